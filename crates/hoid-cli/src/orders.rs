@@ -111,25 +111,16 @@ pub fn ranges(
     let mut ranges = hoid_ident::order_selection::default_operator_ranges(structure, sample_time);
     for (name, value) in parse_pairs(orders.unwrap_or_default()).map_err(CliError::Usage)? {
         let range = parse_range(&value).map_err(|e| CliError::Usage(format!("--orders {name}: {e}")))?;
-        let place = match name.as_str() {
-            "na" => &mut ranges.na,
-            "nb" => &mut ranges.nb,
-            "nc" => &mut ranges.nc,
-            "nd" => &mut ranges.nd,
-            "nf" => &mut ranges.nf,
-            "nk" if nk.is_some() => {
-                return Err(CliError::Usage(
-                    "nk is given twice, by --orders and by --nk; drop one".to_owned(),
-                ));
-            }
-            "nk" => &mut ranges.nk,
-            _ => {
-                return Err(CliError::Usage(format!(
-                    "--orders: there is no order {name}; expected na, nb, nc, nd, nf or nk"
-                )));
-            }
-        };
-        *place = range;
+        if name == "nk" && nk.is_some() {
+            return Err(CliError::Usage(
+                "nk is given twice, by --orders and by --nk; drop one".to_owned(),
+            ));
+        }
+        *ranges.range_mut(&name).ok_or_else(|| {
+            CliError::Usage(format!(
+                "--orders: there is no order {name}; expected na, nb, nc, nd, nf or nk"
+            ))
+        })? = range;
     }
     if let Some(nk) = nk {
         ranges.nk = nk.samples(sample_time);

@@ -13,7 +13,7 @@ use std::{
 
 use tempfile::TempDir;
 
-use common::{bad, good};
+use common::{bad, good, json};
 
 /// A simulated run as text.
 fn run(directory: &Path) -> String {
@@ -84,6 +84,8 @@ fn gains_without_units_are_not_in_degrees() {
         ("# units: e deg\n", None, None),
         ("# units: e deg\n", Some("u=V"), Some("V/deg")),
         ("", Some("e=mm,u=deg"), Some("deg/mm")),
+        // Any word is a unit, and stands as it was typed.
+        ("# units: e deg\n", Some("u=dog"), Some("dog/deg")),
     ] {
         let rest: String = text.lines().skip(1).map(|line| format!("{line}\n")).collect();
         fs::write(d.join("run.csv"), format!("{units}{rest}")).unwrap();
@@ -96,6 +98,9 @@ fn gains_without_units_are_not_in_degrees() {
             None => assert!(!gain.contains("deg"), "{gain}"),
         }
     }
+    let found = json(d, &[&identify[..], &["--unit", "u=dog", "--json"]].concat());
+    let units = serde_json::json!({"input": "deg", "output": "dog"});
+    assert_eq!(found["records"][0]["units"], units);
     fs::write(d.join("run.csv"), text.replace("e deg", "e rad")).unwrap();
     let wrong = [&identify[..], &["--unit", "e=deg"]].concat();
     let (code, message) = bad(d, &wrong);

@@ -357,13 +357,7 @@ impl Fit {
             e: record.input(),
             u: record.output(),
         };
-        let criterion = Criterion {
-            orders,
-            data: vec![data],
-            initial: self.initial_state,
-            first,
-            weights: None,
-        };
+        let criterion = Criterion::of_record(orders, data, self.initial_state, first);
         Ok(Series {
             first,
             values: criterion.residuals_of(theta, 0, &mut Workspace::of_thread()),

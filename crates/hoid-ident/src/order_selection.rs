@@ -74,6 +74,19 @@ impl OrderRanges {
         ]
     }
 
+    /// The range of an order or of the delay by its name.
+    pub fn range_mut(&mut self, name: &str) -> Option<&mut RangeInclusive<usize>> {
+        match name {
+            "na" => Some(&mut self.na),
+            "nb" => Some(&mut self.nb),
+            "nc" => Some(&mut self.nc),
+            "nd" => Some(&mut self.nd),
+            "nf" => Some(&mut self.nf),
+            "nk" => Some(&mut self.nk),
+            _ => None,
+        }
+    }
+
     /// Number of all combinations.
     ///
     /// # Errors

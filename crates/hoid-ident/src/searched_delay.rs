@@ -63,18 +63,13 @@ impl Fit {
         let mut own = 0.0;
         let mut workspace = Workspace::of_thread();
         for data in Data::of(records) {
-            let criterion = Criterion {
-                orders,
-                data: vec![data],
-                initial: self.initial_state,
-                first: first_residual(&orders, self.initial_state),
-                weights: None,
-            };
-            let psi = criterion.jacobian(theta, 0, &mut workspace);
-            let d = along_the_delay(self.model.b(), &psi[orders.na..], ts);
-            own += dot(&d, &d);
+            let first = first_residual(&orders, self.initial_state);
+            let criterion = Criterion::of_record(orders, data, self.initial_state, first);
+            let psi = self.jacobian_with_delay(&criterion, &mut workspace);
+            let d = &psi[theta.len()];
+            own += dot(d, d);
             for (i, &at) in free.iter().enumerate() {
-                along[i] += dot(&psi[at], &d);
+                along[i] += dot(&psi[at], d);
                 for (j, &other) in free.iter().enumerate() {
                     gram[(i, j)] += dot(&psi[at], &psi[other]);
                 }
@@ -97,10 +92,19 @@ impl Fit {
         let finite = variance_s2.is_finite() && slope.iter().all(|s| s.is_finite());
         finite.then_some(SearchedDelay { variance_s2, slope })
     }
+
+    /// Columns of psi in the record of a criterion, and d behind them: the residual's slope along the
+    /// delay, as if that were the last element of theta.
+    pub(crate) fn jacobian_with_delay(&self, criterion: &Criterion<'_>, workspace: &mut Workspace) -> Vec<Vec<f64>> {
+        let mut psi = criterion.jacobian(self.model.theta(), 0, workspace);
+        let of_b = &psi[criterion.orders.na..];
+        psi.push(along_the_delay(self.model.b(), of_b, self.model.sample_time().s()));
+        psi
+    }
 }
 
 /// `-d eps/d tau` from the columns of psi for the coefficients of B.
-pub(crate) fn along_the_delay(b: &[f64], of_b: &[Vec<f64>], sample_time_s: f64) -> Vec<f64> {
+fn along_the_delay(b: &[f64], of_b: &[Vec<f64>], sample_time_s: f64) -> Vec<f64> {
     let n = of_b.first().map_or(0, Vec::len);
     let x = |t: usize| -> f64 { b.iter().zip(of_b).map(|(b, column)| b * column[t]).sum() };
     (0..n)

@@ -3,9 +3,12 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may fail at any line, its helpers as well")]
 
+mod common;
+
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use common::options;
 use hoid_io::{IoError, ReadOptions, ReadRecord, read_record, read_table, write_record};
 use hoid_model::{Channel, Record, SampleTime};
 
@@ -13,14 +16,6 @@ const N: usize = 40;
 
 fn fixture(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fixtures").join(name)
-}
-
-fn options(input: &str, output: &str) -> ReadOptions {
-    ReadOptions {
-        input: Some(input.parse().unwrap()),
-        output: output.parse().unwrap(),
-        ..ReadOptions::default()
-    }
 }
 
 fn read(name: &str, input: &str, output: &str) -> ReadRecord {

@@ -245,13 +245,9 @@ impl Lab {
     /// # Errors
     /// Those of files.
     pub fn export(&self) -> Result<Option<(Vec<u8>, &'static str)>, LabError> {
-        let folder = self
-            .shared
-            .state()
-            .session
-            .as_ref()
-            .map(|session| session.folder.clone());
-        let Some(folder) = folder else { return Ok(None) };
+        let Some(folder) = self.shared.session_folder() else {
+            return Ok(None);
+        };
         Ok(Some((export::archive(&self.shared.out, &folder)?, "application/zip")))
     }
 
@@ -261,13 +257,7 @@ impl Lab {
     /// Those of files.
     pub fn data(&self, name: &str) -> Result<Option<(Vec<u8>, &'static str)>, LabError> {
         let number: Option<usize> = name.strip_suffix(".json").and_then(|number| number.parse().ok());
-        let folder = self
-            .shared
-            .state()
-            .session
-            .as_ref()
-            .map(|session| session.folder.clone());
-        let (Some(number), Some(folder)) = (number, folder) else {
+        let (Some(number), Some(folder)) = (number, self.shared.session_folder()) else {
             return Ok(None);
         };
         let found = Stem::all(&folder)?.into_iter().find(|(known, _)| *known == number);
@@ -280,13 +270,9 @@ impl Lab {
     /// # Errors
     /// Those of files.
     pub fn report(&self, names: &[&str]) -> Result<Option<(Vec<u8>, &'static str)>, LabError> {
-        let folder = self
-            .shared
-            .state()
-            .session
-            .as_ref()
-            .map(|session| session.folder.clone());
-        let Some(folder) = folder else { return Ok(None) };
+        let Some(folder) = self.shared.session_folder() else {
+            return Ok(None);
+        };
         reports::file(&folder, &self.shared.out, names)
     }
 }
@@ -294,6 +280,11 @@ impl Lab {
 impl Shared {
     fn state(&self) -> MutexGuard<'_, Current> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// The folder of the session that goes on or is shown.
+    fn session_folder(&self) -> Option<PathBuf> {
+        self.state().session.as_ref().map(|session| session.folder.clone())
     }
 
     fn pages(&self) -> MutexGuard<'_, BTreeMap<u64, Page>> {

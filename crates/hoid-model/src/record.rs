@@ -273,10 +273,25 @@ impl Record {
     /// The same record with the mean or the line taken out of input and output; other channels stay
     /// as they are.
     pub fn detrended(mut self, how: Detrend) -> Self {
-        for channel in self.input.iter_mut().chain([&mut self.output]) {
-            take_out(how, &mut channel.values);
-        }
+        self.signals_mut().for_each(|values| take_out(how, values));
         self
+    }
+
+    /// The same record with input and output changed, one after the other, as by a filter; other
+    /// channels stay as they are.
+    ///
+    /// # Errors
+    /// [`ModelError::NotFinite`] where what was made of a signal is not finite.
+    pub fn map_signals(mut self, change: impl FnMut(&mut [f64])) -> Result<Self, ModelError> {
+        self.signals_mut().for_each(change);
+        self.input.iter().chain([&self.output]).try_for_each(check_finite)?;
+        Ok(self)
+    }
+
+    /// The values of input and output, in this order.
+    fn signals_mut(&mut self) -> impl Iterator<Item = &mut [f64]> {
+        let channels = self.input.iter_mut().chain([&mut self.output]);
+        channels.map(|channel| channel.values.as_mut_slice())
     }
 }
 
@@ -418,5 +433,30 @@ mod tests {
         assert!((mean.input().iter().sum::<f64>()).abs() < 1e-10);
         assert!((mean.input()[0] + 12.25).abs() < 1e-12);
         assert_eq!(record.clone().detrended(Detrend::None), record);
+    }
+
+    #[test]
+    fn a_map_changes_input_and_output_alone() {
+        let whole = record(&[1.0, 2.0], &[3.0, 4.0])
+            .unwrap()
+            .labelled("run")
+            .starting_at(5.0)
+            .with_channel(channel("x", &[7.0, 8.0]))
+            .unwrap();
+        let twice = |values: &mut [f64]| values.iter_mut().for_each(|v| *v *= 2.0);
+        let found = whole.clone().map_signals(twice).unwrap();
+        assert_eq!((found.input(), found.output()), (&[2.0, 4.0][..], &[6.0, 8.0][..]));
+        // Nothing else is another: its inverse gives the record back.
+        let back = found.map_signals(|values| values.iter_mut().for_each(|v| *v /= 2.0));
+        assert_eq!(back.unwrap(), whole);
+        let mut order = Vec::new();
+        whole.clone().map_signals(|values| order.push(values[0])).unwrap();
+        assert_eq!(order, [1.0, 3.0]);
+        let alone = Record::of_output(whole.sample_time(), channel("u", &[1.0])).unwrap();
+        assert_eq!(alone.map_signals(twice).unwrap().output(), [2.0]);
+        assert!(matches!(
+            whole.map_signals(|values| values[1] /= 0.0),
+            Err(ModelError::NotFinite { index: 1, .. })
+        ));
     }
 }

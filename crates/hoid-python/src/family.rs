@@ -19,7 +19,7 @@ use crate::{
     arrays::{self, Wanted, array, matrix},
     controlled_element::ControlledElement,
     errors::{Outcome, bad_option},
-    figures::{Pair, VerdictParts, pair, verdict},
+    figures::{self, Pair, VerdictParts, pair, verdict},
     fit::PyFit,
     interrupt, names,
 };
@@ -432,11 +432,7 @@ impl PyOperatorFit {
 
     #[getter]
     fn termination<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let (found, all) = (self.found.termination, PyDict::new(py));
-        all.set_item("reason", found.reason.to_string())?;
-        all.set_item("converged", found.converged())?;
-        all.set_item("iterations", found.iterations)?;
-        Ok(all)
+        figures::termination(py, self.found.termination)
     }
 
     /// Channel of the excitation; none where there was none.

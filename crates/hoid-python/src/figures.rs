@@ -1,7 +1,7 @@
 //! Small figures as Python has them: estimates as pairs, operators as dictionaries.
 
 use hoid_ident::{
-    MarginEstimates,
+    MarginEstimates, Termination,
     validation::{GoodnessOfFit, LjungBox},
 };
 use hoid_model::{
@@ -41,6 +41,15 @@ pub type VerdictParts = (&'static str, Vec<String>, Vec<String>);
 pub fn verdict(v: &Verdict) -> VerdictParts {
     let reasons = v.reasons().map(str::to_owned).collect();
     (v.level.name(), reasons, v.notes().map(str::to_owned).collect())
+}
+
+/// How a search ended.
+pub fn termination<'py>(py: Python<'py>, found: Termination) -> PyResult<Bound<'py, PyDict>> {
+    let all = PyDict::new(py);
+    all.set_item("reason", found.reason.to_string())?;
+    all.set_item("converged", found.converged())?;
+    all.set_item("iterations", found.iterations)?;
+    Ok(all)
 }
 
 pub fn orders<'py>(py: Python<'py>, o: &Orders) -> PyResult<Bound<'py, PyDict>> {

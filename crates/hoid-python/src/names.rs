@@ -154,19 +154,9 @@ pub fn range(option: &str, ends: (usize, usize)) -> Outcome<RangeInclusive<usize
 /// Orders by name, each a range, instead of the default ones.
 pub fn with_orders(mut ranges: OrderRanges, orders: &BTreeMap<String, (usize, usize)>) -> Outcome<OrderRanges> {
     for (name, ends) in orders {
-        let place = match name.as_str() {
-            "na" => &mut ranges.na,
-            "nb" => &mut ranges.nb,
-            "nc" => &mut ranges.nc,
-            "nd" => &mut ranges.nd,
-            "nf" => &mut ranges.nf,
-            "nk" => &mut ranges.nk,
-            _ => {
-                return Err(bad_option(format!(
-                    "there is no order {name}; expected na, nb, nc, nd, nf or nk"
-                )));
-            }
-        };
+        let place = ranges
+            .range_mut(name)
+            .ok_or_else(|| bad_option(format!("there is no order {name}; expected na, nb, nc, nd, nf or nk")))?;
         *place = range(name, *ends)?;
     }
     Ok(ranges)

@@ -76,10 +76,7 @@ impl PyTimeVaryingFit {
 
     #[getter]
     fn termination<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let (found, all) = (self.fit.termination(), PyDict::new(py));
-        all.set_item("reason", found.reason.to_string())?;
-        all.set_item("converged", found.converged())?;
-        all.set_item("iterations", found.iterations)?;
+        let all = figures::termination(py, self.fit.termination())?;
         all.set_item("start", self.fit.start())?;
         Ok(all)
     }

@@ -126,6 +126,8 @@ fn three_methods_over_each_other_show_all_that_is_asked_for() {
     }
     let operator = figure(&html, "operator");
     assert!(operator.contains(">truth<") && operator.contains(">batch fit<"));
+    assert!(html.contains("Black dashes: the truth") && html.contains("Dots in colour: batch fits"));
+    assert!(html.contains("Shaded") && html.contains("Upright dots"));
     assert!(
         figure(&html, "coefficients").contains(", f</tspan><tspan"),
         "a and f share a panel"
@@ -187,7 +189,8 @@ fn a_recording_has_no_truth() {
     let html = report(&record, vec![section(hostile, &trace, &[])]).to_html().unwrap();
     check_page(&html);
     assert!(!html.contains("<b>") && !html.contains("<deg>"));
-    assert!(!html.contains(">truth<") && !html.contains("Relative error") && !html.contains("Dashed"));
+    assert!(!html.contains(">truth<") && !html.contains("Relative error"));
+    assert!(!html.contains("dashes") && !html.contains("Dots in colour"));
     // Only the operator's own parameters move, so that their errors are shown.
     assert!(html.contains("Standard errors of the parameters of the operator"));
 }
@@ -203,7 +206,7 @@ fn a_start_from_nothing_and_shortened_steps_are_told() {
     let html = report(&record, vec![section("RPEM", &trace, &[])]).to_html().unwrap();
     check_page(&html);
     assert!(html.contains("There was no start fit") && html.contains("from nothing"));
-    assert!(!html.contains("Shaded"));
+    assert!(!html.contains("Shaded") && !html.contains("Upright"));
     assert!(figure(&html, "shortened").contains(">steps"));
     assert!(html.contains(&format!("<td class=\"n\">{}</td>", trace.counts().shortened)));
 }

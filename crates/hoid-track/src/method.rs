@@ -19,6 +19,7 @@ use crate::{
     person_prior::PersonPrior,
     recursion::Recursion,
     setup::Setup,
+    shared_options::GainOptions,
     start::StartState,
 };
 
@@ -93,19 +94,25 @@ pub(crate) trait RecursiveMethod: Settings {
         None
     }
 
+    /// The options of its gain, where that is the kernel's.
+    fn gain(&self) -> Option<&GainOptions> {
+        None
+    }
+
     /// Its memories, where it has some.
     fn memories(&self) -> Option<&MemoryOptions> {
-        None
+        self.gain().map(|gain| &gain.memories)
     }
 
     /// How it forgets.
     fn forgetting(&self) -> ForgettingRule {
-        ForgettingRule::Exponential
+        self.gain()
+            .map_or(ForgettingRule::Exponential, |gain| gain.forgetting.clone())
     }
 
     /// P at the start as a multiple of the unit matrix; none for that of the start fit.
     fn covariance(&self) -> Option<f64> {
-        None
+        self.gain().and_then(|gain| gain.covariance)
     }
 
     /// Multiple of the innovation's standard deviation beyond which an innovation moves the

@@ -145,6 +145,11 @@ impl Trace {
         whole.iter().all(|c| c.is_finite()).then_some(whole)
     }
 
+    /// True for a row before the first estimate of a method that starts itself: what stands there is none.
+    pub fn is_before_the_first(&self, row: usize) -> bool {
+        self.options.method.starts_itself() && self.covariance(row).is_none()
+    }
+
     /// Each coefficient of a row with its standard error.
     pub fn parameters(&self, row: usize) -> Vec<Estimate> {
         let p = self.width();

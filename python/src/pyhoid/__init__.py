@@ -36,7 +36,9 @@ from .estimates import Estimate, Operator, Remnant
 from .fit import Fit, FrequencyResponse, Series, Validation
 from .groups import group, group_manifest, simulate_group, simulate_people
 from .identification import identify
-from .operator_fit import OperatorFit, OperatorParameter, identify_operator
+from .operator_fit import OperatorFit
+from .operator_identification import identify_operator
+from .operator_parameters import OperatorParameter
 from .reading import info, read, read_segments, write
 from .record import Record
 from .reproduction import Reproduction, reproduce

@@ -10,7 +10,7 @@ from ._options import Order, Progress
 from ._pickling import Call
 from .errors import OptionError
 from .fit import Fit
-from .operator_fit import prior_of
+from .operator_identification import prior_of
 from .record import Record
 from .time_varying import TimeVaryingFit
 

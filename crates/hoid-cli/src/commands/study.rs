@@ -8,7 +8,7 @@ use std::{
     },
 };
 
-use hoid_study::{Outcome, Plan, RunOptions, merge, plan_schema, run};
+use hoid_study::{Outcome, Plan, Progress, RunOptions, StudyError, merge, plan_schema, run};
 use hoid_thesis::plans::{find as find_plan, named_plans};
 use serde_json::json;
 
@@ -58,7 +58,10 @@ fn run_plan(args: &StudyRunArgs) -> Result<(), CliError> {
         resume: args.resume,
         csv: args.csv,
     };
-    let outcome = run_with_progress(&plan, &args.out, &options)?;
+    let estimates = usize::try_from(plan.estimates()).unwrap_or(usize::MAX);
+    let outcome = with_progress(&plan.name, &args.out, (estimates, "estimates"), |progress, go_on| {
+        run(&plan, &args.out, &options, progress, go_on)
+    })?;
     if args.json {
         output::print(&format!("{:#}\n", outcome_json(&plan, &outcome)))?;
         return Ok(());
@@ -76,15 +79,18 @@ fn run_plan(args: &StudyRunArgs) -> Result<(), CliError> {
     Ok(())
 }
 
-/// Runs a plan with a progress bar; an interrupt stops it so that it can be resumed.
-pub fn run_with_progress(plan: &Plan, directory: &Path, options: &RunOptions) -> Result<Outcome, CliError> {
+/// Runs a plan or a group, by its name, into a directory with a progress bar of so many units; an
+/// interrupt stops it so that it can be resumed.
+pub fn with_progress(
+    name: &str,
+    directory: &Path,
+    (total, unit): (usize, &'static str),
+    work: impl FnOnce(&(dyn Fn(Progress) + Sync), &(dyn Fn() -> bool + Sync)) -> Result<Outcome, StudyError>,
+) -> Result<Outcome, CliError> {
     let stopped = stop_at_interrupt();
-    let bar = output::progress(usize::try_from(plan.estimates()).unwrap_or(usize::MAX), "estimates");
-    let outcome = run(
-        plan,
-        directory,
-        options,
-        &|progress| {
+    let bar = output::progress(total, unit);
+    let outcome = work(
+        &|progress: Progress| {
             bar.set_length(progress.total);
             bar.set_position(progress.done);
         },
@@ -97,15 +103,14 @@ pub fn run_with_progress(plan: &Plan, directory: &Path, options: &RunOptions) ->
         Ok(outcome)
     } else {
         Err(CliError::Stopped(format!(
-            "{} was stopped; what is done is in {}, go on with --resume",
-            plan.name,
+            "{name} was stopped; what is done is in {}, go on with --resume",
             directory.display()
         )))
     }
 }
 
 /// What the user should know of a directory, as warnings.
-pub fn say(directory: &Path, notes: &[String]) {
+fn say(directory: &Path, notes: &[String]) {
     for note in notes {
         output::warning(&directory.display().to_string(), note);
     }

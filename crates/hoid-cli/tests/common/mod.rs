@@ -9,6 +9,7 @@ use std::{
 };
 
 use serde_json::Value;
+use tempfile::TempDir;
 
 pub fn hoid(directory: &Path, arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_hoid"))
@@ -59,6 +60,38 @@ pub fn bad(directory: &Path, arguments: &[&str]) -> (i32, String) {
     let message = String::from_utf8(output.stderr).unwrap();
     assert!(!message.contains("panicked"), "{message}");
     (output.status.code().unwrap(), message)
+}
+
+/// A folder with a run of C1.
+pub fn simulated() -> TempDir {
+    let directory = TempDir::new().unwrap();
+    good(
+        directory.path(),
+        &["simulate", "--condition", "C1", "--seed", "1", "--out", "c1.csv"],
+    );
+    directory
+}
+
+/// A file of `rows` samples at 100 Hz, each line made by `row` from its number.
+pub fn write(directory: &Path, name: &str, header: &str, rows: usize, row: impl Fn(usize) -> String) {
+    let lines: Vec<String> = std::iter::once(header.to_owned()).chain((0..rows).map(row)).collect();
+    fs::write(directory.join(name), lines.join("\n") + "\n").unwrap();
+}
+
+/// t, e and u of sample k.
+pub fn wave(k: usize) -> (f64, f64, f64) {
+    let t = k as f64 / 100.0;
+    (
+        t,
+        (1.7 * t).sin() + 0.5 * (9.1 * t).sin(),
+        (1.7 * t - 0.8).sin() + 0.3 * (23.0 * t).cos(),
+    )
+}
+
+/// Sample k as a line of a file.
+pub fn row(k: usize) -> String {
+    let (t, e, u) = wave(k);
+    format!("{t},{e},{u}")
 }
 
 /// Arguments of `track` or `stream` with the method in physical parameters, which starts with a fit,

@@ -3,7 +3,10 @@
 
 pub mod operator;
 
-use hoid_core::adaptation::Forgetting;
+use hoid_core::{
+    adaptation::Forgetting, covariance::Covariance, error_bars::ErrorBars, innovation_variance::InnovationVariance,
+    shape::AnyShape, ud_covariance::UdCovariance,
+};
 
 /// Pseudo-random numbers, uniform with unit variance.
 pub struct Noise(pub u64);
@@ -131,4 +134,49 @@ pub fn relative_difference<const N: usize>(a: &[[f64; N]; N], b: &[[f64; N]; N])
         }
     }
     largest
+}
+
+/// `value` times the unit matrix.
+pub fn diagonal<const N: usize>(value: f64) -> [[f64; N]; N] {
+    std::array::from_fn(|i| std::array::from_fn(|j| if i == j { value } else { 0.0 }))
+}
+
+/// The way of forgetting with P = p0 I and no bound.
+pub fn covariance<const N: usize>(p0: f64, forgetting: Forgetting<N>) -> Covariance<N> {
+    Covariance::new(UdCovariance::diagonal([p0; N]), forgetting, [f64::INFINITY; N])
+}
+
+/// Error bars from p0 I, the innovation limited to five deviations.
+pub fn bars<const N: usize, const K: usize>(p0: f64) -> ErrorBars<N, K> {
+    ErrorBars::new(&diagonal::<N>(p0), InnovationVariance::new(0.0, 0.0, 1.0), 5.0)
+}
+
+/// Stable coefficients of some orders.
+pub fn start<const N: usize>(shape: &AnyShape) -> [f64; N] {
+    let mut theta = [0.0; N];
+    let mut at = 0;
+    for (n, values) in [
+        (shape.na, [-1.2, 0.4]),
+        (shape.nb, [0.05, -0.03]),
+        (shape.nc, [0.2, -0.1]),
+        (shape.nd, [-0.7, 0.1]),
+        (shape.nf, [-1.8, 0.82]),
+    ] {
+        theta[at..at + n].copy_from_slice(&values[..n]);
+        at += n;
+    }
+    theta
+}
+
+/// ARX, ARMAX, OE, ARARX, Box-Jenkins, the general form.
+pub fn shapes() -> [AnyShape; 6] {
+    let s = |na, nb, nc, nd, nf| AnyShape { na, nb, nc, nd, nf };
+    [
+        s(2, 2, 0, 0, 0),
+        s(2, 2, 1, 0, 0),
+        s(0, 2, 0, 0, 2),
+        s(1, 2, 0, 2, 0),
+        s(0, 2, 0, 1, 2),
+        s(1, 2, 2, 1, 2),
+    ]
 }

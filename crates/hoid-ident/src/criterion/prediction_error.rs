@@ -43,7 +43,18 @@ pub(crate) fn output_variance(data: &[Data<'_>], first: usize) -> f64 {
     variance(&outputs)
 }
 
-impl Criterion<'_> {
+impl<'a> Criterion<'a> {
+    /// The criterion over one record in which all residuals count the same.
+    pub fn of_record(orders: Orders, data: Data<'a>, initial: InitialState, first: usize) -> Self {
+        Self {
+            orders,
+            data: vec![data],
+            initial,
+            first,
+            weights: None,
+        }
+    }
+
     /// Number of residuals over all records.
     pub fn residuals(&self) -> usize {
         self.data.iter().map(|d| d.u.len().saturating_sub(self.first)).sum()

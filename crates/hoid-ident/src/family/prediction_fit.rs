@@ -2,9 +2,7 @@
 
 use super::{clusters::Clusters, layout::FamilyLayout};
 use crate::{
-    criterion::{Criterion, Workspace},
-    grey_box::objective::PhysicalCriterion,
-    linalg::least_squares::solve_symmetric,
+    criterion::Workspace, grey_box::objective::PhysicalCriterion, linalg::least_squares::solve_symmetric,
     optimize::Minimum,
 };
 
@@ -42,19 +40,10 @@ impl PredictionFit<'_> {
     pub fn residuals_of(&self, record: usize, workspace: &mut Workspace) -> Option<Vec<f64>> {
         let mapped = self.criterion.model_of(self.eta(), record).ok()?;
         Some(
-            self.of_record(&mapped.orders, record)
+            self.criterion
+                .of_record(mapped.orders, record)
                 .residuals_of(&mapped.theta, 0, workspace),
         )
-    }
-
-    fn of_record(&self, orders: &hoid_model::Orders, record: usize) -> Criterion<'_> {
-        Criterion {
-            orders: *orders,
-            data: vec![self.criterion.data[record]],
-            initial: self.criterion.initial,
-            first: self.criterion.first,
-            weights: None,
-        }
     }
 
     /// Number of free parameters.
@@ -66,7 +55,8 @@ impl PredictionFit<'_> {
     pub fn squares_of(&self, eta: &[f64], record: usize, workspace: &mut Workspace) -> Option<f64> {
         let mapped = self.criterion.model_of(eta, record).ok()?;
         let residuals = self
-            .of_record(&mapped.orders, record)
+            .criterion
+            .of_record(mapped.orders, record)
             .residuals_of(&mapped.theta, 0, workspace);
         let squares: f64 = residuals.iter().map(|e| e * e).sum();
         squares.is_finite().then_some(squares)

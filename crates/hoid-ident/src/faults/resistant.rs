@@ -12,7 +12,7 @@
 
 use std::{cmp::Ordering, collections::BinaryHeap};
 
-use hoid_model::{Channel, Record};
+use hoid_model::Record;
 
 use super::{
     autoregression::{Autoregression, FLOOR},
@@ -26,23 +26,9 @@ const HELD: f64 = 4.0;
 /// The record with its samples held; `None` where none is moved.
 pub fn resistant(record: &Record) -> Option<Record> {
     let ts = record.sample_time().s();
-    let (input, output, others) = record.clone().into_channels();
-    let mut channels: Vec<Channel> = input.into_iter().chain([output]).collect();
     let mut moved = false;
-    for channel in &mut channels {
-        moved |= hold(&mut channel.values, ts);
-    }
-    if !moved {
-        return None;
-    }
-    let mut channels = channels.into_iter();
-    let whole = match (channels.next(), channels.next()) {
-        (Some(input), Some(output)) => Record::new(record.sample_time(), input, output),
-        (Some(output), None) => Record::of_output(record.sample_time(), output),
-        _ => return None,
-    };
-    let whole = whole.ok()?.labelled(record.label()).starting_at(record.time_s(0));
-    others.into_iter().try_fold(whole, Record::with_channel).ok()
+    let held = record.clone().map_signals(|values| moved |= hold(values, ts));
+    held.ok().filter(|_| moved)
 }
 
 fn hold(values: &mut [f64], sample_time_s: f64) -> bool {
@@ -134,7 +120,7 @@ pub fn held(records: &[Record]) -> Option<Vec<Record>> {
 
 #[cfg(test)]
 mod tests {
-    use hoid_model::SampleTime;
+    use hoid_model::{Channel, SampleTime};
 
     use super::{super::test_signals::autoregressive, *};
 

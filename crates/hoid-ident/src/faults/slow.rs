@@ -23,21 +23,9 @@ pub fn without_slow(records: &[Record]) -> Option<Vec<Record>> {
     let count = |r: &Record| ((2.0 * r.len() as f64 * r.sample_time().s() / PERIOD_S) as usize).min(MOST);
     records.iter().any(|r| count(r) > 0).then(|| {
         let each = records.iter().map(|record| {
-            let (input, output, others) = record.clone().detrended(Detrend::Linear).into_channels();
-            let mut channels = input.into_iter().chain([output]).map(|mut channel| {
-                take_out(&mut channel.values, count(record));
-                channel
-            });
-            let whole = match (channels.next(), channels.next()) {
-                (Some(input), Some(output)) => Record::new(record.sample_time(), input, output),
-                (Some(output), None) => Record::of_output(record.sample_time(), output),
-                _ => return record.clone(),
-            };
-            let with_others = |whole: Record| {
-                let whole = whole.labelled(record.label()).starting_at(record.time_s(0));
-                others.iter().cloned().try_fold(whole, Record::with_channel)
-            };
-            whole.and_then(with_others).unwrap_or_else(|_| record.clone())
+            let flat = record.clone().detrended(Detrend::Linear);
+            let quick = flat.map_signals(|values| take_out(values, count(record)));
+            quick.unwrap_or_else(|_| record.clone())
         });
         each.collect()
     })

@@ -91,18 +91,13 @@ impl<'a, P: Parametrisation> PhysicalCriterion<'a, P> {
 
     /// Number of initial states over all records.
     pub fn states(&self) -> usize {
-        let of_record = |record: usize| self.criterion(self.layout.orders(1), record).states();
+        let of_record = |record: usize| self.of_record(self.layout.orders(1), record).states();
         (0..self.data.len()).map(of_record).sum()
     }
 
-    fn criterion(&self, orders: hoid_model::Orders, record: usize) -> Criterion<'a> {
-        Criterion {
-            orders,
-            data: vec![self.data[record]],
-            initial: self.initial,
-            first: self.first,
-            weights: None,
-        }
+    /// The criterion of one record in theta.
+    pub fn of_record(&self, orders: hoid_model::Orders, record: usize) -> Criterion<'a> {
+        Criterion::of_record(orders, self.data[record], self.initial, self.first)
     }
 
     fn polynomials(&self, eta: &[f64], record: usize) -> Option<Mapped> {
@@ -229,7 +224,7 @@ impl<P: Parametrisation> Objective for PhysicalCriterion<'_, P> {
         eta.iter().all(|v| v.is_finite())
             && (0..self.data.len()).all(|record| {
                 self.polynomials(eta, record)
-                    .is_some_and(|p| self.criterion(p.orders, record).is_feasible(&p.theta))
+                    .is_some_and(|p| self.of_record(p.orders, record).is_feasible(&p.theta))
             })
     }
 
@@ -247,7 +242,7 @@ impl<P: Parametrisation> Objective for PhysicalCriterion<'_, P> {
                 return total;
             };
             let of_theta = self
-                .criterion(polynomials.orders, record)
+                .of_record(polynomials.orders, record)
                 .linearise(&polynomials.theta, workspace);
             total.sum_of_squares += of_theta.sum_of_squares;
             let positions = self.layout.positions(record);

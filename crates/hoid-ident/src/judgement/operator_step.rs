@@ -80,13 +80,7 @@ pub fn operator_step(operator: &OperatorParameters, record: &Record) -> Option<[
     let places = [0, 1, 2, theta.len() - 2, theta.len() - 1];
     let mut workspace = Workspace::of_thread();
     let mut scores = |_: usize, data: Data<'_>| {
-        let criterion = Criterion {
-            orders,
-            data: vec![data],
-            initial: fit.initial_state(),
-            first,
-            weights: None,
-        };
+        let criterion = Criterion::of_record(orders, data, fit.initial_state(), first);
         let eps = criterion.residuals_of(theta, 0, &mut workspace);
         let psi = criterion.jacobian(theta, 0, &mut workspace);
         let column = |k: usize| {

@@ -35,6 +35,10 @@ pub enum LineKind {
     /// Continuous, in its colour.
     #[default]
     Line,
+    /// Dashed, in its colour: what may lie on another line, which shows through.
+    Dashed,
+    /// Dotted, in its colour.
+    Dotted,
     /// Dashed and black: the truth, or what was demanded.
     Truth,
     /// Continuous with a marker at each value, whose form is that of the level.
@@ -178,7 +182,8 @@ impl CurveGrid {
         for curve in all().filter(|c| !c.name.is_empty()) {
             let sample = match curve.kind {
                 LineKind::Line => Sample::Line,
-                LineKind::Truth => Sample::Dashed,
+                LineKind::Truth | LineKind::Dashed => Sample::Dashed,
+                LineKind::Dotted => Sample::Dotted,
                 LineKind::Marked => Sample::LineMark(curve.shade.mark()),
                 LineKind::Points | LineKind::Stems => Sample::Point,
             };
@@ -274,7 +279,8 @@ impl Curve {
             let points = kept.map(|k| (self.x[k], scale.bounded(values[k])));
             let line = style::line(points, &self.colour(), LINE);
             match self.kind {
-                LineKind::Truth => line.with_dashed().into(),
+                LineKind::Truth | LineKind::Dashed => line.with_dashed().into(),
+                LineKind::Dotted => line.with_dotted().into(),
                 _ => line.into(),
             }
         };

@@ -89,7 +89,7 @@ pub fn describing(id: &str, title: &str, found: &Description, models: &[ModelCur
     };
     let line = |(k, model): (usize, &ModelCurve), y: Vec<f64>| Curve {
         name: model.name.clone(),
-        kind: LineKind::Line,
+        kind: kind_of(k),
         shade: Shade::of_method(k + 1),
         x: model.omega_rad_s.clone(),
         y,
@@ -142,6 +142,15 @@ pub fn describing(id: &str, title: &str, found: &Description, models: &[ModelCur
         shared_ordinates: false,
     };
     curves(id, title, &grid)
+}
+
+/// The first model is a continuous line, those after it are broken: where they agree, all are seen.
+fn kind_of(model: usize) -> LineKind {
+    match model {
+        0 => LineKind::Line,
+        1 => LineKind::Dashed,
+        _ => LineKind::Dotted,
+    }
 }
 
 /// Half of the longest error bar, dB or deg: a phase that is known no better than half a turn is not
@@ -235,6 +244,17 @@ mod tests {
         // One run has neither errors nor coherence.
         let alone = describing("d", "t", &described(1), &[]);
         assert!(!alone.contains("coherence") && !alone.contains("NaN"));
+    }
+
+    #[test]
+    fn models_that_agree_are_all_seen() {
+        let found = described(4);
+        let model = |name: &str| ModelCurve::over(&found, name, 0.3, |w| Complex64::from_polar(2.0, -0.3 * w));
+        let broken = |models: &[ModelCurve]| describing("d", "t", &found, models).matches("stroke-dasharray").count();
+        let (none, one) = (broken(&[]), broken(&[model("a")]));
+        let (two, three) = (broken(&[model("a"), model("b")]), broken(&["a", "b", "c"].map(model)));
+        // A line in each of two panels, and the sample of the legend.
+        assert_eq!([one - none, two - one, three - two], [0, 3, 3]);
     }
 
     #[test]

@@ -59,6 +59,7 @@ impl TrackReport<'_> {
             has_start => self.traces.iter().any(|t| t.trace.start().is_some()),
             has_batch => self.traces.iter().any(|t| !t.batch.is_empty()),
             has_changes => self.traces.iter().any(|t| !t.trace.changes().is_empty()),
+            has_marks => !operator.marks_s.is_empty(),
             has_truth => self.record.channel("K_e").is_some(),
             methods => tables::methods(&traces, self.record),
             counts => tables::counts(&traces),

@@ -1,6 +1,6 @@
 //! The tables of a page of recursive estimates as values for the template.
 
-use std::mem::discriminant;
+use std::mem::{Discriminant, discriminant};
 
 use hoid_model::{NotConvertible, Record, uncertainty::Estimate};
 use hoid_track::Change;
@@ -80,8 +80,9 @@ pub fn changes(trace: &Evaluated<'_>) -> Vec<Value> {
             declared => fixed(*t, 2),
             since => fixed(t - c.seconds_ago, 2),
             odds => fixed(c.odds, 1),
-            what => if changed.is_empty() { DASH.to_owned() } else { changed.join(", ") },
+            what => if changed.is_empty() { Value::from(DASH) } else { symbol_of(&changed.join(", ")) },
             k_e => pair(c.k_e.map(|e| e.value), 4),
+            k_e_dot => pair(c.k_e_dot.map(|e| e.value), 4),
             t_l => pair(c.t_l_s, 3),
             remnant => fixed((c.innovation_variance[1] / c.innovation_variance[0]).sqrt(), 2),
         }
@@ -99,21 +100,17 @@ struct Reason {
 /// The reasons, the most frequent first. Those that differ in their numbers alone are one, in the
 /// words of the first.
 fn reasons(trace: &Evaluated<'_>) -> Vec<Reason> {
-    let mut found: Vec<(&NotConvertible, Reason)> = Vec::new();
-    let rows = trace.section.trace.times_s().iter().zip(&trace.operators);
-    for (time_s, reason) in rows.filter_map(|(t, o)| Some((*t, o.as_ref().err()?))) {
-        match found.iter_mut().find(|f| discriminant(f.0) == discriminant(reason)) {
+    // No kind for rows before the first estimate.
+    let mut found: Vec<(Option<Discriminant<NotConvertible>>, Reason)> = Vec::new();
+    let of = trace.section.trace;
+    let rows = of.times_s().iter().zip(&trace.operators).enumerate();
+    for (row, first_s, reason) in rows.filter_map(|(row, (t, o))| Some((row, *t, o.as_ref().err()?))) {
+        let kind = (!of.is_before_the_first(row)).then(|| discriminant(reason));
+        match found.iter_mut().find(|f| f.0 == kind) {
             Some((_, known)) => known.rows += 1,
             None => {
-                let text = reason.to_string();
-                found.push((
-                    reason,
-                    Reason {
-                        rows: 1,
-                        first_s: time_s,
-                        text,
-                    },
-                ));
+                let text = kind.map_or_else(|| "there is no estimate yet".to_owned(), |_| reason.to_string());
+                found.push((kind, Reason { rows: 1, first_s, text }));
             }
         }
     }

@@ -57,6 +57,17 @@ impl Followed {
             response,
         }
     }
+
+    /// What a method with an operator found at the next sample that was asked for; its response is that
+    /// of the operator, NaN where there is none.
+    pub(super) fn push(&mut self, task: &Task<'_>, operator: Option<OperatorParameters>) -> Result<(), ThesisError> {
+        self.response.push(match &operator {
+            Some(operator) => response_of(operator, task.record.sample_time(), task.omega_rad_s)?,
+            None => vec![Complex64::new(f64::NAN, f64::NAN); task.omega_rad_s.len()],
+        });
+        self.operator.push(operator);
+        Ok(())
+    }
 }
 
 /// A method that is compared with others.

@@ -29,7 +29,7 @@ use hoid_model::{OperatorParameters, SampleTime, second_order::HeldStates};
 use nalgebra::{DMatrix, DVector, RowDVector};
 
 use super::{
-    comparator::{About, Comparator, Followed, Task, response_of},
+    comparator::{About, Comparator, Followed, Task},
     pade,
     start::Start,
 };
@@ -264,9 +264,7 @@ impl Comparator for DualEkf {
             // counts twice.
             filters.correct(u[k], task.record.time_s(k) >= task.start_s.1 - 0.5 * ts.s());
             while asked.next_if(|at| **at == k).is_some() {
-                let operator = filters.operator(start.operator.tau_e_s.value);
-                found.response.push(response_of(&operator, ts, task.omega_rad_s)?);
-                found.operator.push(Some(operator));
+                found.push(task, Some(filters.operator(start.operator.tau_e_s.value)))?;
             }
         }
         Ok(found)

@@ -25,7 +25,7 @@ use hoid_model::OperatorParameters;
 use hoid_sim::RunSeed;
 
 use super::{
-    comparator::{About, Comparator, Followed, Task, response_of},
+    comparator::{About, Comparator, Followed, Task},
     unit_responses::unit_responses,
 };
 use crate::ThesisError;
@@ -221,12 +221,7 @@ impl Comparator for GeneticSigmoid {
         let fit = self.fit(task)?;
         let mut found = Followed::default();
         for at in task.at {
-            let operator = operator_at(&fit, task.record.time_s(*at));
-            found.response.push(match &operator {
-                Some(operator) => response_of(operator, task.record.sample_time(), task.omega_rad_s)?,
-                None => vec![num_complex::Complex64::new(f64::NAN, f64::NAN); task.omega_rad_s.len()],
-            });
-            found.operator.push(operator);
+            found.push(task, operator_at(&fit, task.record.time_s(*at)))?;
         }
         Ok(found)
     }

@@ -17,7 +17,7 @@ use hoid_ident::{settings, settings::Bounds};
 use hoid_model::OperatorParameters;
 
 use super::{
-    comparator::{About, Comparator, Followed, Task, response_of},
+    comparator::{About, Comparator, Followed, Task},
     start::Start,
     unit_responses::unit_responses,
 };
@@ -98,8 +98,7 @@ impl Comparator for LinearNetwork {
                     t_l_s: k_e_dot / k_e,
                     ..start
                 };
-                found.response.push(response_of(&operator, ts, task.omega_rad_s)?);
-                found.operator.push(Some(operator));
+                found.push(task, Some(operator))?;
             }
         }
         Ok(found)

@@ -84,15 +84,9 @@ fn make(item: &Item, results: &Results, condition: &str, rows: &[Row]) -> ItemOu
         titles: order_titles(),
         methods: ["ARX (RLS)", "BJ (RPEM)"].map(str::to_owned).to_vec(),
         levels: ["median", "average"].map(str::to_owned).to_vec(),
-        shaded_s: Vec::new(),
-        marks_s: Vec::new(),
-        changes: Vec::new(),
-        shared_ordinates: false,
+        ..TraceGrid::default()
     };
-    ItemOutput {
-        svg: Some(trace_panels(&item.name, &item.title, &grid)),
-        data: data.table(&item.title),
-    }
+    item.drawn(trace_panels, &grid, data)
 }
 
 #[cfg(test)]

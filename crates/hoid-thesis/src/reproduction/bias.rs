@@ -240,8 +240,5 @@ fn make(item: &Item, results: &Results, condition: &str, model: Model, parameter
         with_zero: true,
         least_reach: 0.1,
     };
-    ItemOutput {
-        svg: Some(box_plots(&item.name, &item.title, &grid)),
-        data: data.table(&item.title),
-    }
+    item.drawn(box_plots, &grid, data)
 }

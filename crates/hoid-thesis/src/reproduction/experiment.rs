@@ -114,10 +114,7 @@ fn with(
         });
         match made {
             Ok(runs) => make(item, runs),
-            Err(reason) => ItemOutput {
-                svg: None,
-                data: TableBuilder::new(&[], &[]).table(reason),
-            },
+            Err(reason) => TableBuilder::new(&[], &[]).table(reason).into(),
         }
     }
 }
@@ -152,10 +149,7 @@ fn table(item: &Item, runs: &[EvaluatedRun]) -> ItemOutput {
             );
         }
     }
-    ItemOutput {
-        svg: None,
-        data: data.table(&item.title),
-    }
+    data.table(&item.title).into()
 }
 
 /// Mean and median of the numbers among some.
@@ -245,15 +239,9 @@ fn draw(item: &Item, runs: &[EvaluatedRun], condition: Condition, rows: &[Row]) 
             .collect(),
         methods: methods.map(str::to_owned).to_vec(),
         levels: ["median", "mean"].map(str::to_owned).to_vec(),
-        shaded_s: Vec::new(),
-        marks_s: Vec::new(),
-        changes: Vec::new(),
-        shared_ordinates: false,
+        ..TraceGrid::default()
     };
-    ItemOutput {
-        svg: Some(trace_panels(&item.name, &item.title, &grid)),
-        data: data.table(&item.title),
-    }
+    item.drawn(trace_panels, &grid, data)
 }
 
 /// The mean of the simulated operators: the value of the beginning, then that of the end.

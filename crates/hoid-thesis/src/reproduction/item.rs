@@ -5,6 +5,8 @@ use std::collections::BTreeMap;
 use hoid_io::OutputTable;
 use hoid_study::Results;
 
+use super::table_builder::TableBuilder;
+
 /// Name of the claims among tables and figures.
 pub const CLAIMS: &str = "claims";
 
@@ -33,6 +35,9 @@ impl std::fmt::Debug for Item {
     }
 }
 
+/// Draws a grid of panels under a name and a title.
+type Drawing<G> = fn(&str, &str, &G) -> String;
+
 /// The figure and the numbers of an item.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ItemOutput {
@@ -40,6 +45,13 @@ pub struct ItemOutput {
     pub svg: Option<String>,
     /// Its numbers, or the table itself.
     pub data: OutputTable,
+}
+
+impl From<OutputTable> for ItemOutput {
+    /// A table without a figure.
+    fn from(data: OutputTable) -> Self {
+        Self { svg: None, data }
+    }
 }
 
 impl Item {
@@ -69,11 +81,16 @@ impl Item {
     ) -> Self {
         Self::new(name, title, caption, Some(plan), move |item, results| match results {
             Some(results) => make(item, results),
-            None => ItemOutput {
-                svg: None,
-                data: OutputTable::default(),
-            },
+            None => OutputTable::default().into(),
         })
+    }
+
+    /// Its figure of a grid, and the numbers of that.
+    pub(super) fn drawn<G>(&self, draw: Drawing<G>, grid: &G, data: TableBuilder) -> ItemOutput {
+        ItemOutput {
+            svg: Some(draw(&self.name, &self.title, grid)),
+            data: data.table(&self.title),
+        }
     }
 
     /// Makes it from the results of the studies; without those of its plan it is empty.

@@ -157,8 +157,5 @@ fn make(item: &Item, results: &Results, condition: &str, m0: usize, shown: Shown
         mark: "simulated".to_owned(),
     };
     let figure = grid(drawn, titles);
-    ItemOutput {
-        svg: Some(maps(&item.name, &item.title, &figure)),
-        data: data.table(&item.title),
-    }
+    item.drawn(maps, &figure, data)
 }

@@ -225,8 +225,5 @@ fn make(item: &Item, results: &Results, condition: &str, curves: Curves) -> Item
             curves: drawn,
         });
     }
-    ItemOutput {
-        svg: Some(bode_grid(&item.name, &item.title, &BodeGrid { columns })),
-        data: data.table(&item.title),
-    }
+    item.drawn(bode_grid, &BodeGrid { columns }, data)
 }

@@ -21,10 +21,7 @@ use hoid_report::figures::{Curve, CurveGrid, CurvePanel, LineKind, Shade, curves
 
 pub(super) fn items() -> Vec<Item> {
     let table = |name: &str, title: &str, caption: &str, make: fn(&str) -> hoid_io::OutputTable| {
-        Item::new(name, title, caption, None, move |item, _| ItemOutput {
-            svg: None,
-            data: make(&item.title),
-        })
+        Item::new(name, title, caption, None, move |item, _| make(&item.title).into())
     };
     vec![
         table(
@@ -215,10 +212,7 @@ fn spectrum(item: &Item) -> ItemOutput {
         logarithmic_abscissa: true,
         ..CurveGrid::default()
     };
-    ItemOutput {
-        svg: Some(curves(&item.name, &item.title, &grid)),
-        data: data.table(&item.title),
-    }
+    item.drawn(curves, &grid, data)
 }
 
 fn schedules(item: &Item) -> ItemOutput {
@@ -270,10 +264,7 @@ fn schedules(item: &Item) -> ItemOutput {
         logarithmic_abscissa: false,
         shared_ordinates: true,
     };
-    ItemOutput {
-        svg: Some(curves(&item.name, &item.title, &grid)),
-        data: data.table(&item.title),
-    }
+    item.drawn(curves, &grid, data)
 }
 
 fn noise_level(item: &Item, results: &Results) -> ItemOutput {
@@ -328,8 +319,5 @@ fn noise_level(item: &Item, results: &Results) -> ItemOutput {
         logarithmic_abscissa: false,
         shared_ordinates: true,
     };
-    ItemOutput {
-        svg: Some(curves(&item.name, &item.title, &grid)),
-        data: data.table(&item.title),
-    }
+    item.drawn(curves, &grid, data)
 }

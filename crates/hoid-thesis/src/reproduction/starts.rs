@@ -120,8 +120,5 @@ fn make(item: &Item, results: &Results, start: usize) -> ItemOutput {
         with_zero: true,
         least_reach: 0.01,
     };
-    ItemOutput {
-        svg: Some(box_plots(&item.name, &item.title, &grid)),
-        data: data.table(&item.title),
-    }
+    item.drawn(box_plots, &grid, data)
 }

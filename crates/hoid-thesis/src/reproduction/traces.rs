@@ -211,15 +211,9 @@ fn make(
             .map(|(method, name, _)| format!("{} ({name})", if *method == 0 { "ARX" } else { "BJ" }))
             .collect(),
         levels: levels.iter().map(|level| level_name(*level)).collect(),
-        shaded_s: Vec::new(),
-        marks_s: Vec::new(),
-        changes: Vec::new(),
-        shared_ordinates: false,
+        ..TraceGrid::default()
     };
-    ItemOutput {
-        svg: Some(trace_panels(&item.name, &item.title, &grid)),
-        data: data.table(&item.title),
-    }
+    item.drawn(trace_panels, &grid, data)
 }
 
 /// From where on the estimates set the range of their panels, s: before, they leave their start.

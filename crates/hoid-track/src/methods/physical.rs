@@ -9,10 +9,9 @@ use hoid_model::{SampleTime, Structure};
 
 use super::rpem::LIMIT;
 use crate::{
-    forgetting::ForgettingRule,
     guard::GuardOptions,
     kernel::{Kernel, Plan},
-    memory::{Memory, MemoryOptions},
+    memory::Memory,
     method::{About, RecursiveMethod, check_delay, check_operator_orders},
     recursion::Recursion,
     setup::Setup,
@@ -78,16 +77,8 @@ impl RecursiveMethod for PhysicalOptions {
         true
     }
 
-    fn memories(&self) -> Option<&MemoryOptions> {
-        Some(&self.gain.memories)
-    }
-
-    fn forgetting(&self) -> ForgettingRule {
-        self.gain.forgetting.clone()
-    }
-
-    fn covariance(&self) -> Option<f64> {
-        self.gain.covariance
+    fn gain(&self) -> Option<&GainOptions> {
+        Some(&self.gain)
     }
 
     fn is_guarded(&self) -> bool {

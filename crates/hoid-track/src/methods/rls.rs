@@ -5,10 +5,9 @@ use hoid_ident::{IdentError, settings};
 use hoid_model::{SampleTime, Structure};
 
 use crate::{
-    forgetting::ForgettingRule,
     guard::GuardOptions,
     kernel::{Kernel, Plan},
-    memory::{Memory, MemoryOptions},
+    memory::Memory,
     method::{About, RecursiveMethod, bad},
     recursion::Recursion,
     setup::Setup,
@@ -64,16 +63,8 @@ impl RecursiveMethod for RlsOptions {
         Plan::new(setup, from, sample_time).build(Kernel::LeastSquares)
     }
 
-    fn memories(&self) -> Option<&MemoryOptions> {
-        Some(&self.gain.memories)
-    }
-
-    fn forgetting(&self) -> ForgettingRule {
-        self.gain.forgetting.clone()
-    }
-
-    fn covariance(&self) -> Option<f64> {
-        self.gain.covariance
+    fn gain(&self) -> Option<&GainOptions> {
+        Some(&self.gain)
     }
 
     fn is_guarded(&self) -> bool {

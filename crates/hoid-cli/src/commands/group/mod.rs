@@ -3,10 +3,7 @@
 
 mod form;
 
-use std::{
-    path::{Path, PathBuf},
-    sync::atomic::Ordering,
-};
+use std::path::{Path, PathBuf};
 
 use hoid_model::{SampleTime, VerdictLevel};
 use hoid_report::{group_figures, write_group_pages};
@@ -21,10 +18,7 @@ use hoid_study::{
 
 use form::Finished;
 
-use super::{
-    figure, places,
-    study::{say, stop_at_interrupt},
-};
+use super::{figure, places, study::with_progress};
 use crate::{
     args::{GroupArgs, GroupCommand, GroupInitArgs, GroupRunArgs, SimulateGroupArgs},
     error::CliError,
@@ -184,36 +178,16 @@ fn analyse(path: &Path, out: &Path, args: &GroupRunArgs) -> Result<(), CliError>
         hoid_io::check_output_directory(out, &[&path])?;
     }
     let base = path.parent().map_or_else(|| PathBuf::from("."), Path::to_path_buf);
-    let stopped = stop_at_interrupt();
     let runs = manifest.runs.iter().filter(|run| run.counts).count();
-    let bar = output::progress(runs, "runs");
     let options = RunOptions {
         jobs: args.jobs.map(usize::from),
         resume: args.resume,
         csv: args.csv,
         ..RunOptions::default()
     };
-    let outcome = run_group(
-        &manifest,
-        &base,
-        out,
-        &options,
-        &|progress| {
-            bar.set_length(progress.total);
-            bar.set_position(progress.done);
-        },
-        &|| !stopped.load(Ordering::Relaxed),
-    );
-    bar.finish_and_clear();
-    let outcome = outcome?;
-    say(out, &outcome.notes);
-    if !outcome.finished {
-        return Err(CliError::Stopped(format!(
-            "{} was stopped; what is done is in {}, go on with --resume",
-            manifest.name,
-            out.display()
-        )));
-    }
+    let outcome = with_progress(&manifest.name, out, (runs, "runs"), |progress, go_on| {
+        run_group(&manifest, &base, out, &options, progress, go_on)
+    })?;
     let summary = GroupSummary::read(&manifest, out)?;
     let pages = shown(&write_group_pages(&manifest, &path, out)?);
     if let Some(place) = &args.picture.figure {

@@ -102,14 +102,9 @@ impl Tracked<'_> {
         let first = self.trace.times_s().partition_point(|t| *t < from);
         let first = first
             + (first..self.trace.len())
-                .take_while(|row| self.is_before_the_first(*row))
+                .take_while(|row| self.trace.is_before_the_first(*row))
                 .count();
         first.min(self.trace.len().saturating_sub(1))
-    }
-
-    /// True for a row before the first estimate of a method that starts itself.
-    fn is_before_the_first(&self, row: usize) -> bool {
-        self.trace.options().method.starts_itself() && self.trace.covariance(row).is_none()
     }
 
     pub(super) fn not_converted(&self) -> NotConverted {
@@ -117,7 +112,7 @@ impl Tracked<'_> {
         let rows = self.operators.iter().enumerate();
         for (row, reason) in rows.filter_map(|(row, o)| Some((row, o.as_ref().err()?))) {
             let (kind, example) = match reason {
-                _ if self.is_before_the_first(row) => ("none yet", "there is no estimate yet".to_owned()),
+                _ if self.trace.is_before_the_first(row) => ("none yet", "there is no estimate yet".to_owned()),
                 NotConvertible::NegativeRealPole { .. } => (
                     "pole",
                     "a pole lies on the closed negative real axis, so that no real continuous system has it".to_owned(),

@@ -105,13 +105,7 @@ pub(crate) fn physical_blocks<P: Parametrisation>(
     let ts = criterion.layout.sample_time().s();
     let mut scores = |record: usize, data: Data<'_>| -> Option<Scores> {
         let mapped = criterion.model_of(eta, record).ok()?;
-        let of_theta = Criterion {
-            orders: mapped.orders,
-            data: vec![data],
-            initial: criterion.initial,
-            first: criterion.first,
-            weights: None,
-        };
+        let of_theta = Criterion::of_record(mapped.orders, data, criterion.initial, criterion.first);
         let eps = of_theta.residuals_of(&mapped.theta, 0, workspace);
         let psi = of_theta.jacobian(&mapped.theta, 0, workspace);
         let places = criterion.layout.positions(record).iter();

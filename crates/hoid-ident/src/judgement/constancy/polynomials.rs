@@ -16,7 +16,6 @@ use super::{
 use crate::{
     Fit,
     criterion::{Criterion, Data, Workspace, first_residual},
-    searched_delay::along_the_delay,
 };
 
 /// Residuals of a robust fit are held to so many of its scales, as its loss holds their slope.
@@ -47,17 +46,10 @@ impl Fit {
             f64::INFINITY
         };
         let mut scores = |_: usize, data: Data<'_>| -> Option<Scores> {
-            let criterion = Criterion {
-                orders,
-                data: vec![data],
-                initial: self.initial_state,
-                first,
-                weights: None,
-            };
+            let criterion = Criterion::of_record(orders, data, self.initial_state, first);
             let mut eps = criterion.residuals_of(theta, 0, &mut workspace);
             eps.iter_mut().for_each(|x| *x = x.clamp(-bound, bound));
-            let mut psi = criterion.jacobian(theta, 0, &mut workspace);
-            psi.push(along_the_delay(self.model.b(), &psi[orders.na..], ts.s()));
+            let psi = self.jacobian_with_delay(&criterion, &mut workspace);
             let free = psi.into_iter().enumerate().filter(|(i, _)| *i == p || !self.held[*i]);
             Some((eps, free.collect()))
         };

@@ -90,8 +90,5 @@ pub(super) fn boxes(
         with_zero,
         least_reach: 0.0,
     };
-    ItemOutput {
-        svg: Some(box_plots(&item.name, &item.title, &grid)),
-        data: data.table(&item.title),
-    }
+    item.drawn(box_plots, &grid, data)
 }

@@ -86,8 +86,5 @@ fn decimation(item: &Item, results: &Results) -> ItemOutput {
         logarithmic_abscissa: false,
         shared_ordinates: true,
     };
-    ItemOutput {
-        svg: Some(curves(&item.name, &item.title, &grid)),
-        data: data.table(&item.title),
-    }
+    item.drawn(curves, &grid, data)
 }

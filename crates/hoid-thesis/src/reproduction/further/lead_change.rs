@@ -111,8 +111,5 @@ fn lead_change(item: &Item, results: &Results) -> ItemOutput {
         logarithmic_abscissa: true,
         shared_ordinates: true,
     };
-    ItemOutput {
-        svg: Some(curves(&item.name, &item.title, &grid)),
-        data: data.table(&item.title),
-    }
+    item.drawn(curves, &grid, data)
 }

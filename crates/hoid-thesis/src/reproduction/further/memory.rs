@@ -84,10 +84,7 @@ fn memory(item: &Item, results: &Results) -> ItemOutput {
         logarithmic_abscissa: true,
         shared_ordinates: false,
     };
-    ItemOutput {
-        svg: Some(curves(&item.name, &item.title, &grid)),
-        data: data.table(&item.title),
-    }
+    item.drawn(curves, &grid, data)
 }
 
 fn settling(item: &Item, results: &Results) -> ItemOutput {
@@ -133,8 +130,5 @@ fn settling(item: &Item, results: &Results) -> ItemOutput {
         logarithmic_abscissa: true,
         shared_ordinates: true,
     };
-    ItemOutput {
-        svg: Some(curves(&item.name, &item.title, &grid)),
-        data: data.table(&item.title),
-    }
+    item.drawn(curves, &grid, data)
 }

@@ -1,0 +1,382 @@
+//! `identify` as a user runs it.
+#![allow(clippy::unwrap_used)]
+
+mod common;
+
+use std::fs;
+
+use serde_json::Value;
+use tempfile::TempDir;
+
+use common::{bad, good, json, simulated};
+
+#[test]
+fn identify_prints_the_json_of_the_contract() {
+    let directory = simulated();
+    let found = json(
+        directory.path(),
+        &["identify", "c1.csv", "--nk", "29", "--orders", "nd=1", "--json"],
+    );
+    assert_eq!(found["structure"], "bj");
+    assert_eq!(
+        found["orders"],
+        serde_json::json!({"na": 0, "nb": 2, "nc": 0, "nd": 1, "nf": 2, "nk": 29})
+    );
+    assert_eq!(found["records"][0]["samples"], 8192);
+    let names: Vec<&str> = found["parameters"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|p| p["name"].as_str().unwrap())
+        .collect();
+    assert_eq!(names, ["b0", "b1", "d1", "f1", "f2"]);
+    assert_eq!(found["termination"]["converged"], true);
+    assert_eq!(found["operator"]["convertible"], true);
+    for (name, truth) in [
+        ("K_e", 0.09),
+        ("T_L", 0.4),
+        ("K_e_dot", 0.036),
+        ("omega_nm", 11.25),
+        ("zeta_nm", 0.35),
+    ] {
+        let (value, error) = (
+            &found["operator"][name]["value"],
+            &found["operator"][name]["standard_error"],
+        );
+        let distance = (value.as_f64().unwrap() - truth) / error.as_f64().unwrap();
+        assert!(distance.abs() < 4.0, "{name} lies {distance} standard errors off");
+    }
+    let close = |value: &Value, truth: f64| {
+        (value["value"].as_f64().unwrap() - truth).abs() < 4.0 * value["standard_error"].as_f64().unwrap()
+    };
+    assert!((found["operator"]["tau_e"]["value"].as_f64().unwrap() - 0.28).abs() < 1e-12);
+    assert!(close(&found["remnant"]["T_n"], 0.06));
+    assert!(close(&found["remnant"]["K_n"], 0.076_36));
+    for key in [
+        "vaf_simulation",
+        "vaf_prediction",
+        "nrmse_simulation",
+        "nrmse_prediction",
+        "aic",
+        "bic",
+        "fpe",
+    ] {
+        assert!(found["fit"][key].is_number(), "{key}");
+    }
+    assert_eq!(found["candidates"], serde_json::json!([]));
+}
+
+/// The bytes with which a file begins say what it is, and it has the width that was asked for.
+#[test]
+#[cfg(feature = "pdf-png")]
+fn a_figure_is_a_page_or_a_picture_as_its_name_says() {
+    let directory = simulated();
+    let d = directory.path();
+    let draw = |name: &str| {
+        let fit = ["identify", "c1.csv", "--nk", "29", "--orders", "nd=1"];
+        good(d, &[&fit[..], &["--figure", name, "--width", "85mm"]].concat());
+        fs::read(d.join(name)).unwrap()
+    };
+    let pdf = draw("bode.pdf");
+    let text = String::from_utf8_lossy(&pdf);
+    // 85 mm are 240.9 pt.
+    assert!(pdf.starts_with(b"%PDF-") && text.contains("/MediaBox [0 0 240.9") && text.contains("/Font"));
+    let png = draw("bode.png");
+    assert!(png.starts_with(b"\x89PNG\r\n\x1a\n"));
+    // At 300 dots an inch; the width stands in the first chunk.
+    let width = u32::from_be_bytes(png[16..20].try_into().unwrap());
+    assert!(width.abs_diff(1004) <= 4, "{width}");
+}
+
+#[test]
+fn a_range_is_searched_and_its_table_is_part_of_the_result() {
+    let directory = simulated();
+    let found = json(
+        directory.path(),
+        &["identify", "c1.csv", "--nk", "27..31", "--orders", "nd=1..2", "--json"],
+    );
+    assert_eq!(found["candidates"].as_array().unwrap().len(), 10);
+    assert_eq!(found["orders"]["nk"], 29);
+    assert_eq!(found["orders"]["nd"], 1);
+    let text = good(
+        directory.path(),
+        &["identify", "c1.csv", "--structure", "arx", "--nk", "27..31", "-v"],
+    );
+    assert!(text.contains("Searched 5 candidates"), "{text}");
+}
+
+#[test]
+fn options_of_the_search_reach_the_fit() {
+    let directory = simulated();
+    let d = directory.path();
+    let run = |more: &[&str]| {
+        let mut all = vec!["identify", "c1.csv", "--nk", "29", "--orders", "nd=1", "--json"];
+        all.extend(more);
+        json(d, &all)
+    };
+    let plain = run(&[]);
+    let value = |found: &Value, name: &str| {
+        let all = found["parameters"].as_array().unwrap();
+        let p = all.iter().find(|p| p["name"] == name).unwrap().clone();
+        (p["value"].as_f64().unwrap(), p["standard_error"].as_f64())
+    };
+    let fixed = run(&["--fix", "d1=-0.8", "--bound", "f2=..0.92"]);
+    assert_eq!(value(&fixed, "d1"), (-0.8, None));
+    assert_eq!(value(&fixed, "f2"), (0.92, None));
+    for same in [
+        &["--search-method", "gn"][..],
+        &["--search-method", "lm", "--tolerance", "1e-13"],
+        &["--bound", "f2=0.."],
+        &["--stable"],
+        &["--initial-state", "estimate"],
+    ] {
+        let found = run(same);
+        let ratio = found["loss"].as_f64().unwrap() / plain["loss"].as_f64().unwrap();
+        assert!((ratio - 1.0).abs() < 1e-9, "{same:?}: {ratio}");
+    }
+    for other in [
+        &["--initial-state", "zero"][..],
+        &["--initial-state", "backcast"],
+        &["--robust"],
+        &["--robust", "2"],
+        &["--coefficient-prior", "f2=0.9:1"],
+        &["--focus", "simulation"],
+    ] {
+        let found = run(other);
+        assert!(found["termination"]["converged"].as_bool().unwrap(), "{other:?}");
+        assert_ne!(value(&found, "f1").0, value(&plain, "f1").0, "{other:?}");
+        assert!((value(&found, "f1").0 + 1.912).abs() < 0.05, "{other:?}");
+    }
+    let (code, message) = bad(
+        d,
+        &["identify", "c1.csv", "--nk", "29", "--orders", "nd=1", "--fix", "x1=0"],
+    );
+    assert!(code == 1 && message.contains("b0, b1, d1, f1, f2"), "{message}");
+    let steps = run(&["--horizon", "1"]);
+    let ahead = steps["prediction_ahead"]["vaf"].as_f64().unwrap();
+    assert!((ahead - steps["fit"]["vaf_prediction"].as_f64().unwrap()).abs() < 1e-9);
+}
+
+#[test]
+fn every_structure_and_method_runs_from_the_command_line() {
+    let directory = simulated();
+    let d = directory.path();
+    for name in ["arx", "armax", "oe", "bj", "fir", "ararx", "ararmax", "general"] {
+        let orders = if name == "bj" { "nd=1" } else { "nb=2" };
+        let found = json(
+            d,
+            &[
+                "identify",
+                "c1.csv",
+                "--structure",
+                name,
+                "--nk",
+                "29",
+                "--orders",
+                orders,
+                "--json",
+            ],
+        );
+        assert_eq!(found["structure"], name);
+        assert!(found["fit"]["vaf_prediction"].as_f64().unwrap() > 50.0, "{name}");
+    }
+    // An output alone needs no column e.
+    let text = fs::read_to_string(d.join("c1.csv")).unwrap();
+    fs::write(d.join("alone.csv"), text.replace(",e,", ",was_e,")).unwrap();
+    for name in ["ar", "ma", "arma"] {
+        let found = json(d, &["identify", "alone.csv", "--structure", name, "--json"]);
+        assert_eq!(found["structure"], name);
+        assert!(found["operator"].is_null());
+    }
+    let (code, message) = bad(d, &["identify", "alone.csv", "--structure", "arx"]);
+    assert!(code == 1 && message.contains('e'), "{message}");
+    for (method, structure) in [("iv4", "arx"), ("sriv", "oe"), ("rivbj", "bj")] {
+        let orders = if method == "rivbj" { "nd=1" } else { "nb=2" };
+        let found = json(
+            d,
+            &[
+                "identify", "c1.csv", "--method", method, "--nk", "29", "--orders", orders, "--json",
+            ],
+        );
+        assert_eq!(found["structure"], structure);
+        assert!(found["start"].as_str().unwrap().contains("f_t"));
+        let k_e = found["operator"]["K_e"]["value"].as_f64().unwrap();
+        assert!((k_e - 0.09).abs() < 0.02, "{method}: {k_e}");
+    }
+}
+
+#[test]
+fn a_grey_box_gives_the_delay_an_error_bar_and_reports() {
+    let directory = simulated();
+    let d = directory.path();
+    let found = json(
+        d,
+        &[
+            "identify",
+            "c1.csv",
+            "--structure",
+            "grey-box",
+            "--remnant-order",
+            "1..2",
+            "--delay",
+            "0.2..0.4",
+            "--report",
+            "out",
+            "--json",
+        ],
+    );
+    assert_eq!(found["structure"], "grey-box");
+    assert_eq!(found["candidates"].as_array().unwrap().len(), 2);
+    let delay = &found["operator"]["tau_e"];
+    let off = delay["value"].as_f64().unwrap() - 0.28;
+    // Four standard errors.
+    assert!(off.abs() < 4.0 * delay["standard_error"].as_f64().unwrap(), "{delay}");
+    assert!(found["remnant"]["T_n"]["standard_error"].is_number());
+    let page = fs::read_to_string(d.join("out/report.html")).unwrap();
+    assert!(page.contains("Grey box with a remnant of order m = 1"));
+}
+
+#[test]
+fn a_change_is_found_and_its_gains_are_written() {
+    let directory = TempDir::new().unwrap();
+    let d = directory.path();
+    good(d, &["simulate", "--condition", "C4", "--seed", "3", "--out", "c4.csv"]);
+    let arguments = [
+        "identify",
+        "c4.csv",
+        "--structure",
+        "time-varying",
+        "--trace",
+        "trace.csv",
+        "--json",
+    ];
+    let found = json(d, &arguments);
+    assert_eq!(found["change"]["found"], true);
+    let all = found["parameters"].as_array().unwrap();
+    let midpoint = all.iter().find(|p| p["name"] == "t_M").unwrap();
+    assert!((midpoint["value"].as_f64().unwrap() - 40.96).abs() < 3.0, "{midpoint}");
+    let trace = fs::read_to_string(d.join("trace.csv")).unwrap();
+    assert!(trace.contains("t,K_e,K_e_se,T_L,T_L_se,K_e_dot,K_e_dot_se"));
+    // 8192 rows behind two comments and the header.
+    assert_eq!(trace.lines().count(), 8195);
+}
+
+/// The example of the book: a lead-lag whose gain and lead change.
+#[test]
+fn a_change_of_another_form_is_found() {
+    let directory = TempDir::new().unwrap();
+    let d = directory.path();
+    let page = include_str!("../../../docs/src/methods/time-varying.md");
+    let scenario = page
+        .split("<<'END'\n")
+        .nth(1)
+        .and_then(|rest| rest.split("END\n").next());
+    fs::write(d.join("learns.toml"), scenario.unwrap()).unwrap();
+    good(
+        d,
+        &[
+            "simulate",
+            "--scenario",
+            "learns.toml",
+            "--seed",
+            "3",
+            "--out",
+            "learns.csv",
+        ],
+    );
+    let arguments = [
+        "identify",
+        "learns.csv",
+        "--structure",
+        "time-varying",
+        "--form",
+        "lead-lag",
+        "--prior",
+        "population",
+        "--trace",
+        "trace.csv",
+    ];
+    let found = json(d, &[&arguments[..], &["--json"]].concat());
+    assert_eq!(
+        (&found["form"], &found["change"]["found"]),
+        (&"lead-lag".into(), &true.into())
+    );
+    assert_eq!(
+        found["settings"]["prior"],
+        "omega_nm=10.5:0.3,zeta_nm=0.3:0.5,tau_e=0.2:0.7"
+    );
+    for (end, name, truth) in [
+        ("initial", "K_over_T_I", 4.0),
+        ("last", "K_over_T_I", 2.0),
+        ("initial", "T_L", 0.3),
+        ("last", "T_L", 1.0),
+        ("last", "T_I", 5.0),
+        ("last", "K", 10.0),
+    ] {
+        let estimate = &found[end][name];
+        let (value, error) = (
+            estimate["value"].as_f64().unwrap(),
+            estimate["standard_error"].as_f64().unwrap(),
+        );
+        assert!(
+            (value - truth).abs() < 4.0 * error && error < 0.5 * truth,
+            "{end} {name}: {estimate}"
+        );
+    }
+    let trace = fs::read_to_string(d.join("trace.csv")).unwrap();
+    assert!(trace.contains("t,K,K_se,K_over_T_I,K_over_T_I_se,T_L,T_L_se"));
+    let said = good(d, &arguments);
+    for part in ["of the form lead-lag", "before the change", "after it", "T_I"] {
+        assert!(said.contains(part), "{said} lacks {part}");
+    }
+}
+
+#[test]
+fn several_records_start_validation_report_and_margins() {
+    let directory = simulated();
+    let d = directory.path();
+    good(
+        d,
+        &["simulate", "--condition", "C1", "--seed", "2", "--out", "again.csv"],
+    );
+    let arguments = [
+        "identify",
+        "c1.csv",
+        "again.csv",
+        "--nk",
+        "29",
+        "--orders",
+        "nd=1",
+        "--validate",
+        "again.csv",
+        "--report",
+        "out",
+        "--controlled-element",
+        "90/1,6,0",
+        "--start",
+        "b0=.04,b1=-.04,d1=-.5,f1=-1.8,f2=.85",
+        "--json",
+    ];
+    let found = json(d, &arguments);
+    assert_eq!(found["records"].as_array().unwrap().len(), 2);
+    assert_eq!(found["start"], "given");
+    let crossover = &found["open_loop"]["crossover_rad_s"];
+    let (value, error) = (&crossover["value"], &crossover["standard_error"]);
+    let off = value.as_f64().unwrap() - 1.5635;
+    // Two records; five standard errors.
+    assert!(
+        off.abs() < 0.1 && off.abs() < 5.0 * error.as_f64().unwrap(),
+        "{crossover}"
+    );
+    assert_eq!(found["residual_tests"].as_array().unwrap().len(), 2);
+    assert!(
+        found["roots"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .any(|r| r["polynomial"] == "f")
+    );
+    assert!(found["validation"]["vaf_simulation"].as_f64().unwrap() > 85.0);
+    let page = fs::read_to_string(d.join("out/report.html")).unwrap();
+    assert!(page.contains("<svg") && page.contains("again.csv"), "{}", page.len());
+}

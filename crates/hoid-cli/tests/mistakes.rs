@@ -1,0 +1,204 @@
+//! What is in a file, and what is said where it or the command line is not as it should be.
+#![allow(clippy::unwrap_used)]
+
+mod common;
+
+use std::fs;
+
+use serde_json::Value;
+use tempfile::TempDir;
+
+use common::{bad, good, json, row, simulated, wave, write};
+
+#[test]
+fn info_shows_what_is_inside() {
+    let directory = TempDir::new().unwrap();
+    let at = directory.path();
+    write(at, "run.csv", "t,e,u,k", 200, |k| {
+        let (t, e, u) = wave(k);
+        let t = if k < 150 { t } else { t + 0.05 };
+        format!("{t},{:.1},{},7", e, u.min(0.6))
+    });
+    let found = json(at, &["info", "run.csv", "--json"]);
+    assert_eq!(found["format"], "CSV");
+    let sampling = &found["samplings"][0];
+    assert_eq!(
+        (&sampling["gaps"], &sampling["missing"]),
+        (&Value::from(1), &Value::from(5))
+    );
+    assert!((sampling["sample_time"].as_f64().unwrap() - 0.01).abs() < 1e-9);
+    let column = |name: &str| {
+        found["columns"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .find(|c| c["path"] == name)
+            .unwrap()["values"]
+            .clone()
+    };
+    assert!((column("e")["quantum"].as_f64().unwrap() - 0.1).abs() < 1e-9);
+    assert!(column("u")["saturated_high"].as_u64().unwrap() > 10 && column("u")["quantum"].is_null());
+    assert_eq!(column("k")["constant"], true);
+    let text = good(at, &["info", "run.csv"]);
+    for words in [
+        "CSV, 4 columns",
+        "1 gaps (5 samples",
+        "constant",
+        "quantised in steps of 0.1",
+        "saturated at 0.6",
+        "█",
+    ] {
+        assert!(text.contains(words), "{words}: {text}");
+    }
+    fs::write(at.join("bad.mat"), "t,e,u").unwrap();
+    assert!(bad(at, &["info", "bad.mat"]).1.contains("is no MATLAB file"));
+}
+
+#[test]
+fn bad_input_is_told_in_the_users_words() {
+    let directory = simulated();
+    let d = directory.path();
+    let n = 400;
+    fs::write(d.join("empty.csv"), "").unwrap();
+    write(d, "nocolumn.csv", "t,e,y", n, row);
+    write(d, "text.csv", "t,e,u", n, |k| {
+        if k == 7 { "0.07,abc,1".to_owned() } else { row(k) }
+    });
+    write(d, "nan.csv", "t,e,u", n, |k| {
+        if k == 8 { "0.08,NaN,1".to_owned() } else { row(k) }
+    });
+    write(d, "inf.csv", "t,e,u", n, |k| {
+        if k == 9 { "0.09,1,inf".to_owned() } else { row(k) }
+    });
+    write(d, "gap.csv", "t,e,u", n, |k| row(if k > 50 { k + 20 } else { k }));
+    write(d, "jitter.csv", "t,e,u", n, |k| {
+        let (t, e, u) = wave(k);
+        format!("{},{e},{u}", t + 0.003 * (k as f64 * 2.3).sin())
+    });
+    write(d, "short.csv", "t,e,u", 33, row);
+    write(d, "zero.csv", "t,e,u", n, |k| format!("{},{},0", wave(k).0, wave(k).1));
+    write(d, "constant.csv", "t,e,u", n, |k| {
+        format!("{},2.5,{}", wave(k).0, wave(k).2)
+    });
+    write(d, "slow.csv", "t,e,u", n, |k| {
+        format!("{},{},{}", 2.0 * wave(k).0, wave(k).1, wave(k).2)
+    });
+    write(d, "one.csv", "t,e,u", n, row);
+    let cases: [(&[&str], &[&str]); 17] = [
+        (&["empty.csv"], &["empty.csv", "empty"]),
+        (&["absent.csv"], &["absent.csv", "cannot be read"]),
+        (&["nocolumn.csv"], &["u", "t, e, y"]),
+        (&["text.csv"], &["line 9", "abc"]),
+        (&["nan.csv"], &["line 10", "--fill"]),
+        (&["inf.csv"], &["line 11", "inf"]),
+        (&["gap.csv"], &["line 52", "--resample"]),
+        (&["jitter.csv"], &["--resample"]),
+        (&["short.csv"], &["33 samples"]),
+        (&["one.csv", "--nk", "500"], &["nk = 500", "400 samples"]),
+        (&["zero.csv"], &["u", "0 in every sample"]),
+        (&["constant.csv"], &["e", "2.5 in every sample"]),
+        (&["one.csv", "slow.csv"], &["0.02", "0.01", "resample"]),
+        (&["one.csv", "--from", "90", "--to", "95"], &["90", "95"]),
+        (&["one.csv", "--input", "q"], &["q", "t, e, u"]),
+        (
+            &["one.csv", "--start", "f1=2", "--nk", "5", "--orders", "nd=1"],
+            &["--start lacks b0"],
+        ),
+        (
+            &[
+                "one.csv",
+                "--start",
+                "b0=1,b1=1,d1=0,f1=-2.1,f2=1.2",
+                "--nk",
+                "5",
+                "--orders",
+                "nd=1",
+            ],
+            &["unit circle"],
+        ),
+    ];
+    for (arguments, expected) in cases {
+        let mut all = vec!["identify", "--nk", "29", "--orders", "nd=1"];
+        if arguments.contains(&"--nk") {
+            all.truncate(1);
+        }
+        if arguments.contains(&"--orders") {
+            all.truncate(1);
+        }
+        all.extend(arguments);
+        let (code, message) = bad(d, &all);
+        let usage = message.contains("--start lacks");
+        assert_eq!(code, if usage { 2 } else { 1 }, "{arguments:?}: {message}");
+        for part in expected {
+            assert!(message.contains(part), "{arguments:?}: {part:?} is not in: {message}");
+        }
+    }
+}
+
+#[test]
+fn wrong_usage_ends_with_two() {
+    let directory = simulated();
+    let d = directory.path();
+    for arguments in [
+        &["identify"][..],
+        &["identify", "c1.csv", "--nk", "5..2"],
+        &["identify", "c1.csv", "--orders", "nx=2"],
+        &["identify", "c1.csv", "--orders", "nk=3", "--nk", "4"],
+        &["identify", "c1.csv", "--structure", "narmax"],
+        &["identify", "c1.csv", "--start", "b0=1"],
+        &["identify", "c1.csv", "--method", "iv4", "--structure", "bj"],
+        &["identify", "c1.csv", "--instruments", "f_t"],
+        &["identify", "c1.csv", "--orders", "nc=1,nd=99"],
+        &["identify", "c1.csv", "--structure", "grey-box", "--nk", "29"],
+        &["identify", "c1.csv", "--structure", "grey-box", "--orders", "nb=2"],
+        &["identify", "c1.csv", "--structure", "bj", "--remnant-order", "1"],
+        &["identify", "c1.csv", "--structure", "bj", "--delay", "0.1..0.3"],
+        &["identify", "c1.csv", "--structure", "bj", "--form", "lead-lag"],
+        &["identify", "c1.csv", "--remnant-order", "1", "--form", "lead-lag"],
+        &["identify", "c1.csv", "--prior", "omega_nm=1"],
+        &["identify", "c1.csv", "--trace", "x.csv"],
+        &["identify", "c1.csv", "--structure", "time-varying", "--report", "out"],
+        &["identify", "c1.csv", "--structure", "time-varying", "--orders", "nb=2"],
+        &["identify", "c1.csv", "--nk", "29", "--fix", "d1"],
+        &["identify", "c1.csv", "--nk", "29", "--bound", "d1=2..1"],
+        &[
+            "identify", "c1.csv", "--nk", "29", "--fix", "d1=0", "--bound", "d1=0..1",
+        ],
+        &["simulate", "--out", "x.csv"],
+        &["simulate", "--condition", "C9", "--out", "x.csv"],
+        &["convert", "--f", "1,2"],
+        &["convert", "--operator", "K_e=1"],
+        &["convert", "--operator", "K_e=x"],
+        &["convert", "--transfer-function", "1/1,2", "--method", "prewarped"],
+        &["margins"],
+        &["nonsense"],
+    ] {
+        let (code, message) = bad(d, arguments);
+        assert_eq!(code, 2, "{arguments:?}: {message}");
+    }
+}
+
+#[test]
+fn what_cannot_be_simulated_ends_with_one_and_writes_nothing() {
+    let directory = TempDir::new().unwrap();
+    let d = directory.path();
+    for (arguments, expected) in [
+        (&["--noise-level", "1.5"][..], "P_n"),
+        (&["--remnant-order", "7"], "order"),
+        (
+            &["--noise-level", "5", "--noise-definition", "remnant"],
+            "largest reachable",
+        ),
+        (&["--sample-time", "0.013"], "whole number of samples"),
+        (&["--sample-time", "-1"], "Ts"),
+        (&["--remnant-time-constant", "0"], "T_n"),
+    ] {
+        let mut all = vec!["simulate", "--condition", "C1", "--out", "x.csv"];
+        all.extend(arguments);
+        let (code, message) = bad(d, &all);
+        assert_eq!(code, 1, "{arguments:?}: {message}");
+        assert!(message.contains(expected), "{arguments:?}: {message}");
+    }
+    let (code, _) = bad(d, &["simulate", "--condition", "C1", "--out", "no/such/place.csv"]);
+    assert_eq!(code, 1);
+}

@@ -1,0 +1,51 @@
+//! Files that tests write and read.
+// Each file of tests uses its own part of this.
+#![allow(dead_code, clippy::unwrap_used)]
+
+use std::{fs, path::PathBuf};
+
+use hoid_io::{IoError, ReadOptions, ReadRecord, read_record};
+
+/// A folder of its own, gone with the test.
+pub struct Desk {
+    pub dir: tempfile::TempDir,
+}
+
+impl Desk {
+    pub fn new() -> Self {
+        Self {
+            dir: tempfile::tempdir().unwrap(),
+        }
+    }
+
+    pub fn path(&self, name: &str) -> PathBuf {
+        self.dir.path().join(name)
+    }
+
+    /// The record of a file with this text.
+    pub fn read(&self, text: impl AsRef<[u8]>, options: &ReadOptions) -> Result<ReadRecord, IoError> {
+        let path = self.path("run.csv");
+        fs::write(&path, text).unwrap();
+        read_record(&path, options)
+    }
+
+    /// What is said of a file with this text, which must name it.
+    pub fn error(&self, text: impl AsRef<[u8]>, options: &ReadOptions) -> String {
+        let message = self.read(text, options).unwrap_err().to_string();
+        assert!(message.contains("run.csv"), "{message}");
+        message
+    }
+}
+
+/// Input and output by these expressions.
+pub fn options(input: &str, output: &str) -> ReadOptions {
+    ReadOptions {
+        input: Some(input.parse().unwrap()),
+        output: output.parse().unwrap(),
+        ..ReadOptions::default()
+    }
+}
+
+pub fn defaults() -> ReadOptions {
+    ReadOptions::default()
+}

@@ -1,0 +1,214 @@
+//! The time of a file: its name, its grid, what is done about gaps and jitter, and spans of it.
+
+#![allow(clippy::unwrap_used, reason = "a test may fail at any line, its helpers as well")]
+
+mod common;
+
+use common::{Desk, defaults};
+use hoid_io::{IoError, ReadOptions, Repair, read_record};
+
+const FILL: Repair = Repair {
+    resample: false,
+    fill: true,
+};
+const RESAMPLE: Repair = Repair {
+    resample: true,
+    fill: false,
+};
+
+#[test]
+fn the_time_may_have_the_name_that_a_recorder_gives_it() {
+    let directory = tempfile::tempdir().unwrap();
+    let read = |header: &str, factor: f64| {
+        let path = directory.path().join("run.csv");
+        let row = |k: i32| format!("{:.3};{k};{}\n", f64::from(k) / 60.0 * factor, 2 * k);
+        let rows: String = (0..40).map(row).collect();
+        std::fs::write(&path, format!("{header}\n{rows}")).unwrap();
+        read_record(&path, &ReadOptions::default())
+    };
+    // Printed to a microsecond, to a millisecond: the grid is found all the same.
+    let found = read("Time [ms];e;u", 1000.0).unwrap();
+    assert!((found.record.sample_time().s() - 1.0 / 60.0).abs() < 1e-6);
+    assert!(
+        found.notes.iter().any(|note| note == "Time [ms] is taken as t, in s"),
+        "{:?}",
+        found.notes
+    );
+    assert!((read("time;e;u", 1.0).unwrap().record.time_s(39) - 0.65).abs() < 1e-3);
+    // Two times: nobody knows which.
+    let path = directory.path().join("two.csv");
+    std::fs::write(&path, "time,time_ms,e,u\n0,0,1,2\n0.01,10,1,2\n").unwrap();
+    let message = read_record(&path, &ReadOptions::default()).unwrap_err().to_string();
+    assert!(message.contains("has no column t"), "{message}");
+}
+
+#[test]
+fn a_given_frequency_wins_over_t() {
+    let desk = Desk::new();
+    let with = |hz| ReadOptions {
+        sampling_hz: Some(hz),
+        ..defaults()
+    };
+    let text = "t,e,u\n5,1,0\n5.1,2,0\n9,3,0\n";
+    let read = desk.read(text, &with(50.0)).unwrap();
+    assert_eq!(read.record.times_s(), [5.0, 5.02, 5.04]);
+    assert!(
+        read.notes[0].contains("the given sampling frequency of 50 Hz counts"),
+        "{:?}",
+        read.notes
+    );
+    let clock = desk.read("t,e,u\n12:00:01,1,0\n12:00:02,2,0\n", &with(2.0)).unwrap();
+    assert_eq!(clock.record.time_s(1), 0.5);
+    assert!(clock.notes[0].contains("t is no number on line 2"), "{:?}", clock.notes);
+    assert_eq!(desk.read("e,u\n1,2\n", &with(2.0)).unwrap().record.len(), 1);
+    assert!(
+        desk.error("e,u\n1,2\n", &defaults())
+            .contains("has no column t (time in s)")
+    );
+    for bad in [0.0, -1.0, f64::NAN, f64::INFINITY, 1e-320] {
+        assert!(
+            matches!(desk.read(text, &with(bad)), Err(IoError::SamplingFrequency { .. })),
+            "{bad}"
+        );
+    }
+    // A span of counted samples.
+    let span = ReadOptions {
+        span_s: (Some(5.02), None),
+        ..with(50.0)
+    };
+    let part = desk.read(text, &span).unwrap().record;
+    assert_eq!((part.time_s(0), part.input()), (5.02, &[2.0, 3.0][..]));
+}
+
+#[test]
+fn fill_bridges_and_says_so() {
+    let desk = Desk::new();
+    let fill = |repair| ReadOptions { repair, ..defaults() };
+    let text = "t,e,u,d\n0,1,2,1\n,NaN,2,NA\n2,,2,\n3,4,2,4\n";
+    let read = desk.read(text, &fill(FILL)).unwrap();
+    assert_eq!(read.record.input(), [1.0, 2.0, 3.0, 4.0]);
+    assert_eq!(read.record.channel("d").unwrap(), [1.0, 2.0, 3.0, 4.0]);
+    assert_eq!(read.record.times_s(), [0.0, 1.0, 2.0, 3.0]);
+    assert!(
+        read.steps
+            .iter()
+            .any(|step| step.to_string() == "column e: 2 missing values bridged linearly, at most 2 in a row")
+    );
+    let open = desk.error("t,e,u\n0,1,2\n1,,2\n", &fill(FILL));
+    assert!(
+        open.contains("line 3, column e: the values are missing up to the end"),
+        "{open}"
+    );
+    let open = desk.error("t,e,u\n0,,2\n1,1,2\n", &fill(FILL));
+    assert!(
+        open.contains("line 2, column e: the values are missing up to the start"),
+        "{open}"
+    );
+    // Text and infinite values are mistakes and not gaps.
+    assert!(
+        desk.error("t,e,u\n0,1,2\n1,x,2\n2,1,2\n", &fill(FILL))
+            .contains("found \"x\"")
+    );
+    assert!(
+        desk.error("t,e,u\n0,1,2\n1,inf,2\n2,1,2\n", &fill(FILL))
+            .contains("found inf")
+    );
+}
+
+#[test]
+fn resample_goes_over_gaps_and_jitter() {
+    let desk = Desk::new();
+    let ask = |repair, sampling_hz| ReadOptions {
+        repair,
+        sampling_hz,
+        ..defaults()
+    };
+    // e = 10 t and u = 1 - t on an uneven t with two samples missing: straight lines come back
+    // exactly up to rounding.
+    let times = [0.0, 0.101, 0.199, 0.3, 0.6, 0.7, 0.803, 0.9, 1.0];
+    let mut text = String::from("t,e,u\n");
+    times
+        .iter()
+        .for_each(|t| text.push_str(&format!("{t:.3},{},{}\n", 10.0 * t, 1.0 - t)));
+    assert!(matches!(
+        desk.read(&text, &defaults()),
+        Err(IoError::Gap { missing: 2, .. })
+    ));
+    let read = desk.read(&text, &ask(RESAMPLE, None)).unwrap();
+    assert_eq!(read.record.sample_time().s(), 0.1);
+    assert_eq!(read.record.len(), 11);
+    for k in 0..11 {
+        let t = 0.1 * k as f64;
+        assert!((read.record.input()[k] - 10.0 * t).abs() < 1e-13, "{k}");
+        assert!((read.record.output()[k] - (1.0 - t)).abs() < 1e-14, "{k}");
+    }
+    assert!(
+        read.steps[0]
+            .to_string()
+            .contains("from 9 samples to 11 at 10 Hz; the longest step"),
+        "{:?}",
+        read.steps
+    );
+    let twenty = desk.read(&text, &ask(RESAMPLE, Some(20.0))).unwrap().record;
+    assert_eq!((twenty.len(), twenty.sample_time().s()), (21, 0.05));
+    let coarse = desk.read(&text, &ask(RESAMPLE, Some(4.0))).unwrap();
+    assert_eq!(coarse.record.times_s(), [0.0, 0.25, 0.5, 0.75, 1.0]);
+    assert!((coarse.record.input()[1] - 2.5).abs() < 1e-14);
+    let slow = desk.read(&text, &ask(RESAMPLE, Some(2.0))).unwrap();
+    assert!(slow.notes[0].contains("no low-pass filter"), "{:?}", slow.notes);
+    // An even record is left alone, and one with a time that jumps away is no record.
+    let even = "t,e,u\n0.0,1,2\n0.1,2,3\n0.2,4,5\n";
+    assert_eq!(
+        desk.read(even, &ask(RESAMPLE, None)).unwrap(),
+        desk.read(even, &defaults()).unwrap()
+    );
+    let away = desk.error("t,e,u\n0,1,2\n1,1,2\n2,1,2\n1e9,1,2\n", &ask(RESAMPLE, None));
+    assert!(away.contains("would make 1000000001 samples out of 4"), "{away}");
+    let back = desk.error("t,e,u\n0,1,2\n1,1,2\n0.5,1,2\n", &ask(RESAMPLE, None));
+    assert!(back.contains("expected increasing time"), "{back}");
+}
+
+/// What a cut file, or a short span of one, leaves.
+#[test]
+fn one_sample_is_not_resampled() {
+    let desk = Desk::new();
+    let options = ReadOptions {
+        sampling_hz: Some(50.0),
+        repair: RESAMPLE,
+        ..defaults()
+    };
+    let message = desk.error("# sample_time: 0.01 s\nt,e,u\n0,1,2\n", &options);
+    assert!(message.contains("1 sample, expected at least 2"), "{message}");
+}
+
+#[test]
+fn what_lies_outside_the_span_is_not_looked_at() {
+    let desk = Desk::new();
+    let span = |from, to| ReadOptions {
+        span_s: (from, to),
+        ..defaults()
+    };
+    let text = "t,e,u\n0,x,2\n1,1,2\n2,2,2\n3,3,2\n7,,2\n";
+    let read = desk.read(text, &span(Some(1.0), Some(7.0))).unwrap().record;
+    assert_eq!(
+        (read.times_s(), read.input()),
+        (vec![1.0, 2.0, 3.0], &[1.0, 2.0, 3.0][..])
+    );
+    assert!(desk.error(text, &span(Some(3.0), None)).contains("column e"));
+    // 0.3 falls on the sample that floating point puts at 0.30000000000000004.
+    let sums = "t,e,u\n0.1,1,2\n0.2,2,2\n0.30000000000000004,3,2\n0.4,4,2\n";
+    assert_eq!(desk.read(sums, &span(None, Some(0.3))).unwrap().record.len(), 2);
+    assert_eq!(desk.read(sums, &span(Some(0.3), None)).unwrap().record.len(), 2);
+    for (from, to) in [
+        (Some(9.0), None),
+        (None, Some(0.0)),
+        (Some(2.0), Some(2.0)),
+        (Some(f64::NAN), None),
+    ] {
+        let message = desk.error(text, &span(from, to));
+        assert!(
+            message.contains("holds no samples; the record covers 0 to 7 s"),
+            "{message}"
+        );
+    }
+}

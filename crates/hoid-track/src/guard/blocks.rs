@@ -1,0 +1,125 @@
+//! The end of a block: what is judged, learnt and kept once a second.
+
+use hoid_core::guard::{
+    channel::{ChannelGuard, QUANTILE_OVER_MEAN},
+    profile::{Block, CHANNELS, Trouble},
+};
+
+use super::{FLOOR, Guard, LARGEST, LEAST_AGE, SOUND_EVERY, event::GuardKind};
+use crate::recursion::Recursion;
+
+impl Guard {
+    /// A second is over.
+    #[cold]
+    pub(super) fn end_block(&mut self, recursion: &mut dyn Recursion) {
+        self.channels.iter_mut().for_each(ChannelGuard::choose);
+        let block = self.block.means();
+        let enough = 2 * block.samples >= self.block_length;
+        self.block = Block::default();
+        self.in_block = 0;
+        if !enough {
+            self.sound_blocks = 0;
+            return;
+        }
+        let trouble = self.profile.judge(&block);
+        if let Some(reference) = &mut self.reference {
+            if self.pause.kind > 0 {
+                reference.begin();
+            } else if self.profile.is_unusual(&block) {
+                reference.suspect();
+            } else if trouble.is_none() && reference.end_block(&block, self.block_length) {
+                self.start.restore(recursion);
+                self.sound_at = [0; 2];
+                self.begin_pause(GuardKind::Astray, 2, 0, 0.0);
+                return;
+            }
+        }
+        if self.pause.kind > 0 {
+            self.judge_pause(recursion, trouble, &block);
+            return;
+        }
+        match trouble {
+            Some(trouble) => {
+                let (kind, channel) = named(trouble);
+                let seen = u64::from(trouble.blocks()) * u64::from(self.block_length);
+                self.go_back(recursion, seen);
+                self.begin_pause(kind, channel, seen.min(self.samples), 0.0);
+            }
+            None if self.in_ring == 0 => {
+                self.profile.learn(&block);
+                self.set_limits();
+                self.sound_blocks = if self.profile.is_calm() {
+                    self.sound_blocks + 1
+                } else {
+                    0
+                };
+                if self.sound_blocks >= SOUND_EVERY {
+                    self.sound_blocks = 0;
+                    let older = usize::from(self.sound_at[1] < self.sound_at[0]);
+                    self.sound[older].take(recursion);
+                    self.sound_at[older] = self.samples;
+                }
+            }
+            None => {}
+        }
+    }
+
+    fn judge_pause(&mut self, recursion: &mut dyn Recursion, trouble: Option<Trouble>, block: &Block) {
+        self.pause.bad_block = trouble.is_some();
+        if trouble.is_some() {
+            self.pause.good = 0;
+        }
+        if trouble.is_some() && self.former.resembles(block) {
+            let former = self.former;
+            self.learn_anew(recursion);
+            self.profile = former;
+            self.set_limits();
+        } else if trouble.is_some_and(Trouble::may_be_the_new_usual) {
+            self.pause.doubtful += u64::from(self.block_length);
+        }
+    }
+
+    /// Puts the recursion back to before the last samples of which there were so many.
+    fn go_back(&self, recursion: &mut dyn Recursion, samples: u64) {
+        let least = samples.max(LEAST_AGE * u64::from(self.block_length));
+        let sound = (0..2)
+            .filter(|i| self.sound_at[*i] > 0 && self.samples - self.sound_at[*i] >= least)
+            .max_by_key(|i| self.sound_at[*i]);
+        match sound {
+            Some(i) => self.sound[i].restore(recursion),
+            None => self.start.restore(recursion),
+        };
+    }
+
+    /// Limits that follow from the long-run values.
+    pub(super) fn set_limits(&mut self) {
+        if !self.profile.is_known() {
+            return;
+        }
+        let usual = *self.profile.usual();
+        self.centre = usual.mean;
+        for c in 0..CHANNELS {
+            let size = usual.magnitude[c];
+            self.largest[c] = if size > 0.0 { LARGEST * size } else { f64::INFINITY };
+            self.channels[c].set_floor(FLOOR[c] * size);
+            if !self.channels[c].is_known() {
+                let mean = usual.differences[c];
+                self.channels[c].set_quantiles(mean.map(|m| QUANTILE_OVER_MEAN * m));
+            }
+        }
+    }
+}
+
+/// The kind and the channel of a trouble.
+fn named(trouble: Trouble) -> (GuardKind, usize) {
+    match trouble {
+        Trouble::FrozenInput => (GuardKind::Frozen, 0),
+        Trouble::FrozenOutput => (GuardKind::Frozen, 1),
+        Trouble::Idle => (GuardKind::Idle, 2),
+        Trouble::Larger => (GuardKind::Level, 2),
+        Trouble::RescaledInput => (GuardKind::Level, 0),
+        Trouble::RescaledOutput => (GuardKind::Level, 1),
+        Trouble::Swapped => (GuardKind::Swapped, 2),
+        Trouble::Misfit => (GuardKind::Misfit, 2),
+    }
+}

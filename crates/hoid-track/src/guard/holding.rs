@@ -1,0 +1,174 @@
+//! Samples that are held back, and what becomes of them: taken again, or taken as they came.
+
+use hoid_core::guard::profile::CHANNELS;
+
+use super::{
+    Guard, Guarded, Raw,
+    event::{GuardAction, GuardKind},
+};
+use crate::recursion::{Recursion, Sample};
+
+impl Guard {
+    /// A sample that is held back, or the one with which the signals are back.
+    #[cold]
+    pub(super) fn hold(
+        &mut self,
+        recursion: &mut dyn Recursion,
+        sample: Sample,
+        moves: bool,
+        outliers: [bool; 2],
+    ) -> Guarded {
+        if self.in_ring == 0 {
+            self.before.take(recursion);
+            self.channels_before = self.channels;
+        }
+        let x = [sample.e, sample.u];
+        let place = self.in_ring;
+        self.in_ring += 1;
+        let mut clean = x;
+        let mut holds = [false; CHANNELS];
+        for c in 0..CHANNELS {
+            let channel = &mut self.channels[c];
+            let held = channel.held();
+            if held == 0 && !outliers[c] {
+                let errors = channel.errors(x[c]);
+                channel.accept(x[c], &errors);
+            } else if held > 0 && channel.is_back(x[c]) {
+                let size = channel.size();
+                channel.resume(x[c]);
+                self.tell(GuardKind::Outlier, c, u64::from(held), size, GuardAction::Held, 1);
+            } else {
+                clean[c] = channel.hold(x[c]);
+                holds[c] = true;
+            }
+        }
+        self.ring[place] = Raw {
+            values: x,
+            held: holds,
+            moves,
+        };
+        if let Some(reference) = &mut self.reference {
+            reference.take(clean);
+        }
+        let lasting = (0..CHANNELS).find(|c| self.channels[*c].held() > self.longest);
+        if let Some(c) = lasting.or((self.in_ring == self.ring.len()).then_some(0)) {
+            return self.lasting(recursion, c, sample);
+        }
+        if holds == [false; CHANNELS] {
+            return self.take_again(recursion, sample);
+        }
+        let sample = Sample {
+            e: clean[0],
+            u: clean[1],
+            ..sample
+        };
+        if holds[1] {
+            recursion.bridge(sample);
+        } else {
+            recursion.follow(sample);
+        }
+        Guarded {
+            outcome: None,
+            held: true,
+        }
+    }
+
+    /// Both signals are back: the recursion takes the samples since before they went, those that were
+    /// held back on a parabola from the last good one and its slope to the next good one.
+    fn take_again(&mut self, recursion: &mut dyn Recursion, sample: Sample) -> Guarded {
+        for c in 0..CHANNELS {
+            let mut last = self.channels_before[c].last();
+            let mut slope = self.channels_before[c].slope();
+            let mut k = 0;
+            while k < self.in_ring {
+                let run = self.ring[k..self.in_ring].iter().take_while(|raw| raw.held[c]).count();
+                let Some(next) = self.ring[..self.in_ring].get(k + run).map(|raw| raw.values[c]) else {
+                    break;
+                };
+                let span = (run + 1) as f64;
+                let rest = (next - last - slope * span) / (span * span);
+                for i in 0..run {
+                    let s = (i + 1) as f64;
+                    self.ring[k + i].values[c] = last + slope * s + rest * s * s;
+                }
+                let before = if run > 0 {
+                    self.ring[k + run - 1].values[c]
+                } else {
+                    last
+                };
+                slope = if self.channels_before[c].has_slope() {
+                    next - before
+                } else {
+                    0.0
+                };
+                last = next;
+                k += run + 1;
+            }
+        }
+        self.before.restore(recursion);
+        let mut outcome = None;
+        for raw in &self.ring[..self.in_ring] {
+            let taken = Sample {
+                e: raw.values[0],
+                u: raw.values[1],
+                ..sample
+            };
+            // e acts only after the delay: an innovation of now does not know it. A tenth of a second of
+            // interpolated u moves an estimate by less than the clock of births of a bank of
+            // hypotheses does that is stopped for as long.
+            outcome = Some(if raw.moves {
+                recursion.step(taken)
+            } else {
+                recursion.follow(taken)
+            });
+        }
+        self.in_ring = 0;
+        Guarded { outcome, held: false }
+    }
+
+    /// A signal that has been held back for too long to be an outlier.
+    fn lasting(&mut self, recursion: &mut dyn Recursion, c: usize, sample: Sample) -> Guarded {
+        let x = [sample.e, sample.u];
+        let (held, size) = (u64::from(self.channels[c].held()), self.channels[c].size());
+        if !x[c].is_finite() {
+            self.begin_pause(GuardKind::Missing, c, held, 0.0);
+            return self.paused(recursion, sample);
+        }
+        if self.is_too_large(c, x[c]) {
+            self.begin_pause(GuardKind::Level, c, held, x[c].abs());
+            return self.paused(recursion, sample);
+        }
+        self.before.restore(recursion);
+        self.channels = self.channels_before;
+        let mut last = self.channels_before.map(|channel| channel.last());
+        let mut outcome = None;
+        for k in 0..self.in_ring {
+            let Raw { values, moves, .. } = self.ring[k];
+            let mut sound = [true; CHANNELS];
+            for i in 0..CHANNELS {
+                sound[i] = values[i].is_finite() && !self.is_too_large(i, values[i]);
+                if sound[i] {
+                    last[i] = values[i];
+                    let errors = self.channels[i].errors(values[i]);
+                    self.channels[i].accept(values[i], &errors);
+                }
+            }
+            let taken = Sample {
+                e: last[0],
+                u: last[1],
+                ..sample
+            };
+            outcome = None;
+            match sound {
+                [true, true] if moves => outcome = Some(recursion.step(taken)),
+                [_, true] => {
+                    recursion.follow(taken);
+                }
+                [_, false] => recursion.bridge(taken),
+            }
+        }
+        self.in_ring = 0;
+        self.tell(GuardKind::Step, c, held, size, GuardAction::Accepted, 0);
+        Guarded { outcome, held: false }
+    }
+}

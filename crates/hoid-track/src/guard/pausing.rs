@@ -1,0 +1,120 @@
+//! Pauses: the estimate stands still, and the samples go into the filters where they can.
+
+use hoid_core::guard::profile::{Block, CHANNELS};
+
+use super::{
+    GIVEN_UP_S, Guard, Guarded, Pause,
+    event::{GuardAction, GuardKind},
+};
+use crate::recursion::{Recursion, Sample};
+
+impl Guard {
+    pub(super) fn is_too_large(&self, c: usize, x: f64) -> bool {
+        (x - self.centre[c]).abs() > self.largest[c]
+    }
+
+    /// The estimate stands still from here on.
+    pub(super) fn begin_pause(&mut self, kind: GuardKind, channel: usize, samples: u64, size: f64) {
+        self.in_ring = 0;
+        let place = GuardKind::ALL.iter().position(|k| *k == kind).unwrap_or(0);
+        self.pause = Pause {
+            kind: place + 1,
+            channel,
+            first: self.samples.saturating_sub(samples),
+            size,
+            bad_block: !matches!(kind, GuardKind::Missing | GuardKind::Level | GuardKind::Astray),
+            good: 0,
+            doubtful: 0,
+        };
+        self.block = Block::default();
+        self.in_block = 0;
+        self.tell(kind, channel, samples, size, GuardAction::Paused, 0);
+    }
+
+    /// A sample of a pause: into the filters, where it can be.
+    #[cold]
+    pub(super) fn paused(&mut self, recursion: &mut dyn Recursion, sample: Sample) -> Guarded {
+        let mut values = [sample.e, sample.u];
+        let mut good = [true; CHANNELS];
+        let mut errors = [[0.0; 4]; CHANNELS];
+        for c in 0..CHANNELS {
+            let x = values[c];
+            good[c] = x.is_finite() && !self.is_too_large(c, x);
+            if x.abs() > self.pause.size && self.pause.kind() == GuardKind::Level {
+                self.pause.size = x.abs();
+            }
+            if good[c] {
+                errors[c] = self.channels[c].errors(x);
+                self.channels[c].follow(x, &errors[c]);
+            } else {
+                values[c] = self.centre[c];
+                self.channels[c].restart(std::iter::once(values[c]));
+            }
+        }
+        let taken = Sample {
+            e: values[0],
+            u: values[1],
+            ..sample
+        };
+        let mut outcome = None;
+        if good[1] {
+            let followed = recursion.follow(taken);
+            if good[0] {
+                self.block.add(&errors, values, self.centre);
+                self.block.add_innovation(followed.innovation);
+                outcome = Some(followed);
+            }
+        } else {
+            recursion.bridge(taken);
+        }
+        let larger = (0..CHANNELS).any(|c| !good[c] && [sample.e, sample.u][c].is_finite());
+        self.pause.doubtful += u64::from(larger);
+        if self.pause.doubtful as f64 * self.sample_time.s() > GIVEN_UP_S {
+            self.learn_anew(recursion);
+            return Guarded { outcome, held: true };
+        }
+        self.pause.good = if good == [true; CHANNELS] {
+            self.pause.good + 1
+        } else {
+            0
+        };
+        if self.pause.good >= self.settle && !self.pause.bad_block {
+            let action = match self.pause.kind() {
+                GuardKind::Missing => GuardAction::Resumed,
+                _ => GuardAction::Restarted,
+            };
+            self.end_pause(action);
+        }
+        Guarded { outcome, held: true }
+    }
+
+    /// The estimate moves again.
+    fn end_pause(&mut self, action: GuardAction) {
+        let Pause {
+            channel, first, size, ..
+        } = self.pause;
+        let kind = self.pause.kind();
+        self.pause = Pause::default();
+        self.block = Block::default();
+        (self.in_block, self.sound_blocks) = (0, 0);
+        if action != GuardAction::Resumed {
+            self.restarts += 1;
+            self.restarted_at = self.samples;
+        }
+        self.tell(kind, channel, self.samples - first, size, action, 0);
+    }
+
+    /// The recursion begins again from its start, and nothing is known of the signals.
+    pub(super) fn learn_anew(&mut self, recursion: &mut dyn Recursion) {
+        self.start.restore(recursion);
+        self.former = std::mem::take(&mut self.profile);
+        self.sound_at = [0; 2];
+        self.centre = [0.0; CHANNELS];
+        self.largest = [f64::INFINITY; CHANNELS];
+        for channel in &mut self.channels {
+            channel.set_quantiles([0.0; 4]);
+            channel.set_floor(0.0);
+        }
+        self.end_pause(GuardAction::Relearnt);
+    }
+}
