@@ -6,7 +6,7 @@ use std::{collections::BTreeMap, process::Command};
 use serde_json::Value;
 
 /// What each crate may depend on within the workspace.
-const ALLOWED: [(&str, &[&str]); 15] = [
+const ALLOWED: [(&str, &[&str]); 16] = [
     ("hoid-core", &[]),
     ("hoid-model", &["hoid-core"]),
     ("hoid-ident", &["hoid-core", "hoid-lanes", "hoid-model"]),
@@ -14,6 +14,10 @@ const ALLOWED: [(&str, &[&str]); 15] = [
     ("hoid-track", &["hoid-core", "hoid-ident", "hoid-model"]),
     ("hoid-sim", &["hoid-core", "hoid-lanes", "hoid-model"]),
     ("hoid-io", &["hoid-model"]),
+    (
+        "hoid-ffi",
+        &["hoid-ident", "hoid-io", "hoid-model", "hoid-sim", "hoid-track"],
+    ),
     (
         "hoid-thesis",
         &[
