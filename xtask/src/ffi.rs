@@ -75,21 +75,12 @@ fn header() -> Result<(), String> {
 }
 
 fn build(profile: &str, out: &Path) -> Result<(), String> {
-    cargo(&["build", "--profile", profile, "-p", "hoid-ffi"], &[])?;
-    // Two hundred megabytes with what debuggers read: no build of the workspace makes it.
-    cargo(
-        &[
-            "rustc",
-            "--profile",
-            profile,
-            "-p",
-            "hoid-ffi",
-            "--lib",
-            "--crate-type",
-            "staticlib",
-        ],
-        &[],
-    )?;
+    if profile == "dev" {
+        // With the features of the whole workspace, as the tests have compiled it.
+        cargo(&["build", "--workspace", "--lib"], &[])?;
+    } else {
+        cargo(&["build", "--profile", profile, "-p", "hoid-ffi"], &[])?;
+    }
     let built = target_directory().join(if profile == "dev" { "debug" } else { profile });
     let version = env!("CARGO_PKG_VERSION");
     let _ = fs::remove_dir_all(out);
