@@ -48,6 +48,7 @@ fn main() -> ExitCode {
         Command::Describe(args) => commands::describe::run(&args),
         Command::Track(args) => commands::track::run(&args),
         Command::Stream(args) => commands::stream::run(&args),
+        Command::Fmu(args) => commands::fmu::run(&args),
         Command::Lab(args) => commands::lab::run(&args),
         Command::Info(args) => commands::info::run(&args),
         Command::Convert(args) => commands::convert::run(&args),

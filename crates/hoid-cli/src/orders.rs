@@ -2,8 +2,9 @@
 
 use std::{collections::BTreeMap, ops::RangeInclusive};
 
-use hoid_ident::{Constraint, OrderRanges, Prior};
+use hoid_ident::{Constraint, NamedOrders, OrderRanges, Prior, order_selection::default_operator_ranges};
 use hoid_model::{MAX_DELAY, MAX_ORDER, Orders, SampleTime, Structure};
+use hoid_track::theta_of;
 
 use crate::error::CliError;
 
@@ -101,39 +102,35 @@ pub fn parse_numbers(text: &str) -> Result<Vec<(String, f64)>, String> {
         .collect()
 }
 
-/// What is to be searched: the defaults of the structure, changed by what was typed.
-pub fn ranges(
-    structure: Structure,
+/// The orders that were typed.
+pub fn named_orders(
     orders: Option<&str>,
     nk: Option<&DelayRange>,
     sample_time: SampleTime,
-) -> Result<OrderRanges, CliError> {
-    let mut ranges = hoid_ident::order_selection::default_operator_ranges(structure, sample_time);
+) -> Result<NamedOrders, CliError> {
+    let mut all = NamedOrders::new();
     for (name, value) in parse_pairs(orders.unwrap_or_default()).map_err(CliError::Usage)? {
-        let range = parse_range(&value).map_err(|e| CliError::Usage(format!("--orders {name}: {e}")))?;
         if name == "nk" && nk.is_some() {
             return Err(CliError::Usage(
                 "nk is given twice, by --orders and by --nk; drop one".to_owned(),
             ));
         }
-        *ranges.range_mut(&name).ok_or_else(|| {
-            CliError::Usage(format!(
-                "--orders: there is no order {name}; expected na, nb, nc, nd, nf or nk"
-            ))
-        })? = range;
+        let range = parse_range(&value).map_err(|e| CliError::Usage(format!("--orders {name}: {e}")))?;
+        all.insert(name, range);
     }
     if let Some(nk) = nk {
-        ranges.nk = nk.samples(sample_time);
+        all.insert("nk".to_owned(), nk.samples(sample_time));
     }
-    let orders = [
-        ("na", &ranges.na),
-        ("nb", &ranges.nb),
-        ("nc", &ranges.nc),
-        ("nd", &ranges.nd),
-        ("nf", &ranges.nf),
-    ];
-    let of_delay = std::iter::once(("nk", &ranges.nk, MAX_DELAY));
-    for (name, range, most) in orders.into_iter().map(|(n, r)| (n, r, MAX_ORDER)).chain(of_delay) {
+    for (name, range) in &all {
+        let most = match name.as_str() {
+            "nk" => MAX_DELAY,
+            "na" | "nb" | "nc" | "nd" | "nf" => MAX_ORDER,
+            _ => {
+                return Err(CliError::Usage(format!(
+                    "--orders: there is no order {name}; expected na, nb, nc, nd, nf or nk"
+                )));
+            }
+        };
         if *range.end() > most {
             return Err(CliError::Usage(format!(
                 "{name} = {}: at most {most} is possible; give a smaller number or range",
@@ -141,9 +138,20 @@ pub fn ranges(
             )));
         }
     }
-    ranges
-        .candidates()
-        .map_err(|error| CliError::Usage(error.to_string()))?;
+    Ok(all)
+}
+
+/// What is to be searched: the defaults of the structure, changed by what was typed.
+pub fn ranges(
+    structure: Structure,
+    orders: Option<&str>,
+    nk: Option<&DelayRange>,
+    sample_time: SampleTime,
+) -> Result<OrderRanges, CliError> {
+    let usual = default_operator_ranges(structure, sample_time);
+    let usage = |error: hoid_ident::IdentError| CliError::Usage(error.to_string());
+    let ranges = (usual.with(&named_orders(orders, nk, sample_time)?)).map_err(usage)?;
+    ranges.candidates().map_err(usage)?;
     Ok(ranges)
 }
 
@@ -210,32 +218,13 @@ pub fn priors(text: Option<&str>) -> Result<BTreeMap<String, Prior>, CliError> {
 
 /// Theta from `f1=..,b0=..`: every coefficient of the orders, each once.
 pub fn theta(orders: &Orders, text: &str) -> Result<Vec<f64>, CliError> {
-    let names = orders.parameter_names();
-    let mut theta = vec![None; names.len()];
+    let mut start = BTreeMap::new();
     for (name, value) in parse_numbers(text).map_err(|e| CliError::Usage(format!("--start: {e}")))? {
-        let Some(i) = names.iter().position(|n| *n == name) else {
-            return Err(CliError::Usage(format!(
-                "--start: the model has no coefficient {name}; it has {}",
-                names.join(", ")
-            )));
-        };
-        if theta[i].replace(value).is_some() {
+        if start.insert(name.clone(), value).is_some() {
             return Err(CliError::Usage(format!("--start: {name} is given twice")));
         }
     }
-    let missing: Vec<&str> = names
-        .iter()
-        .zip(&theta)
-        .filter(|(_, v)| v.is_none())
-        .map(|(n, _)| n.as_str())
-        .collect();
-    if !missing.is_empty() {
-        return Err(CliError::Usage(format!(
-            "--start lacks {}; give all coefficients, or none for the program's own starts",
-            missing.join(", ")
-        )));
-    }
-    Ok(theta.into_iter().flatten().collect())
+    theta_of(&orders.parameter_names(), &start).map_err(|reason| CliError::Usage(format!("--start {reason}")))
 }
 
 #[cfg(test)]

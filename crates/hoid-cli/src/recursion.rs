@@ -5,7 +5,7 @@ use std::path::Path;
 use hoid_ident::{Choice, IdentError, OrderRanges};
 use hoid_io::{is_fit_file, read_fit};
 use hoid_model::{Record, SampleTime, Structure};
-use hoid_track::{Method, StartAt, TrackOptions, TrackPlan, narrowed};
+use hoid_track::{Method, StartAt, TrackOptions, TrackPlan, ranges_of};
 
 use crate::{
     args::{RecursionArgs, flag, methods_with},
@@ -181,22 +181,15 @@ fn ranges(
     structure: Structure,
     sample_time: SampleTime,
 ) -> Result<OrderRanges, CliError> {
-    let mut ranges = orders::ranges(structure, args.orders.as_deref(), args.nk.as_ref(), sample_time)?;
-    if let Some(nd) = method.usual_nd()
-        && !args.orders.as_deref().is_some_and(|o| o.contains("nd"))
-    {
-        ranges.nd = nd..=nd;
-    }
-    let typed_nk = args.nk.is_some() || args.orders.as_deref().is_some_and(|o| o.contains("nk"));
+    let usage = |error: IdentError| CliError::Usage(error.to_string());
+    let named = orders::named_orders(args.orders.as_deref(), args.nk.as_ref(), sample_time)?;
     let start = args.start.as_deref().filter(|text| text.trim() != "nothing");
-    let names: Vec<String> = match (start, &args.orders) {
-        (Some(text), None) => orders::parse_pairs(text)
-            .map_err(|e| CliError::Usage(format!("--start: {e}")))?
-            .into_iter()
-            .map(|(name, _)| name)
-            .collect(),
-        _ => Vec::new(),
-    };
-    let delay = method.track_delay_s().filter(|_| !typed_nk);
-    Ok(narrowed(ranges, delay, &names, sample_time))
+    let names: Vec<String> = orders::parse_pairs(start.unwrap_or_default())
+        .map_err(|e| CliError::Usage(format!("--start: {e}")))?
+        .into_iter()
+        .map(|(name, _)| name)
+        .collect();
+    let ranges = ranges_of(method, structure, &named, &names, sample_time).map_err(usage)?;
+    ranges.candidates().map_err(usage)?;
+    Ok(ranges)
 }

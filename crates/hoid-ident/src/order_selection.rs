@@ -6,7 +6,7 @@
 //! more on all the samples that its own orders leave, and its error bars count the search of the
 //! delay (`searched_delay.rs`).
 
-use std::{fmt, ops::RangeInclusive};
+use std::{collections::BTreeMap, fmt, ops::RangeInclusive};
 
 use hoid_model::{Orders, Record, Structure};
 use rayon::prelude::*;
@@ -32,6 +32,9 @@ pub struct OrderRanges {
     /// Delay of b0 in samples.
     pub nk: RangeInclusive<usize>,
 }
+
+/// Orders by their names (na, nb, nc, nd, nf, nk), each with its range.
+pub type NamedOrders = BTreeMap<String, RangeInclusive<usize>>;
 
 impl From<Orders> for OrderRanges {
     fn from(o: Orders) -> Self {
@@ -74,17 +77,30 @@ impl OrderRanges {
         ]
     }
 
-    /// The range of an order or of the delay by its name.
-    pub fn range_mut(&mut self, name: &str) -> Option<&mut RangeInclusive<usize>> {
-        match name {
-            "na" => Some(&mut self.na),
-            "nb" => Some(&mut self.nb),
-            "nc" => Some(&mut self.nc),
-            "nd" => Some(&mut self.nd),
-            "nf" => Some(&mut self.nf),
-            "nk" => Some(&mut self.nk),
-            _ => None,
+    /// With the orders that are named in the place of these.
+    ///
+    /// # Errors
+    /// [`IdentError::BadOption`] for a name that is no order.
+    pub fn with(mut self, named: &NamedOrders) -> Result<Self, IdentError> {
+        for (name, range) in named {
+            let place = match name.as_str() {
+                "na" => &mut self.na,
+                "nb" => &mut self.nb,
+                "nc" => &mut self.nc,
+                "nd" => &mut self.nd,
+                "nf" => &mut self.nf,
+                "nk" => &mut self.nk,
+                _ => {
+                    return Err(IdentError::BadOption {
+                        option: "orders".to_owned(),
+                        found: name.clone(),
+                        expected: "na, nb, nc, nd, nf or nk".to_owned(),
+                    });
+                }
+            };
+            *place = range.clone();
         }
+        Ok(self)
     }
 
     /// Number of all combinations.

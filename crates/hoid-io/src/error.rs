@@ -53,6 +53,14 @@ pub enum IoError {
         /// What is wrong.
         reason: String,
     },
+    /// A file that is no shared library of a platform that units are made for.
+    #[error(
+        "{file} is no shared library for Linux, Windows or macOS with 64 bits; give the one that `cargo xtask ffi` has built"
+    )]
+    NoLibrary {
+        /// The file.
+        file: String,
+    },
     /// A second process on one directory.
     #[error("another process works on {directory}: wait for its end, or take another directory")]
     InUse {

@@ -31,6 +31,7 @@
 //! | `segments` | [`read_segments`]: the records between faults of the recording |
 //! | `scenario_file` | [`read_scenario`]: scenarios in TOML |
 //! | `fit_file` | [`read_fit`]: what `hoid identify --json` has printed |
+//! | [`fmu`] | functional mock-up units |
 //! | `formats`, `format` | the formats, and what each says of itself |
 //! | `arrays` | files of named arrays: paths, and the columns among them |
 //! | `time_column` | the time under another name |
@@ -53,6 +54,7 @@ mod data_quality;
 mod directory_lock;
 mod error;
 mod fit_file;
+pub mod fmu;
 mod format;
 mod formats;
 mod guarded;

@@ -86,7 +86,7 @@ pub fn identify<'py>(
     let (work, models): (Work, usize) = match kind {
         Kind::Polynomial(structure) => {
             let usual = default_operator_ranges(structure, records[0].sample_time());
-            let ranges = names::with_orders(usual, &orders)?;
+            let ranges = usual.with(&names::named_orders(&orders)?)?;
             let criterion = names::criterion(criterion)?;
             let combinations = ranges.combinations()?;
             let mut estimator = Estimator {

@@ -3,13 +3,14 @@
 use std::{collections::BTreeMap, ops::RangeInclusive};
 
 use hoid_ident::{
-    Constraint, Focus, InitialState, IvMethod, OrderRanges, Prior, SearchMethod, order_selection::Criterion,
+    Constraint, Focus, InitialState, IvMethod, NamedOrders, Prior, SearchMethod, order_selection::Criterion,
 };
 use hoid_io::QualityIssueKind;
 use hoid_model::{
     Detrend, NamedChoice, Structure, discretise, remnant::RemnantDiscretisation, remnant_gain::NoiseDefinition,
     scenario::Realisation,
 };
+use hoid_track::theta_of;
 
 use crate::errors::{Outcome, bad_option};
 
@@ -151,15 +152,10 @@ pub fn range(option: &str, ends: (usize, usize)) -> Outcome<RangeInclusive<usize
     Ok(ends.0..=ends.1)
 }
 
-/// Orders by name, each a range, instead of the default ones.
-pub fn with_orders(mut ranges: OrderRanges, orders: &BTreeMap<String, (usize, usize)>) -> Outcome<OrderRanges> {
-    for (name, ends) in orders {
-        let place = ranges
-            .range_mut(name)
-            .ok_or_else(|| bad_option(format!("there is no order {name}; expected na, nb, nc, nd, nf or nk")))?;
-        *place = range(name, *ends)?;
-    }
-    Ok(ranges)
+/// Orders by name, each a range.
+pub fn named_orders(orders: &BTreeMap<String, (usize, usize)>) -> Outcome<NamedOrders> {
+    let one = |(name, ends): (&String, &(usize, usize))| Ok((name.clone(), range(name, *ends)?));
+    orders.iter().map(one).collect()
 }
 
 /// Fixed values and bounds, by name.
@@ -204,27 +200,5 @@ pub fn priors(guesses: BTreeMap<String, (f64, f64)>) -> Outcome<BTreeMap<String,
 
 /// Theta of a model with these names: every coefficient, each once.
 pub fn theta(names: &[String], start: &BTreeMap<String, f64>) -> Outcome<Vec<f64>> {
-    if let Some(unknown) = start.keys().find(|name| !names.contains(name)) {
-        return Err(bad_option(format!(
-            "start: the model has no coefficient {unknown}; it has {}",
-            names.join(", ")
-        )));
-    }
-    let missing: Vec<&str> = names
-        .iter()
-        .filter(|name| !start.contains_key(*name))
-        .map(String::as_str)
-        .collect();
-    if !missing.is_empty() {
-        return Err(bad_option(format!(
-            "start lacks {}; give all coefficients, or none for the program's own starts",
-            missing.join(", ")
-        )));
-    }
-    if let Some((name, value)) = start.iter().find(|(_, v)| !v.is_finite()) {
-        return Err(bad_option(format!(
-            "start: {name} is {value}, expected a finite number"
-        )));
-    }
-    Ok(names.iter().map(|name| start[name]).collect())
+    theta_of(names, start).map_err(|reason| bad_option(format!("start {reason}")))
 }

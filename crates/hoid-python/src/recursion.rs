@@ -2,10 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use hoid_ident::{IdentError, order_selection::default_operator_ranges, settings::MethodSpec};
+use hoid_ident::{IdentError, settings::MethodSpec};
 use hoid_io::{FitFile, parse_fit};
 use hoid_model::SampleTime;
-use hoid_track::{Method, StartAt, TrackOptions, TrackPlan, narrowed};
+use hoid_track::{Method, StartAt, TrackOptions, TrackPlan, ranges_of};
 use pyo3::{prelude::*, types::PyDict};
 
 use crate::{
@@ -43,17 +43,14 @@ pub fn plan(options: &Bound<'_, PyDict>, sample_time: SampleTime) -> Outcome<Tra
     let orders: BTreeMap<String, (usize, usize)> = get(options, "orders")?.unwrap_or_default();
     let start: Option<BTreeMap<String, f64>> = get(options, "start")?;
     let from_nothing = get(options, "from_nothing")?.unwrap_or(false);
-    let mut usual = default_operator_ranges(structure, sample_time);
-    if let Some(nd) = method.usual_nd() {
-        usual.nd = nd..=nd;
-    }
-    let usual = names::with_orders(usual, &orders)?;
-    let delay = method.track_delay_s().filter(|_| !orders.contains_key("nk"));
-    let named: Vec<String> = match &start {
-        Some(start) if orders.keys().all(|name| name == "nk") => start.keys().cloned().collect(),
-        _ => Vec::new(),
-    };
-    let ranges = narrowed(usual, delay, &named, sample_time);
+    let start_names: Vec<String> = start.iter().flat_map(BTreeMap::keys).cloned().collect();
+    let ranges = ranges_of(
+        &method,
+        structure,
+        &names::named_orders(&orders)?,
+        &start_names,
+        sample_time,
+    )?;
     let combinations = ranges.combinations()?;
     let largest = combinations[combinations.len() - 1];
     let start = match start {

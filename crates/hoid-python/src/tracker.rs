@@ -1,8 +1,8 @@
 //! `pyhoid.Tracker`: a recursive estimate, live.
 
 use hoid_ident::{Choice, IdentError};
-use hoid_model::{Record, SampleTime};
-use hoid_track::{Counts, Live, Sample, TrackPlan, Tracker, WarmUp};
+use hoid_model::{Orders, Record, SampleTime};
+use hoid_track::{Counts, Live, Sample, TrackPlan, Tracker};
 use numpy::{PyArray1, PyArray2, PyReadonlyArray1};
 use pyo3::{prelude::*, types::PyDict};
 
@@ -332,13 +332,9 @@ impl PyTracker {
 
     /// The orders, once there is a tracker, and all that changes as numbers.
     fn saved<'py>(&mut self, py: Python<'py>) -> PyResult<Saved<'py>> {
-        Ok(match &mut self.live {
-            Live::Tracking(tracker) => {
-                let orders = figures::orders(py, &tracker.options().orders)?;
-                (Some(orders), array(py, tracker.saved()))
-            }
-            Live::Collecting(warm_up) => (None, array(py, warm_up.saved())),
-        })
+        let (orders, numbers) = self.live.saved();
+        let orders = orders.map(|orders| figures::orders(py, &orders)).transpose()?;
+        Ok((orders, array(py, numbers)))
     }
 
     /// Restores the state that `saved` returned.
@@ -348,25 +344,24 @@ impl PyTracker {
         numbers: PyReadonlyArray1<'_, f64>,
     ) -> Outcome<()> {
         let numbers = numbers.as_slice().map_err(PyErr::from)?;
-        let wrong = || bad_option("the saved numbers are those of a tracker with other options");
-        self.live = match orders {
-            None => Live::Collecting(WarmUp::restored(self.sample_time, numbers).ok_or_else(wrong)?),
+        let orders = match orders {
+            None => None,
             Some(orders) => {
-                let mut all = self.plan.options().orders;
-                for (name, place) in [
-                    ("na", &mut all.na),
-                    ("nb", &mut all.nb),
-                    ("nc", &mut all.nc),
-                    ("nd", &mut all.nd),
-                    ("nf", &mut all.nf),
-                    ("nk", &mut all.nk),
-                ] {
-                    *place = *orders.get(name).ok_or_else(wrong)?;
-                }
-                let options = self.plan.with_orders(all);
-                Live::Tracking(Box::new(Tracker::restored(&options, self.sample_time, numbers)?))
+                let of = |name: &str| {
+                    let wrong = || bad_option(format!("the saved tracker has no {name}; save it again"));
+                    orders.get(name).copied().ok_or_else(wrong)
+                };
+                Some(Orders {
+                    na: of("na")?,
+                    nb: of("nb")?,
+                    nc: of("nc")?,
+                    nd: of("nd")?,
+                    nf: of("nf")?,
+                    nk: of("nk")?,
+                })
             }
         };
+        self.live = Live::restored(&self.plan, orders, numbers, self.sample_time)?;
         Ok(())
     }
 }

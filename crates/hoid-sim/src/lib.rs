@@ -23,6 +23,7 @@
 //! | module | what it holds |
 //! |---|---|
 //! | `simulator` | [`Simulator`]: a scenario made ready, and its runs |
+//! | `operator_run` | [`OperatorRun`]: the operator alone, a sample at a time |
 //! | `run_seed` | [`RunSeed`]: what names the random numbers of one run |
 //! | `normal_deviates` | standard normal deviates by the ziggurat |
 //! | `cascade` | exact zero-order hold of the remnant filter |
@@ -34,11 +35,13 @@ mod cascade;
 mod error;
 pub mod family;
 mod normal_deviates;
+mod operator_run;
 pub mod people;
 mod run_seed;
 mod simulator;
 
 pub use error::SimError;
 pub use family::{FamilySignals, FamilySimulator};
+pub use operator_run::OperatorRun;
 pub use run_seed::RunSeed;
 pub use simulator::{Signals, Simulator};

@@ -40,26 +40,26 @@ pub struct Simulator {
     forcing_deg: Vec<f64>,
     /// One entry when nothing changes, else one a sample.
     parameters: Vec<TrueParameters>,
-    matrices: Vec<Matrices>,
-    cascade: Cascade,
+    pub(crate) matrices: Vec<Matrices>,
+    pub(crate) cascade: Cascade,
 }
 
 #[derive(Debug, Clone, Copy)]
-struct Matrices {
-    operator: Rows,
-    operator_output: [f64; 2],
+pub(crate) struct Matrices {
+    pub operator: Rows,
+    pub operator_output: [f64; 2],
     element: Rows,
     element_input: f64,
     element_output: f64,
-    k_n: f64,
-    delay: usize,
+    pub k_n: f64,
+    pub delay: usize,
 }
 
 /// A held system by rows, `[a x_0 + b x_1 + g u, d x_1 - c x_0 - h u]`: the bits of
 /// [`HeldStates::step`]. Were both rows sums, the compiler would pack the states into one register,
 /// and each sample would wait for the shuffles besides.
 #[derive(Debug, Clone, Copy)]
-struct Rows {
+pub(crate) struct Rows {
     plus: [f64; 3],
     minus: [f64; 3],
 }
@@ -75,7 +75,7 @@ impl Rows {
 
     /// One sample on.
     #[inline(always)]
-    fn step<R: Number>(&self, x: [R; 2], u: R) -> [R; 2] {
+    pub fn step<R: Number>(&self, x: [R; 2], u: R) -> [R; 2] {
         let ([a, b, g], [d, c, h]) = (self.plus, self.minus);
         [
             u.splat(a) * x[0] + u.splat(b) * x[1] + u.splat(g) * u,
@@ -219,7 +219,7 @@ impl Simulator {
         (noises.iter().zip(&*into)).try_for_each(|(noise, signals)| self.check_finite(noise, signals))
     }
 
-    fn longest_delay(&self) -> usize {
+    pub(crate) fn longest_delay(&self) -> usize {
         let [initial, last] = self.scenario.delay_samples();
         initial.max(last)
     }

@@ -3,10 +3,10 @@
 use std::collections::VecDeque;
 
 use hoid_core::state::{State, visit_all};
-use hoid_model::{Channel, Record, SampleTime};
+use hoid_model::{Channel, Orders, Record, SampleTime};
 
 use crate::{
-    Outcome, Sample, StartAt, TrackOptions, Tracker,
+    Outcome, Sample, StartAt, TrackOptions, TrackPlan, Tracker,
     idle::idle_head,
     seal::{opened, sealed},
 };
@@ -51,6 +51,36 @@ impl Live {
             StartAt::Span(_) if !options.method.starts_itself() => Self::Collecting(WarmUp::new(warm_up, sample_time)),
             _ => Self::Tracking(Box::new(Tracker::new(options, None, sample_time)?)),
         })
+    }
+
+    /// All that changes as numbers, and the orders once there is a tracker, for [`Live::restored`]. It
+    /// does not change.
+    pub fn saved(&mut self) -> (Option<Orders>, Vec<f64>) {
+        match self {
+            Self::Tracking(tracker) => (Some(tracker.options().orders), tracker.saved()),
+            Self::Collecting(warm_up) => (None, warm_up.saved()),
+        }
+    }
+
+    /// The recursion that [`Live::saved`] was asked of, from its plan.
+    ///
+    /// # Errors
+    /// [`IdentError::BadStart`] for numbers of another recursion, and for such that were changed or
+    /// cut; those of [`Tracker::new`].
+    pub fn restored(
+        plan: &TrackPlan,
+        orders: Option<Orders>,
+        numbers: &[f64],
+        sample_time: SampleTime,
+    ) -> Result<Self, IdentError> {
+        let Some(orders) = orders else {
+            let warm_up = WarmUp::restored(sample_time, numbers).ok_or_else(|| IdentError::BadStart {
+                reason: "the numbers of the saved warm-up were changed or cut since; save it again".to_owned(),
+            })?;
+            return Ok(Self::Collecting(warm_up));
+        };
+        let tracker = Tracker::restored(&plan.with_orders(orders), sample_time, numbers)?;
+        Ok(Self::Tracking(Box::new(tracker)))
     }
 
     /// Takes a sample; NaN stands for what is faulty or missing. The fit of the warm-up is made

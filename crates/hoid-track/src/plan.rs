@@ -3,14 +3,14 @@
 
 use std::{collections::BTreeMap, ops::RangeInclusive};
 
-use hoid_model::{Orders, Record, SampleTime};
+use hoid_model::{Orders, Record, SampleTime, Structure};
 
 use crate::{
     forgetting::ForgettingRule, methods::Method, options::TrackOptions, person_prior::PersonPrior, setup::StartAt,
 };
 use hoid_ident::{
-    Choice, IdentError, OrderRanges,
-    order_selection::{Criterion, choose_orders_with},
+    Choice, IdentError, NamedOrders, OrderRanges,
+    order_selection::{Criterion, choose_orders_with, default_operator_ranges},
 };
 
 /// Delay of people who track, s.
@@ -127,10 +127,62 @@ fn usual_ranges(method: &Method, ranges: &OrderRanges, sample_time: SampleTime) 
     }
 }
 
-/// Narrows ranges to what is known besides: the delay lies within the range that is tracked (unless
-/// nk was given), and orders that are still open are those of the coefficients of a start, named as
-/// f1 or b0.
-pub fn narrowed(
+/// What is searched: the ranges that are usual for structure and method, with the orders that are
+/// named in their place. Where nk is not named, the delay lies within the range that is tracked;
+/// where no other order is, orders that are still open are those of the coefficients of a start,
+/// named as f1 or b0.
+///
+/// # Errors
+/// [`IdentError::BadOption`] for a name that is no order.
+pub fn ranges_of(
+    method: &Method,
+    structure: Structure,
+    named: &NamedOrders,
+    start_names: &[String],
+    sample_time: SampleTime,
+) -> Result<OrderRanges, IdentError> {
+    let mut usual = default_operator_ranges(structure, sample_time);
+    if let Some(nd) = method.usual_nd() {
+        usual.nd = nd..=nd;
+    }
+    let delay = method.track_delay_s().filter(|_| !named.contains_key("nk"));
+    let of_start = if named.keys().all(|name| name == "nk") {
+        start_names
+    } else {
+        &[]
+    };
+    Ok(narrowed(usual.with(named)?, delay, of_start, sample_time))
+}
+
+/// Theta in the order of these names: every coefficient once.
+///
+/// # Errors
+/// What is wrong, as the end of a sentence that begins with the name of the option.
+pub fn theta_of(names: &[String], start: &BTreeMap<String, f64>) -> Result<Vec<f64>, String> {
+    if let Some(unknown) = start.keys().find(|name| !names.contains(name)) {
+        return Err(format!(
+            "names {unknown}, which the model does not have; it has {}",
+            names.join(", ")
+        ));
+    }
+    let missing: Vec<&str> = (names.iter())
+        .filter(|name| !start.contains_key(*name))
+        .map(String::as_str)
+        .collect();
+    if !missing.is_empty() {
+        return Err(format!(
+            "lacks {}; give all coefficients, or none for the program's own starts",
+            missing.join(", ")
+        ));
+    }
+    if let Some((name, value)) = start.iter().find(|(_, v)| !v.is_finite()) {
+        return Err(format!("has {name} = {value}, expected a finite number"));
+    }
+    Ok(names.iter().map(|name| start[name]).collect())
+}
+
+/// Narrows ranges to what is known besides.
+fn narrowed(
     mut ranges: OrderRanges,
     track_delay_s: Option<(f64, f64)>,
     start_names: &[String],
@@ -201,7 +253,6 @@ mod tests {
 
     use super::*;
     use crate::Method;
-    use hoid_ident::order_selection::default_operator_ranges;
 
     #[test]
     fn names_and_letters() {
@@ -222,6 +273,44 @@ mod tests {
         let found = narrowed(usual.clone(), Some((0.2, 0.3)), &start, ts);
         assert_eq!((found.nd.clone(), found.nk.clone()), (2..=2, 21..=31));
         assert_eq!(narrowed(usual.clone(), None, &[], ts), usual);
+    }
+
+    #[test]
+    fn named_orders_stand_for_the_usual_ones() {
+        let ts = SampleTime::HUNDREDTH;
+        let of = |method: &Method, named: &[(&str, RangeInclusive<usize>)], start: &[&str]| {
+            let named = named.iter().map(|(name, range)| ((*name).to_owned(), range.clone()));
+            let start: Vec<String> = start.iter().map(|name| (*name).to_owned()).collect();
+            ranges_of(method, Structure::BoxJenkins, &named.collect(), &start, ts)
+        };
+        let tracked = Method::adaptive().with("track_delay", "0.2..0.3").unwrap();
+        let found = of(&tracked, &[], &[]).unwrap();
+        assert_eq!((found.nd, found.nk), (6..=6, 21..=31));
+        let found = of(&tracked, &[("nk", 29..=29), ("nd", 1..=2)], &[]).unwrap();
+        assert_eq!((found.nd, found.nk), (1..=2, 29..=29));
+        let start = ["b0", "b1", "d1", "d2", "f1", "f2"];
+        let nd = |named: &[(&str, RangeInclusive<usize>)]| of(&Method::rpem(), named, &start).unwrap().nd;
+        assert_eq!((nd(&[("nk", 29..=29)]), nd(&[("nf", 2..=2)])), (2..=2, 1..=4));
+        assert!(
+            of(&tracked, &[("nx", 1..=1)], &[])
+                .unwrap_err()
+                .to_string()
+                .contains("nx")
+        );
+    }
+
+    #[test]
+    fn theta_is_complete_or_refused() {
+        let names: Vec<String> = ["b0", "f1"].map(str::to_owned).to_vec();
+        let of = |start: &[(&str, f64)]| theta_of(&names, &start.iter().map(|(n, v)| ((*n).to_owned(), *v)).collect());
+        assert_eq!(of(&[("f1", -1.9), ("b0", 0.04)]), Ok(vec![0.04, -1.9]));
+        for (start, reason) in [
+            (&[("f1", 1.0)][..], "lacks b0"),
+            (&[("a1", 1.0)], "names a1"),
+            (&[("b0", f64::NAN), ("f1", 1.0)], "b0 = NaN"),
+        ] {
+            assert!(of(start).unwrap_err().contains(reason), "{reason}");
+        }
     }
 
     #[test]

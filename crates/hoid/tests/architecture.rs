@@ -6,7 +6,7 @@ use std::{collections::BTreeMap, process::Command};
 use serde_json::Value;
 
 /// What each crate may depend on within the workspace.
-const ALLOWED: [(&str, &[&str]); 16] = [
+const ALLOWED: [(&str, &[&str]); 17] = [
     ("hoid-core", &[]),
     ("hoid-embedded", &["hoid-core"]),
     ("hoid-model", &["hoid-core"]),
@@ -15,6 +15,10 @@ const ALLOWED: [(&str, &[&str]); 16] = [
     ("hoid-track", &["hoid-core", "hoid-ident", "hoid-model"]),
     ("hoid-sim", &["hoid-core", "hoid-lanes", "hoid-model"]),
     ("hoid-io", &["hoid-model"]),
+    (
+        "hoid-ffi",
+        &["hoid-ident", "hoid-io", "hoid-model", "hoid-sim", "hoid-track"],
+    ),
     (
         "hoid-thesis",
         &[

@@ -5,6 +5,7 @@ use clap::{Parser, Subcommand};
 use super::{
     convert::{ConvertArgs, InfoArgs},
     describe::DescribeArgs,
+    fmu::FmuArgs,
     group::{GroupArgs, SimulateGroupArgs},
     identify::IdentifyArgs,
     lab::LabArgs,
@@ -50,6 +51,11 @@ pub enum Command {
     ///
     /// Reads samples as lines on standard input and writes one JSON line a sample on standard output.
     Stream(Box<StreamArgs>),
+    /// A unit for simulators (FMI 2.0, 3.0)
+    ///
+    /// Writes a functional mock-up unit: the tracker, or with --operator a simulated person. It takes the
+    /// shared library that `cargo xtask ffi` builds.
+    Fmu(FmuArgs),
     /// What is inside of a file, and what is wrong with it
     ///
     /// Shows columns, sampling, ranges, what is suspicious, and a sketch of each column.

@@ -20,7 +20,7 @@ struct Help {
 const GROUPS: [(&str, &[&str]); 5] = [
     (
         "Recordings",
-        &["info", "identify", "describe", "track", "stream", "lab", "group"],
+        &["info", "identify", "describe", "track", "stream", "lab", "group", "fmu"],
     ),
     ("Simulation", &["demo", "simulate", "simulate-group"]),
     ("Models", &["convert", "margins"]),
@@ -28,7 +28,7 @@ const GROUPS: [(&str, &[&str]); 5] = [
     ("This program", &["completions", "man", "help"]),
 ];
 
-const HELP: [Help; 16] = [
+const HELP: [Help; 17] = [
     Help {
         command: "lab",
         examples: &["hoid lab --open", "hoid lab --config lab.toml --out study"],
@@ -133,7 +133,16 @@ const HELP: [Help; 16] = [
             "memory",
             "warm_up",
             "every",
+            "udp",
         ],
+    },
+    Help {
+        command: "fmu",
+        examples: &[
+            "hoid fmu --out tracker.fmu --controlled-element '90/(s(s+6))'",
+            "hoid fmu --operator C4 --seed 3 --out person.fmu",
+        ],
+        shown: &[],
     },
     Help {
         command: "group",
@@ -218,6 +227,7 @@ const HEADINGS: [(&str, &[&str]); 2] = [
             "input",
             "output",
             "fs",
+            "udp",
             "from",
             "to",
             "unit",

@@ -6,9 +6,10 @@
 //! | `simulate` | `hoid demo`, `hoid simulate`, `hoid margins` |
 //! | `identify` | `hoid identify` |
 //! | `describe` | `hoid describe` |
-//! | `recursion`, `settings` | `hoid track`, `hoid stream`; the options of the methods, from the registry |
+//! | `recursion`, `settings`, `udp` | `hoid track`, `hoid stream`; the options of the methods, from the registry |
 //! | `reading` | all commands that read records |
 //! | `convert` | `hoid convert`, `hoid info` |
+//! | `fmu` | `hoid fmu` |
 //! | `figure` | figures as files |
 //! | `show` | how results are shown |
 //! | `lab` | `hoid lab` |
@@ -21,6 +22,7 @@ mod cli;
 mod convert;
 mod describe;
 mod figure;
+mod fmu;
 mod group;
 mod help;
 mod identify;
@@ -33,10 +35,12 @@ mod shell;
 mod show;
 mod simulate;
 mod study;
+mod udp;
 
 pub use cli::{Cli, Command};
 pub use convert::{ConvertArgs, InfoArgs};
 pub use describe::DescribeArgs;
+pub use fmu::{FmuArgs, OperatorChoice};
 pub use group::{GroupArgs, GroupCommand, GroupInitArgs, GroupRunArgs, SimulateGroupArgs};
 pub use help::command;
 pub use identify::{IdentifyArgs, ModelKind, estimators_with};
@@ -50,3 +54,4 @@ pub use settings::{flag, methods_with};
 pub use shell::{CompletionsArgs, ManArgs};
 pub use simulate::{DemoArgs, MarginsArgs, ScenarioChoice, SimulateArgs, StateName};
 pub use study::{ReproduceArgs, StudyCommand, StudyMergeArgs, StudyRunArgs};
+pub use udp::UdpPlaces;

@@ -11,7 +11,9 @@ use hoid_io::{Scaling, readable_endings, writable_endings};
 use hoid_model::{ContinuousTransferFunction, Structure};
 use hoid_track::Method;
 
-use super::{ReadArgs, choices::choice_of, figure::FigureArgs, parse_span, settings::SettingArgs, show::ShowArgs};
+use super::{
+    ReadArgs, choices::choice_of, figure::FigureArgs, parse_span, settings::SettingArgs, show::ShowArgs, udp::UdpPlaces,
+};
 use crate::orders::{DelayRange, parse_delay};
 
 /// What is tracked, and how.
@@ -116,13 +118,17 @@ pub struct StreamArgs {
     /// Column of the output (control) in the header line, where there is one
     #[arg(long, value_name = "NAME", default_value = "u")]
     pub output: String,
+    /// Samples and answers as datagrams of UDP in place of lines: a line of text, or a struct of C, each
+    /// answered in kind. Ports of 127.0.0.1, or addresses and ports, as 0.0.0.0:5005:192.168.1.7:5006
+    #[arg(long, value_name = "IN:OUT")]
+    pub udp: Option<UdpPlaces>,
     /// Multiply e or u: by a factor (u=12.5) or from unit to unit (e=rad:deg). May be repeated
     #[arg(long, value_name = "e|u=FACTOR", value_parser = super::reading::parse_scale)]
     pub scale: Vec<(String, Scaling)>,
 }
 
 /// The recursive methods, each with its line of help.
-fn method_names() -> impl TypedValueParser<Value = String> {
+pub(super) fn method_names() -> impl TypedValueParser<Value = String> {
     let value = |spec: MethodSpec| PossibleValue::new(spec.name).help(spec.help);
     PossibleValuesParser::new(Method::registry().into_iter().map(value)).map(|name| name.to_lowercase())
 }

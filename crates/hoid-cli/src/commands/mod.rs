@@ -5,6 +5,7 @@ pub mod demo;
 pub mod describe;
 pub mod faults;
 pub mod figure;
+pub mod fmu;
 pub mod group;
 pub mod identify;
 pub mod info;

@@ -1,0 +1,121 @@
+//! `hoid fmu`: a unit for simulators, of the library that is here.
+
+use std::{
+    env,
+    path::{Path, PathBuf},
+};
+
+use hoid_io::{
+    AnyScenario, IoError,
+    fmu::{FmiVersion, FmuKind, FmuSettings, FmuStart, Library, write_fmu},
+    is_fit_file, parse_any_scenario, parse_fit, read_text,
+};
+use hoid_model::SampleTime;
+use hoid_track::Method;
+
+use super::places;
+use crate::{
+    args::{FmuArgs, OperatorChoice},
+    error::CliError,
+    output,
+};
+
+pub fn run(args: &FmuArgs) -> Result<(), CliError> {
+    let libraries = match args.library.as_slice() {
+        [] => vec![beside_this_program()?],
+        named => named.to_vec(),
+    };
+    let (settings, read, step_s) = match &args.operator {
+        Some(operator) => of_operator(operator, args.seed)?,
+        None => of_tracker(args)?,
+    };
+    let inputs: Vec<&Path> = libraries.iter().chain(&read).map(PathBuf::as_path).collect();
+    places::check(&inputs, &[Some(&args.out)], &[])?;
+    let loaded: Vec<Library> = (libraries.iter())
+        .map(|path| Library::read(path))
+        .collect::<Result<_, IoError>>()?;
+    write_fmu(&args.out, args.fmi, &settings, &loaded, step_s)?;
+    let what = match args.operator {
+        Some(_) => "an operator: e in, u out",
+        None => "a tracker: e and u in, estimates out",
+    };
+    let version = match args.fmi {
+        FmiVersion::Two => "2.0",
+        FmiVersion::Three => "3.0",
+    };
+    output::print(&format!(
+        "{what}; FMI {version} for co-simulation, sample time {step_s} s.\nWritten to {}.\n",
+        args.out.display()
+    ))?;
+    Ok(())
+}
+
+/// Settings of a unit, the files that were read for it, its sample time in s.
+type Unit = (FmuSettings, Vec<PathBuf>, f64);
+
+fn of_tracker(args: &FmuArgs) -> Result<Unit, CliError> {
+    let step = SampleTime::new(args.sample_time)?;
+    let mut settings = FmuSettings::new(FmuKind::Tracker)
+        .with("sample_time", FmuStart::Real(step.s()))
+        .with("method", FmuStart::Text(args.method.clone()));
+    let mut read = Vec::new();
+    let mut method: Method = args.method.parse()?;
+    let wrong = |prior: &str, error: &dyn std::fmt::Display| CliError::Usage(format!("--prior {prior}: {error}"));
+    match &args.prior {
+        None => {}
+        Some(file) if is_fit_file(file) => {
+            let text = read_text(Path::new(file))?;
+            // What could not begin with it is said here, not in a simulator.
+            let fit = parse_fit(&text, file)?.operator()?;
+            method.start_from(fit).map_err(|error| wrong(file, &error))?;
+            settings = (settings.with_fit(text)).with("prior", FmuStart::Text("fit".to_owned()));
+            read.push(PathBuf::from(file));
+        }
+        Some(prior) => {
+            method.set("prior", prior).map_err(|error| wrong(prior, &error))?;
+            settings = settings.with("prior", FmuStart::Text(prior.clone()));
+        }
+    }
+    if let Some(element) = &args.controlled_element {
+        settings = settings.with("controlled_element", FmuStart::Text(element.to_string()));
+    }
+    Ok((settings, read, step.s()))
+}
+
+fn of_operator(operator: &OperatorChoice, seed: i32) -> Result<Unit, CliError> {
+    let (text, source, read) = match operator {
+        OperatorChoice::Condition(condition) => (
+            format!("condition = \"{}\"\n", condition.name()),
+            condition.name().to_owned(),
+            Vec::new(),
+        ),
+        OperatorChoice::File(file) => (read_text(file)?, file.display().to_string(), vec![file.clone()]),
+    };
+    let step_s = match parse_any_scenario(&text, &source, &source)? {
+        AnyScenario::Reference(scenario) => scenario.sample_time.s(),
+        AnyScenario::Family(_) => {
+            return Err(CliError::Usage(format!(
+                "--operator {source}: a scenario with a form cannot be a unit yet; give one of a gain with a lead"
+            )));
+        }
+    };
+    let settings = FmuSettings::new(FmuKind::Operator)
+        .with_scenario(text)
+        .with("seed", FmuStart::Integer(seed));
+    Ok((settings, read, step_s))
+}
+
+/// The library beside this program, as installed or as built.
+fn beside_this_program() -> Result<PathBuf, CliError> {
+    let program = env::current_exe().unwrap_or_default();
+    let folder = program.parent().unwrap_or(Path::new("."));
+    let (prefix, suffix) = (env::consts::DLL_PREFIX, env::consts::DLL_SUFFIX);
+    let places = ["hoid", "hoid_ffi"].map(|name| folder.join(format!("{prefix}{name}{suffix}")));
+    let found = places.iter().find(|place| place.is_file()).cloned();
+    found.ok_or_else(|| {
+        CliError::Usage(format!(
+            "there is no {prefix}hoid{suffix} in {}; build it with cargo xtask ffi, and name it by --library",
+            folder.display()
+        ))
+    })
+}

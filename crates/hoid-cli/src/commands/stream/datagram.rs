@@ -1,0 +1,203 @@
+//! Samples and estimates as datagrams: lines of text as on standard input, or structs of C, least byte
+//! first and without gaps.
+//!
+//! ```c
+//! struct sample {             /* 40 bytes */
+//!     char magic[4];          /* "hoid" */
+//!     uint32_t sequence;      /* one more at each sample */
+//!     double t, e, u, f_t;    /* s; NaN: t is sequence times the sample time, others are missing */
+//! };
+//! struct estimate {           /* 168 bytes */
+//!     char magic[4];          /* "hoid" */
+//!     uint32_t sequence;      /* of the sample */
+//!     double t;               /* s */
+//!     double operator_[12];   /* K_e, T_L, K_e_dot, omega_nm, zeta_nm, tau_e, a standard error behind each */
+//!     double open_loop[4];    /* crossover_rad_s, phase_margin_deg, a standard error behind each */
+//!     double innovation;
+//!     double change_t;        /* when the person changed, where a change was declared since the last */
+//!     int32_t level;          /* 0 trustworthy, 1 doubtful, 2 not determined */
+//!     uint32_t ready;         /* 1 once there is an estimate */
+//! };
+//! ```
+//!
+//! What is not known is NaN.
+
+use hoid_model::{SampleTime, VerdictLevel, uncertainty::Estimate};
+use hoid_track::{Change, Live};
+
+use super::lines::Read;
+
+const MAGIC: &[u8; 4] = b"hoid";
+/// Bytes of a sample and of an estimate.
+const SAMPLE: usize = 40;
+const ESTIMATE: usize = 168;
+
+/// What a datagram is.
+#[derive(Debug, PartialEq)]
+pub enum Datagram<'b> {
+    Sample(SampleDatagram),
+    Lines(&'b str),
+    Unreadable(String),
+}
+
+/// A sample as a struct.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SampleDatagram {
+    pub sequence: u32,
+    t: f64,
+    e: f64,
+    u: f64,
+    f_t: f64,
+}
+
+impl<'b> Datagram<'b> {
+    pub fn of(bytes: &'b [u8]) -> Self {
+        if let Some(rest) = bytes.strip_prefix(MAGIC) {
+            return match rest.first_chunk::<{ SAMPLE - 4 }>() {
+                Some(all) if rest.len() == SAMPLE - 4 => Self::Sample(SampleDatagram::of(all)),
+                _ => Self::Unreadable(format!(
+                    "a datagram of {} bytes that begins as a sample, which has {SAMPLE}",
+                    bytes.len()
+                )),
+            };
+        }
+        match std::str::from_utf8(bytes) {
+            Ok(text) => Self::Lines(text),
+            Err(_) => Self::Unreadable(format!(
+                "a datagram of {} bytes that is neither sample nor text",
+                bytes.len()
+            )),
+        }
+    }
+}
+
+impl SampleDatagram {
+    fn of(bytes: &[u8; SAMPLE - 4]) -> Self {
+        let mut number = [0; 4];
+        number.copy_from_slice(&bytes[..4]);
+        let (numbers, _) = bytes[4..].as_chunks::<8>();
+        let [t, e, u, f_t] = [0, 1, 2, 3].map(|i| f64::from_le_bytes(numbers[i]));
+        Self {
+            sequence: u32::from_le_bytes(number),
+            t,
+            e,
+            u,
+            f_t,
+        }
+    }
+
+    /// As a line would be read: a value with a fault is NaN.
+    pub fn read(&self, sample_time: SampleTime, largest: f64) -> Read {
+        let sound = |v: f64| v.abs() <= largest;
+        let told = |name: &str, v: f64| (!sound(v)).then(|| format!("{name} is {v}"));
+        let faults: Vec<String> = [told("e", self.e), told("u", self.u)].into_iter().flatten().collect();
+        let value = |v: f64| if sound(v) { v } else { f64::NAN };
+        Read {
+            t: Some(if self.t.is_finite() {
+                self.t
+            } else {
+                f64::from(self.sequence) * sample_time.s()
+            }),
+            e: value(self.e),
+            u: value(self.u),
+            reference: Some(self.f_t).filter(|f| sound(*f)),
+            fault: (!faults.is_empty()).then(|| faults.join("; ")),
+        }
+    }
+}
+
+/// An estimate as a struct.
+pub struct EstimateDatagram {
+    bytes: [u8; ESTIMATE],
+}
+
+impl EstimateDatagram {
+    pub fn new(
+        sequence: u32,
+        t: Option<f64>,
+        live: &Live,
+        innovation: Option<f64>,
+        change: Option<&(Option<f64>, Change)>,
+    ) -> Self {
+        let tracker = match live {
+            Live::Tracking(tracker) => Some(tracker),
+            Live::Collecting(_) => None,
+        };
+        let operator = tracker.map(|tracker| tracker.operator());
+        let level = tracker
+            .zip(operator.as_ref())
+            .map(|(tracker, operator)| tracker.level(operator));
+        let level = match level.unwrap_or(VerdictLevel::NotDetermined) {
+            VerdictLevel::Trustworthy => 0_i32,
+            VerdictLevel::Doubtful => 1,
+            VerdictLevel::NotDetermined => 2,
+        };
+        let rows = operator
+            .and_then(Result::ok)
+            .map(|operator| operator.rows().map(|(.., e)| Some(e)));
+        let open_loop = tracker.and_then(|tracker| tracker.open_loop()).and_then(Result::ok);
+        let of_loop = [
+            open_loop.map(|found| found.crossover_rad_s),
+            open_loop.map(|found| found.phase_margin_deg),
+        ];
+        let pair = |e: &Option<Estimate>| {
+            let value = e.map_or(f64::NAN, |e| e.value);
+            [value, e.and_then(|e| e.standard_error).unwrap_or(f64::NAN)]
+        };
+        let changed = change.and_then(|(t, change)| Some((*t)? - change.seconds_ago));
+        let estimates = rows.unwrap_or([None; 6]);
+        let numbers = std::iter::once(t.unwrap_or(f64::NAN))
+            .chain(estimates.iter().chain(&of_loop).flat_map(pair))
+            .chain([innovation.unwrap_or(f64::NAN), changed.unwrap_or(f64::NAN)]);
+        let mut all = Vec::with_capacity(ESTIMATE);
+        all.extend_from_slice(MAGIC);
+        all.extend_from_slice(&sequence.to_le_bytes());
+        all.extend(numbers.flat_map(f64::to_le_bytes));
+        all.extend_from_slice(&level.to_le_bytes());
+        all.extend_from_slice(&u32::from(tracker.is_some()).to_le_bytes());
+        let mut bytes = [0; ESTIMATE];
+        bytes.copy_from_slice(&all);
+        Self { bytes }
+    }
+
+    pub fn bytes(&self) -> &[u8] {
+        &self.bytes
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    fn sample(sequence: u32, numbers: [f64; 4]) -> Vec<u8> {
+        let mut bytes = MAGIC.to_vec();
+        bytes.extend_from_slice(&sequence.to_le_bytes());
+        bytes.extend(numbers.iter().flat_map(|n| n.to_le_bytes()));
+        bytes
+    }
+
+    #[test]
+    fn samples_come_as_structs_and_as_text() {
+        let read = |bytes: &[u8]| match Datagram::of(bytes) {
+            Datagram::Sample(sample) => sample.read(SampleTime::HUNDREDTH, 1e6),
+            other => panic!("{other:?}"),
+        };
+        let found = read(&sample(7, [f64::NAN, 0.5, -1.0, f64::NAN]));
+        assert_eq!(
+            (found.t, found.e, found.u, found.reference),
+            (Some(0.07), 0.5, -1.0, None)
+        );
+        let found = read(&sample(7, [2.5, 1e7, f64::INFINITY, 3.0]));
+        assert_eq!((found.t, found.reference), (Some(2.5), Some(3.0)));
+        assert!(found.e.is_nan() && found.u.is_nan());
+        assert_eq!(found.fault.as_deref(), Some("e is 10000000; u is inf"));
+        assert_eq!(Datagram::of(b"0,1,2\n"), Datagram::Lines("0,1,2\n"));
+        assert_eq!(Datagram::of(b""), Datagram::Lines(""));
+        let whole = sample(7, [0.0; 4]);
+        let longer = [&whole[..], b"x"].concat();
+        for wrong in [&whole[..39], &whole[..4], &longer, b"\xff\xfe"] {
+            assert!(matches!(Datagram::of(wrong), Datagram::Unreadable(_)));
+        }
+    }
+}

@@ -1,0 +1,77 @@
+//! The socket of `hoid stream --udp`.
+
+use std::{
+    fmt, io,
+    net::{SocketAddr, UdpSocket},
+};
+
+use crate::{args::UdpPlaces, error::CliError};
+
+/// Largest datagram that there is, bytes.
+const LARGEST: usize = 1 << 16;
+
+/// Room for a datagram.
+pub fn room() -> Vec<u8> {
+    vec![0; LARGEST]
+}
+
+/// A socket that takes samples, and where its answers go.
+pub struct Udp {
+    socket: UdpSocket,
+    output: SocketAddr,
+}
+
+impl fmt::Display for Udp {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.socket.local_addr() {
+            Ok(input) => write!(f, "listening on {input}, answering to {}", self.output),
+            Err(_) => write!(f, "answering to {}", self.output),
+        }
+    }
+}
+
+impl Udp {
+    /// # Errors
+    /// [`CliError::Stream`] for an address that the system does not give.
+    pub fn bind(places: &UdpPlaces) -> Result<Self, CliError> {
+        let socket = UdpSocket::bind(places.input).map_err(|error| {
+            CliError::Stream(format!(
+                "{} cannot be listened on: {error}; is another stream there?",
+                places.input
+            ))
+        })?;
+        Ok(Self {
+            socket,
+            output: places.output,
+        })
+    }
+
+    /// The next datagram.
+    ///
+    /// # Errors
+    /// [`CliError::Stream`] when the socket is no more.
+    pub fn receive<'b>(&self, bytes: &'b mut [u8]) -> Result<&'b [u8], CliError> {
+        loop {
+            match self.socket.recv(bytes) {
+                Ok(length) => return Ok(&bytes[..length]),
+                // An answer that nobody took is told here.
+                Err(error) if is_passing(&error) => {}
+                Err(error) => return Err(CliError::Stream(format!("the socket cannot be read: {error}"))),
+            }
+        }
+    }
+
+    /// Sends an answer; one that cannot be sent is lost, as datagrams may be.
+    pub fn send(&self, bytes: &[u8]) {
+        let _ = self.socket.send_to(bytes, self.output);
+    }
+}
+
+fn is_passing(error: &io::Error) -> bool {
+    use io::ErrorKind::{ConnectionRefused, ConnectionReset, Interrupted, WouldBlock};
+    // On Windows a datagram that is too large for the room is an error, too.
+    matches!(
+        error.kind(),
+        ConnectionRefused | ConnectionReset | Interrupted | WouldBlock
+    )
+}

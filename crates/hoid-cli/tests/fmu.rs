@@ -1,0 +1,89 @@
+//! `hoid fmu`: what goes into a unit, and what is refused. That it runs in a simulator is tested with
+//! the Python package.
+#![allow(clippy::unwrap_used)]
+
+mod common;
+
+use std::fs;
+
+use tempfile::TempDir;
+
+use common::{bad, good};
+
+/// The head of a shared library of Linux, and nothing behind it.
+fn library(folder: &TempDir) {
+    let mut bytes = vec![0_u8; 64];
+    bytes[..6].copy_from_slice(b"\x7fELF\x02\x01");
+    bytes[18] = 62;
+    fs::write(folder.path().join("libhoid.so"), bytes).unwrap();
+}
+
+#[test]
+fn a_unit_is_written_whole_and_the_same_again() {
+    let folder = TempDir::new().unwrap();
+    library(&folder);
+    let with = |more: &[&str]| {
+        let usual = ["fmu", "--library", "libhoid.so", "--out", "a.fmu"];
+        let said = good(folder.path(), &[&usual[..], more].concat());
+        (said, fs::read(folder.path().join("a.fmu")).unwrap())
+    };
+    let (said, bytes) = with(&[]);
+    assert!(said.contains("FMI 2.0") && said.contains("a.fmu"), "{said}");
+    assert!(bytes.starts_with(b"PK"));
+    assert_eq!(with(&[]).1, bytes);
+    let (said, other) = with(&[
+        "--fmi",
+        "3",
+        "--sample-time",
+        "0.02",
+        "--controlled-element",
+        "90/(s(s+6))",
+    ]);
+    assert!(said.contains("FMI 3.0") && said.contains("0.02 s"), "{said}");
+    assert_ne!(other, bytes);
+    let (said, _) = with(&["--operator", "C4", "--seed", "3"]);
+    assert!(said.contains("e in, u out"), "{said}");
+    fs::write(
+        folder.path().join("mine.toml"),
+        "condition = \"C1\"\nsample_time_s = 0.02\n",
+    )
+    .unwrap();
+    let (said, _) = with(&["--operator", "mine.toml"]);
+    assert!(said.contains("0.02 s"), "{said}");
+}
+
+#[test]
+fn what_makes_no_unit_says_why() {
+    let folder = TempDir::new().unwrap();
+    library(&folder);
+    fs::write(folder.path().join("text"), "text").unwrap();
+    fs::write(folder.path().join("fit.json"), "{}").unwrap();
+    fs::write(folder.path().join("form.toml"), "form = \"gain\"\n").unwrap();
+    let of = |more: &[&str]| bad(folder.path(), &[&["fmu", "--out", "a.fmu"][..], more].concat());
+    let with = |more: &[&str]| of(&[&["--library", "libhoid.so"][..], more].concat());
+    for (arguments, reason) in [
+        (&["--library", "text"][..], "cargo xtask ffi"),
+        (&["--library", "nowhere.so"], "nowhere.so"),
+    ] {
+        let (_, message) = of(arguments);
+        assert!(message.contains(reason), "{message}");
+    }
+    for (arguments, reason) in [
+        (&["--prior", "fit.json"][..], "fit.json"),
+        (&["--prior", "omega_nm=1"], "omega_nm"),
+        (&["--method", "rpem", "--prior", "none"], "population"),
+        (&["--sample-time", "0"], "sample time"),
+        (&["--operator", "nowhere.toml"], "nowhere.toml"),
+        (&["--operator", "form.toml"], "form"),
+        (&["--operator", "C4", "--method", "rpem"], "--operator"),
+        (&["--seed", "3"], "--operator"),
+    ] {
+        let (code, message) = with(arguments);
+        assert!(code > 0 && message.contains(reason), "{arguments:?}: {message}");
+    }
+    let (_, message) = bad(
+        folder.path(),
+        &["fmu", "--out", "libhoid.so", "--library", "libhoid.so"],
+    );
+    assert!(message.contains("libhoid.so"), "{message}");
+}

@@ -1,0 +1,258 @@
+//! Pointers of the caller: all that this crate believes.
+//!
+//! A pointer that is null or not aligned is refused. That it points to what the header says, and
+//! that the caller does not use it at the same time from another thread, cannot be checked: it is
+//! the contract of every function here.
+
+use std::{
+    ffi::{CStr, c_char},
+    slice,
+};
+
+use crate::{
+    session::Session,
+    status::{
+        Failure, HOID_BAD_POINTER, HOID_BAD_TEXT, HOID_BROKEN, HOID_PANIC, HOID_TOO_SMALL, HoidStatus, guarded, said,
+    },
+};
+
+/// A tracker. Make it with hoid_tracker_new, hoid_tracker_from_fit or hoid_tracker_restore, free it with
+/// hoid_tracker_free. One thread at a time may use it.
+pub struct HoidTracker {
+    session: Session,
+    is_broken: bool,
+}
+
+fn check<T>(pointer: *const T, what: &str) -> Result<(), Failure> {
+    if pointer.is_null() {
+        return Err(Failure::new(HOID_BAD_POINTER, format!("{what} is null")));
+    }
+    if !pointer.is_aligned() {
+        return Err(Failure::new(
+            HOID_BAD_POINTER,
+            format!("{what} is not aligned: it has to be of its own type"),
+        ));
+    }
+    Ok(())
+}
+
+/// A text of the caller; none for a null pointer.
+///
+/// # Safety
+/// `pointer` is null or points to a text that ends with a zero and stays as it is during the call.
+pub(crate) unsafe fn text<'a>(pointer: *const c_char, what: &str) -> Result<Option<&'a str>, Failure> {
+    if pointer.is_null() {
+        return Ok(None);
+    }
+    // SAFETY: not null; that it ends with a zero and stays is the contract.
+    let text = unsafe { CStr::from_ptr(pointer) };
+    let wrong = |_| Failure::new(HOID_BAD_TEXT, format!("{what} is not in UTF-8"));
+    text.to_str().map(Some).map_err(wrong)
+}
+
+/// Bytes of the caller.
+///
+/// # Safety
+/// `pointer` is null or points to `length` bytes that stay as they are during the call.
+pub(crate) unsafe fn bytes<'a>(pointer: *const u8, length: usize, what: &str) -> Result<&'a [u8], Failure> {
+    check(pointer, what)?;
+    if length > isize::MAX as usize {
+        return Err(Failure::new(
+            HOID_TOO_SMALL,
+            format!("{what}: no memory has {length} bytes"),
+        ));
+    }
+    // SAFETY: not null, and no longer than a slice may be; that there are so many is the contract.
+    Ok(unsafe { slice::from_raw_parts(pointer, length) })
+}
+
+/// Writes a value where the caller wants it.
+///
+/// # Safety
+/// `pointer` is null or points to room for one value.
+pub(crate) unsafe fn put<T>(pointer: *mut T, value: T, what: &str) -> Result<(), Failure> {
+    check(pointer, what)?;
+    // SAFETY: not null, aligned; that there is room is the contract. What stood there needs no drop.
+    unsafe { pointer.write(value) };
+    Ok(())
+}
+
+/// Writes a list where the caller wants it, and its length. Without room (`list` null and `room`
+/// zero) only the length is told.
+///
+/// # Safety
+/// `list` is null or points to room for `room` values, `count` is null or to room for a number.
+pub(crate) unsafe fn put_all<T: Copy>(
+    values: &[T],
+    list: *mut T,
+    room: usize,
+    count: *mut usize,
+    what: &str,
+) -> Result<(), Failure> {
+    // SAFETY: by the contract of this function.
+    unsafe { put(count, values.len(), "the pointer for the count") }?;
+    if list.is_null() && room == 0 {
+        return Ok(());
+    }
+    check(list, what)?;
+    if room < values.len() {
+        return Err(Failure::new(
+            HOID_TOO_SMALL,
+            format!("{what} has room for {room}, there are {}", values.len()),
+        ));
+    }
+    // SAFETY: not null, aligned, and by the contract with room for `room` values, which is enough;
+    // memory of the caller does not overlap with ours.
+    unsafe { list.copy_from_nonoverlapping(values.as_ptr(), values.len()) };
+    Ok(())
+}
+
+/// A tracker into the hands of the caller.
+///
+/// # Safety
+/// `place` is null or points to room for a pointer.
+pub(crate) unsafe fn hand_over(session: Session, place: *mut *mut HoidTracker) -> Result<(), Failure> {
+    check(place, "the place for the tracker")?;
+    let tracker = Box::into_raw(Box::new(HoidTracker {
+        session,
+        is_broken: false,
+    }));
+    // SAFETY: by the contract of this function.
+    unsafe { put(place, tracker, "the place for the tracker") }
+}
+
+/// Takes a tracker back and lets it go.
+///
+/// # Safety
+/// `tracker` is null or one that was handed over and not taken back.
+pub(crate) unsafe fn take_back(tracker: *mut HoidTracker) {
+    if tracker.is_null() {
+        return;
+    }
+    // SAFETY: it came from `hand_over`, by the contract for the only time.
+    drop(unsafe { Box::from_raw(tracker) });
+}
+
+/// Looks at a tracker.
+///
+/// # Safety
+/// `tracker` is null or one that was handed over, and no other thread uses it.
+pub(crate) unsafe fn with_tracker(
+    tracker: *const HoidTracker,
+    call: impl FnOnce(&Session) -> Result<(), Failure>,
+) -> HoidStatus {
+    guarded(|| {
+        check(tracker, "the tracker")?;
+        // SAFETY: not null, aligned; by the contract it is ours and nobody changes it.
+        let tracker = unsafe { &*tracker };
+        tracker.check()?;
+        call(&tracker.session)
+    })
+}
+
+/// Moves a tracker. After a panic in it, it is broken.
+///
+/// # Safety
+/// As [`with_tracker`].
+pub(crate) unsafe fn move_tracker(
+    tracker: *mut HoidTracker,
+    call: impl FnOnce(&mut Session) -> Result<(), Failure>,
+) -> HoidStatus {
+    guarded(|| {
+        check(tracker, "the tracker")?;
+        // SAFETY: not null, aligned; by the contract it is ours and nobody else uses it.
+        let tracker = unsafe { &mut *tracker };
+        tracker.check()?;
+        let session = &mut tracker.session;
+        let moved = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| call(session)));
+        moved.unwrap_or_else(|panic| {
+            tracker.is_broken = true;
+            Err(Failure::new(HOID_PANIC, said(&*panic)))
+        })
+    })
+}
+
+impl HoidTracker {
+    fn check(&self) -> Result<(), Failure> {
+        if self.is_broken {
+            return Err(Failure::new(
+                HOID_BROKEN,
+                "a fault was caught in this tracker before; free it and make another",
+            ));
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use std::ptr;
+
+    use super::*;
+    use crate::{HOID_OK, hoid_last_error, session::Session};
+
+    fn last() -> String {
+        // SAFETY: a text of this thread, and no call in between.
+        let text = unsafe { CStr::from_ptr(hoid_last_error()) };
+        text.to_str().unwrap().to_owned()
+    }
+
+    #[test]
+    fn a_panic_becomes_a_status_and_breaks_its_tracker_alone() {
+        let hook = std::panic::take_hook();
+        std::panic::set_hook(Box::new(|_| {}));
+        let mut trackers = [ptr::null_mut(), ptr::null_mut()];
+        for place in &mut trackers {
+            let session = Session::new(None, 0.01, None, None).unwrap();
+            // SAFETY: a place on the stack.
+            unsafe { hand_over(session, place) }.unwrap();
+        }
+        // SAFETY: made above.
+        let status = unsafe { move_tracker(trackers[0], |_| panic!("as planned")) };
+        assert_eq!(status, HOID_PANIC);
+        assert!(last().contains("as planned"), "{}", last());
+        // SAFETY: made above.
+        let status = unsafe { move_tracker(trackers[0], |_| Ok(())) };
+        assert_eq!(status, HOID_BROKEN);
+        // SAFETY: made above.
+        let status = unsafe { with_tracker(trackers[1], |_| Ok(())) };
+        assert_eq!(status, HOID_OK);
+        assert_eq!(guarded(|| panic!("{}", 7)), HOID_PANIC);
+        assert!(last().ends_with('7'));
+        for tracker in trackers {
+            // SAFETY: made above, taken back once.
+            unsafe { take_back(tracker) };
+        }
+        std::panic::set_hook(hook);
+    }
+
+    #[test]
+    fn pointers_that_cannot_be_are_refused() {
+        // SAFETY: null is allowed.
+        assert_eq!(unsafe { text(ptr::null(), "a") }, Ok(None));
+        // SAFETY: null is allowed.
+        let refused = unsafe { put(ptr::null_mut(), 1.0, "the place") }.unwrap_err();
+        assert_eq!(refused.status, HOID_BAD_POINTER);
+        let mut room = [0.0_f64; 2];
+        // SAFETY: one byte further is not written to.
+        let refused = unsafe { put(room.as_mut_ptr().wrapping_byte_add(1), 1.0, "the place") }.unwrap_err();
+        assert!(refused.text.contains("aligned"));
+        let mut count = 0;
+        // SAFETY: room for two.
+        let refused = unsafe { put_all(&[1.0, 2.0, 3.0], room.as_mut_ptr(), 2, &mut count, "the list") };
+        assert_eq!(
+            (refused.unwrap_err().status, count, room),
+            (HOID_TOO_SMALL, 3, [0.0; 2])
+        );
+        // SAFETY: nothing to be written to.
+        let told = unsafe { put_all(&[1.0], ptr::null_mut(), 0, &mut count, "the list") };
+        assert_eq!((told, count), (Ok(()), 1));
+        // SAFETY: ends with a zero.
+        let refused = unsafe { text(c"\xff".as_ptr(), "a") }.unwrap_err();
+        assert_eq!(refused.status, HOID_BAD_TEXT);
+        // SAFETY: not read.
+        let refused = unsafe { bytes(room.as_ptr().cast(), usize::MAX, "bytes") }.unwrap_err();
+        assert_eq!(refused.status, HOID_TOO_SMALL);
+    }
+}

@@ -1,0 +1,228 @@
+//! Handles, statuses and messages that both interfaces share.
+
+use std::{
+    ffi::{CStr, CString, c_char, c_int, c_void},
+    panic::{AssertUnwindSafe, catch_unwind},
+    path::PathBuf,
+    slice,
+};
+
+use super::{instance::Instance, model::Done};
+use crate::status::said;
+
+/// Statuses, of both interfaces.
+pub(super) const OK: i32 = 0;
+pub(super) const ERROR: i32 = 3;
+pub(super) const FATAL: i32 = 4;
+
+/// `fmi2CallbackLogger`.
+pub type Fmi2Logger = unsafe extern "C" fn(*mut c_void, *const c_char, c_int, *const c_char, *const c_char, ...);
+/// `fmi3LogMessageCallback`.
+pub type Fmi3Logger = unsafe extern "C" fn(*mut c_void, c_int, *const c_char, *const c_char);
+
+/// Who is told what went wrong.
+#[derive(Clone, Copy)]
+pub(super) enum Logger {
+    Nobody,
+    Two {
+        function: Fmi2Logger,
+        environment: *mut c_void,
+    },
+    Three {
+        function: Fmi3Logger,
+        environment: *mut c_void,
+    },
+}
+
+const CATEGORY: &CStr = c"logStatusError";
+
+impl Logger {
+    /// Tells a message.
+    ///
+    /// # Safety
+    /// The function is that of the importer, and its environment is alive.
+    unsafe fn tell(self, name: &CString, status: i32, message: &str) {
+        let message = CString::new(message.replace('\0', " ")).unwrap_or_default();
+        match self {
+            Self::Nobody => {}
+            Self::Two { function, environment } => {
+                // SAFETY: texts end with a zero and stay during the call; the format takes one of them.
+                unsafe {
+                    function(
+                        environment,
+                        name.as_ptr(),
+                        status,
+                        CATEGORY.as_ptr(),
+                        c"%s".as_ptr(),
+                        message.as_ptr(),
+                    );
+                }
+            }
+            Self::Three { function, environment } => {
+                // SAFETY: texts end with a zero and stay during the call.
+                unsafe { function(environment, status, CATEGORY.as_ptr(), message.as_ptr()) };
+            }
+        }
+    }
+}
+
+/// An instance in the hands of an importer.
+pub struct Component {
+    instance: Instance,
+    name: CString,
+    logger: Logger,
+    is_broken: bool,
+}
+
+/// Makes an instance; null where that fails.
+///
+/// # Safety
+/// `logger` is that of the importer.
+pub(super) unsafe fn made(name: &str, logger: Logger, instance: impl FnOnce() -> Done<Instance>) -> *mut Component {
+    let name = CString::new(name.replace('\0', " ")).unwrap_or_default();
+    let made = catch_unwind(AssertUnwindSafe(instance)).unwrap_or_else(|panic| Err(said(&*panic)));
+    match made {
+        Ok(instance) => Box::into_raw(Box::new(Component {
+            instance,
+            name,
+            logger,
+            is_broken: false,
+        })),
+        Err(message) => {
+            // SAFETY: by the contract of this function.
+            unsafe { logger.tell(&name, ERROR, &message) };
+            std::ptr::null_mut()
+        }
+    }
+}
+
+/// Frees an instance.
+///
+/// # Safety
+/// `component` is null or was made here and not freed.
+pub(super) unsafe fn free(component: *mut Component) {
+    if component.is_null() {
+        return;
+    }
+    // SAFETY: it came from `made`, by the contract for the only time.
+    drop(unsafe { Box::from_raw(component) });
+}
+
+/// Works on an instance: its status; what went wrong is told.
+///
+/// # Safety
+/// `component` is null or was made here, and no other thread uses it.
+pub(super) unsafe fn with(component: *mut Component, call: impl FnOnce(&mut Instance) -> Done) -> i32 {
+    if component.is_null() || !component.is_aligned() {
+        return ERROR;
+    }
+    // SAFETY: not null, aligned; by the contract it is ours alone.
+    let component = unsafe { &mut *component };
+    if component.is_broken {
+        return FATAL;
+    }
+    let instance = &mut component.instance;
+    let (status, message) = match catch_unwind(AssertUnwindSafe(|| call(instance))) {
+        Ok(Ok(())) => return OK,
+        Ok(Err(message)) => (ERROR, message),
+        Err(panic) => {
+            component.is_broken = true;
+            (FATAL, said(&*panic))
+        }
+    };
+    // SAFETY: the logger is that of the importer.
+    unsafe { component.logger.tell(&component.name, status, &message) };
+    status
+}
+
+/// A list of the importer; empty for no elements, whatever the pointer.
+///
+/// # Safety
+/// `pointer` has `count` elements that stay during the call.
+pub(super) unsafe fn list<'a, T>(pointer: *const T, count: usize) -> Done<&'a [T]> {
+    if count == 0 {
+        return Ok(&[]);
+    }
+    if pointer.is_null() || !pointer.is_aligned() {
+        return Err("a list is null or not aligned".to_owned());
+    }
+    // SAFETY: not null, aligned; that there are so many is the contract.
+    Ok(unsafe { slice::from_raw_parts(pointer, count) })
+}
+
+/// A list of the importer to be written to.
+///
+/// # Safety
+/// `pointer` has room for `count` initialised elements that nobody else uses during the call.
+pub(super) unsafe fn list_mut<'a, T>(pointer: *mut T, count: usize) -> Done<&'a mut [T]> {
+    if count == 0 {
+        return Ok(&mut []);
+    }
+    if pointer.is_null() || !pointer.is_aligned() {
+        return Err("a list is null or not aligned".to_owned());
+    }
+    // SAFETY: not null, aligned; that there is so much room is the contract.
+    Ok(unsafe { slice::from_raw_parts_mut(pointer, count) })
+}
+
+/// A text of the importer; empty for null and for what is not in UTF-8.
+///
+/// # Safety
+/// `pointer` is null or a text that ends with a zero and stays during the call.
+pub(super) unsafe fn words<'a>(pointer: *const c_char) -> &'a str {
+    // SAFETY: by the contract of this function.
+    let text = unsafe { crate::boundary::text(pointer, "the text") };
+    text.ok().flatten().unwrap_or_default()
+}
+
+/// The folder of a URI such as `file:///tmp/a%20b/resources`, or of a path; none for an empty one.
+pub(super) fn folder(uri: &str) -> Option<PathBuf> {
+    if uri.is_empty() {
+        return None;
+    }
+    let Some(rest) = uri.strip_prefix("file:") else {
+        return Some(PathBuf::from(uri));
+    };
+    let path = match rest.strip_prefix("//") {
+        // Behind the host, which is empty or this one.
+        Some(rest) => rest.find('/').map_or("", |slash| &rest[slash..]),
+        None => rest,
+    };
+    let mut bytes = Vec::with_capacity(path.len());
+    let mut left = path.bytes();
+    while let Some(byte) = left.next() {
+        let mut ahead = left.clone();
+        let digit = |byte: Option<u8>| char::from(byte?).to_digit(16);
+        match (byte, digit(ahead.next()), digit(ahead.next())) {
+            (b'%', Some(high), Some(low)) => {
+                bytes.push((16 * high + low) as u8);
+                left = ahead;
+            }
+            _ => bytes.push(byte),
+        }
+    }
+    let path = String::from_utf8_lossy(&bytes).into_owned();
+    // A drive of Windows: /C:/a.
+    let is_drive = path.as_bytes().get(2) == Some(&b':');
+    Some(PathBuf::from(if is_drive { &path[1..] } else { &path }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn folders_of_uris() {
+        for (uri, expected) in [
+            ("file:///tmp/a%20b/resources", "/tmp/a b/resources"),
+            ("file:/tmp/a", "/tmp/a"),
+            ("file://localhost/tmp/a%", "/tmp/a%"),
+            ("file:///C:/a/b", "C:/a/b"),
+            ("file:///tmp/%c3%a4", "/tmp/\u{e4}"),
+            ("/tmp/a%20b", "/tmp/a%20b"),
+        ] {
+            assert_eq!(folder(uri), Some(PathBuf::from(expected)), "{uri}");
+        }
+        assert_eq!(folder(""), None);
+    }
+}

@@ -1,0 +1,329 @@
+//! An instance of a unit.
+//!
+//! Samples are taken at `t_0 + k Ts`, t_0 the start of the experiment. A step may be as long as the
+//! sample time, or shorter: then the inputs of the first step within a sample are those of the
+//! sample. In a longer one a sample would be lost, and it is refused.
+
+use std::{ffi::CString, fs, path::Path};
+
+use hoid_io::fmu::{FMU_SETTINGS, FmuKind, FmuSettings, FmuStart, FmuVariable, Role};
+
+use super::model::{Done, Given, Model};
+
+/// Share of the sample time by which a time may be off.
+const OFF: f64 = 1e-6;
+
+/// Where an instance is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Phase {
+    /// Parameters may be set.
+    Setup,
+    /// Samples are taken.
+    Running,
+    Ended,
+}
+
+/// An instance.
+pub(super) struct Instance {
+    settings: FmuSettings,
+    variables: Vec<FmuVariable>,
+    values: Vec<FmuStart>,
+    /// Texts as C wants them, by value reference; empty for what is no text.
+    texts: Vec<CString>,
+    first_output: usize,
+    phase: Phase,
+    start_s: f64,
+    /// The sample that is next.
+    k: u64,
+    end_s: f64,
+    model: Option<Model>,
+}
+
+impl Instance {
+    /// The unit of a token, with the resources in a folder.
+    pub fn new(token: &str, resources: Option<&Path>) -> Done<Self> {
+        let kind = (FmuKind::ALL.into_iter().find(|kind| kind.token() == token)).ok_or_else(|| {
+            format!(
+                "the description is of {token:?}, the library of {}; make the unit again by hoid fmu",
+                FmuKind::ALL.map(FmuKind::token).join(" and ")
+            )
+        })?;
+        let settings = match resources {
+            None => FmuSettings::new(kind),
+            Some(folder) => {
+                let path = folder.join(FMU_SETTINGS);
+                let text = fs::read_to_string(&path).map_err(|error| format!("{}: {error}", path.display()))?;
+                FmuSettings::parse(&text)?
+            }
+        };
+        if settings.kind()? != kind {
+            return Err(format!(
+                "{FMU_SETTINGS} is of another unit than {token}; make it again by hoid fmu"
+            ));
+        }
+        let variables = settings.variables()?;
+        let first_output = variables.iter().take_while(|v| v.role != Role::Output).count();
+        let mut instance = Self {
+            settings,
+            values: Vec::new(),
+            texts: vec![CString::default(); variables.len()],
+            variables,
+            first_output,
+            phase: Phase::Setup,
+            start_s: 0.0,
+            k: 0,
+            end_s: 0.0,
+            model: None,
+        };
+        instance.reset();
+        Ok(instance)
+    }
+
+    /// As it was at first.
+    pub fn reset(&mut self) {
+        self.values = self.variables.iter().map(|variable| variable.start.clone()).collect();
+        for reference in 0..self.values.len() {
+            self.keep_text(reference);
+        }
+        self.phase = Phase::Setup;
+        (self.start_s, self.k, self.end_s) = (0.0, 0, 0.0);
+        self.model = None;
+    }
+
+    fn keep_text(&mut self, reference: usize) {
+        if let FmuStart::Text(text) = &self.values[reference] {
+            self.texts[reference] = CString::new(text.replace('\0', " ")).unwrap_or_default();
+        }
+    }
+
+    fn variable(&self, reference: u32) -> Done<&FmuVariable> {
+        let variable = self.variables.get(reference as usize);
+        variable.ok_or_else(|| format!("there is no variable with the value reference {reference}"))
+    }
+
+    /// The value of a variable.
+    pub fn value(&self, reference: u32) -> Done<&FmuStart> {
+        self.variable(reference)?;
+        Ok(&self.values[reference as usize])
+    }
+
+    /// A text, as long as it is not set.
+    pub fn text(&self, reference: u32) -> Done<&CString> {
+        match self.value(reference)? {
+            FmuStart::Text(_) => Ok(&self.texts[reference as usize]),
+            _ => Err(self.other_type(reference)),
+        }
+    }
+
+    /// That a variable is of another type than that of the call.
+    pub fn other_type(&self, reference: u32) -> String {
+        let name = self.variable(reference).map_or("?", |variable| variable.name);
+        format!("{name} is of another type")
+    }
+
+    /// Sets a parameter before the start, or an input.
+    pub fn set(&mut self, reference: u32, value: FmuStart) -> Done {
+        let phase = self.phase;
+        let variable = self.variable(reference)?;
+        let (name, role) = (variable.name, variable.role);
+        if std::mem::discriminant(&variable.start) != std::mem::discriminant(&value) {
+            return Err(self.other_type(reference));
+        }
+        match role {
+            Role::Output => return Err(format!("{name} is an output; it cannot be set")),
+            Role::Parameter if phase != Phase::Setup => {
+                return Err(format!("{name} is fixed once the experiment runs; set it before"));
+            }
+            Role::Parameter | Role::Input => {}
+        }
+        self.values[reference as usize] = value;
+        self.keep_text(reference as usize);
+        Ok(())
+    }
+
+    /// The experiment begins at this time, s.
+    pub fn begins_at(&mut self, start_s: f64) -> Done {
+        if !start_s.is_finite() {
+            return Err(format!("the experiment begins at {start_s} s, expected a finite time"));
+        }
+        if self.phase != Phase::Setup {
+            return Err("the experiment runs already".to_owned());
+        }
+        (self.start_s, self.end_s) = (start_s, start_s);
+        Ok(())
+    }
+
+    /// What stands for the parameters and inputs.
+    fn given(&self) -> Given<'_> {
+        Given {
+            variables: &self.variables,
+            values: &self.values,
+        }
+    }
+
+    /// Makes the model of the parameters.
+    pub fn start(&mut self) -> Done {
+        let model = Model::new(&self.settings, &self.given(), self.start_s)?;
+        self.values.splice(self.first_output.., model.outputs());
+        self.model = Some(model);
+        self.phase = Phase::Running;
+        Ok(())
+    }
+
+    /// Goes from a time on by a step, both in s.
+    pub fn step(&mut self, t_s: f64, step_s: f64) -> Done {
+        let given = Given {
+            variables: &self.variables,
+            values: &self.values,
+        };
+        let model = match (&mut self.model, self.phase) {
+            (Some(model), Phase::Running) => model,
+            _ => return Err("the experiment does not run: initialise the unit first".to_owned()),
+        };
+        let ts = model.sample_time_s();
+        if !(step_s > 0.0 && step_s <= ts * (1.0 + OFF)) {
+            return Err(format!(
+                "the step is {step_s} s and the sample time {ts} s: samples would be lost; take the sample time as step, or a \
+                 part of it"
+            ));
+        }
+        if !(t_s >= self.end_s - OFF * ts && t_s.is_finite()) {
+            return Err(format!("the step begins at {t_s} s, expected {} s", self.end_s));
+        }
+        self.end_s = t_s + step_s;
+        let time_of = |k: u64| self.start_s + k as f64 * ts;
+        if time_of(self.k) < self.end_s - OFF * ts {
+            model.take(&given, time_of(self.k));
+            self.k += 1;
+        }
+        // What a model says of its next sample is not said before its time.
+        if model.speaks_at_once() || time_of(self.k) <= self.end_s + OFF * ts {
+            self.values.splice(self.first_output.., model.outputs());
+        }
+        Ok(())
+    }
+
+    /// The experiment is over.
+    pub fn end(&mut self) {
+        self.phase = Phase::Ended;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use hoid_model::scenario::{Condition, Scenario};
+    use hoid_sim::{RunSeed, Simulator};
+
+    use super::*;
+
+    fn tracker() -> Instance {
+        Instance::new(&FmuKind::Tracker.token(), None).unwrap()
+    }
+
+    fn reference(instance: &Instance, name: &str) -> u32 {
+        let found = instance.variables.iter().position(|v| v.name == name);
+        u32::try_from(found.unwrap()).unwrap()
+    }
+
+    fn real(instance: &Instance, name: &str) -> f64 {
+        match instance.value(reference(instance, name)).unwrap() {
+            FmuStart::Real(value) => *value,
+            other => panic!("{name}: {other:?}"),
+        }
+    }
+
+    fn set(instance: &mut Instance, name: &str, value: FmuStart) {
+        let reference = reference(instance, name);
+        instance.set(reference, value).unwrap();
+    }
+
+    /// Every output has its value, in the order and of the type of the description.
+    #[test]
+    fn outputs_are_those_of_the_description() {
+        for kind in FmuKind::ALL {
+            let folder = tempfile::tempdir().unwrap();
+            let settings = FmuSettings::new(kind).with_scenario("condition = \"C4\"".to_owned());
+            fs::write(folder.path().join(FMU_SETTINGS), settings.text()).unwrap();
+            let mut instance = Instance::new(&kind.token(), Some(folder.path())).unwrap();
+            instance.start().unwrap();
+            let outputs: Vec<&FmuVariable> = instance.variables.iter().filter(|v| v.role == Role::Output).collect();
+            let model = instance.model.as_ref().unwrap();
+            assert_eq!(model.output_names(), outputs.iter().map(|v| v.name).collect::<Vec<_>>());
+            for (variable, value) in outputs.iter().zip(model.outputs()) {
+                assert_eq!(
+                    std::mem::discriminant(&variable.start),
+                    std::mem::discriminant(&value),
+                    "{}",
+                    variable.name
+                );
+            }
+            assert_eq!(instance.values.len(), instance.variables.len());
+        }
+    }
+
+    /// A step of a tenth of the sample time gives the estimate of steps of the sample time.
+    #[test]
+    fn shorter_steps_take_the_same_samples() {
+        let simulator = Simulator::new(&Scenario::condition(Condition::C1)).unwrap();
+        let record = simulator.run(RunSeed::default(), false).unwrap();
+        let ended = |parts: u32| {
+            let mut instance = tracker();
+            instance.begins_at(2.0).unwrap();
+            instance.start().unwrap();
+            for k in 0..1000 {
+                for part in 0..parts {
+                    // Within a sample the inputs move on.
+                    let moved = f64::from(part);
+                    set(&mut instance, "e", FmuStart::Real(record.input()[k] + moved));
+                    set(&mut instance, "u", FmuStart::Real(record.output()[k] + moved));
+                    let h = 0.01 / f64::from(parts);
+                    instance.step(2.0 + 0.01 * k as f64 + h * moved, h).unwrap();
+                }
+            }
+            ["K_e", "K_e_se", "tau_e", "innovation"].map(|name| real(&instance, name).to_bits())
+        };
+        let expected = ended(1);
+        assert_eq!(ended(10), expected);
+        assert_eq!(ended(3), expected);
+        assert!(f64::from_bits(expected[0]).is_finite());
+    }
+
+    #[test]
+    fn what_cannot_be_is_said() {
+        let why = |done: Done| done.unwrap_err();
+        assert!(
+            Instance::new("hoid-0.0.0-tracker", None)
+                .err()
+                .unwrap()
+                .contains("hoid fmu")
+        );
+        assert!(
+            Instance::new(&FmuKind::Operator.token(), None)
+                .unwrap()
+                .start()
+                .is_err()
+        );
+        let mut instance = tracker();
+        assert!(why(instance.step(0.0, 0.01)).contains("initialise"));
+        assert!(why(instance.set(1000, FmuStart::Real(0.0))).contains("1000"));
+        assert!(why(instance.set(0, FmuStart::Integer(1))).contains("type"));
+        let output = reference(&instance, "K_e");
+        assert!(why(instance.set(output, FmuStart::Real(0.0))).contains("output"));
+        assert!(instance.text(0).is_err() && instance.begins_at(f64::NAN).is_err());
+        set(&mut instance, "method", FmuStart::Text("kalman".to_owned()));
+        assert!(why(instance.start()).contains("population"));
+        instance.reset();
+        instance.start().unwrap();
+        assert!(why(instance.set(0, FmuStart::Real(0.02))).contains("fixed"));
+        for (t_s, step_s) in [(0.0, 0.02), (0.0, 0.0), (0.0, f64::NAN), (-1.0, 0.01), (f64::NAN, 0.01)] {
+            assert!(instance.step(t_s, step_s).is_err(), "{t_s} {step_s}");
+        }
+        instance.step(0.0, 0.01).unwrap();
+        instance.end();
+        assert!(instance.step(0.01, 0.01).is_err());
+        instance.reset();
+        set(&mut instance, "sample_time", FmuStart::Real(f64::NAN));
+        assert!(instance.start().is_err());
+    }
+}

@@ -1,0 +1,17 @@
+//! Functional mock-up units: the tracker, and the operator of a scenario, for simulators.
+//!
+//! The shared library is that of the C ABI; `hoid fmu` packs it with a description. What a unit has
+//! is said by [`hoid_io::fmu`]; here is what it does.
+//!
+//! | file | what it holds |
+//! |---|---|
+//! | `instance` | an instance: its values, its phases, when a sample is due |
+//! | `model` | what takes samples: tracker and operator |
+//! | `component` | handles, statuses and messages of both interfaces |
+//! | `fmi2`, `fmi3` | the functions of FMI 2.0 and 3.0 |
+
+mod component;
+pub mod fmi2;
+pub mod fmi3;
+mod instance;
+mod model;

@@ -1,0 +1,250 @@
+//! What takes the samples of a unit.
+
+use hoid_io::{
+    AnyScenario,
+    fmu::{FmuKind, FmuSettings, FmuStart, FmuVariable},
+    parse_any_scenario,
+};
+use hoid_sim::{OperatorRun, RunSeed, Simulator};
+use hoid_track::Sample;
+use serde_json::{Map, Value};
+
+use crate::{reading::number_of, session::Session};
+
+/// What is done, or why not.
+pub(super) type Done<T = ()> = Result<T, String>;
+
+/// Values by the names of their variables.
+pub(super) struct Given<'a> {
+    pub variables: &'a [FmuVariable],
+    pub values: &'a [FmuStart],
+}
+
+impl Given<'_> {
+    fn value(&self, name: &str) -> Option<&FmuStart> {
+        let place = self.variables.iter().position(|variable| variable.name == name)?;
+        self.values.get(place)
+    }
+
+    fn real(&self, name: &str) -> f64 {
+        match self.value(name) {
+            Some(FmuStart::Real(value)) => *value,
+            _ => f64::NAN,
+        }
+    }
+
+    fn text(&self, name: &str) -> &str {
+        match self.value(name) {
+            Some(FmuStart::Text(text)) => text.trim(),
+            _ => "",
+        }
+    }
+
+    fn is(&self, name: &str) -> bool {
+        matches!(self.value(name), Some(FmuStart::Boolean(true)))
+    }
+
+    fn count(&self, name: &str) -> u64 {
+        match self.value(name) {
+            Some(FmuStart::Integer(value)) => u64::from(value.cast_unsigned()),
+            _ => 0,
+        }
+    }
+}
+
+/// What a unit is made of.
+pub(super) enum Model {
+    Tracker(Box<TrackerModel>),
+    Operator(Box<OperatorModel>),
+}
+
+/// A tracker, and the changes that it has told.
+pub(super) struct TrackerModel {
+    session: Session,
+    with_excitation: bool,
+    innovation: f64,
+    changes: i32,
+    change_t_s: f64,
+}
+
+/// An operator.
+pub(super) struct OperatorModel {
+    run: OperatorRun,
+    sample_time_s: f64,
+}
+
+impl Model {
+    /// Of the parameters, from a time in s on.
+    pub fn new(settings: &FmuSettings, given: &Given<'_>, start_s: f64) -> Done<Self> {
+        Ok(match settings.kind()? {
+            FmuKind::Tracker => Self::Tracker(Box::new(TrackerModel::new(settings, given)?)),
+            FmuKind::Operator => Self::Operator(Box::new(OperatorModel::new(settings, given, start_s)?)),
+        })
+    }
+
+    pub fn sample_time_s(&self) -> f64 {
+        match self {
+            Self::Tracker(tracker) => tracker.session.sample_time_s(),
+            Self::Operator(operator) => operator.sample_time_s,
+        }
+    }
+
+    /// True where the outputs are of the sample that was taken, not of the next one.
+    pub fn speaks_at_once(&self) -> bool {
+        matches!(self, Self::Tracker(_))
+    }
+
+    /// Takes the sample at a time in s.
+    pub fn take(&mut self, given: &Given<'_>, t_s: f64) {
+        match self {
+            Self::Tracker(tracker) => tracker.take(given, t_s),
+            Self::Operator(operator) => operator.run.take(given.real("e")),
+        }
+    }
+
+    /// Outputs with their names, in the order of the description.
+    fn named(&self) -> Vec<(&'static str, FmuStart)> {
+        match self {
+            Self::Tracker(tracker) => tracker.named(),
+            Self::Operator(operator) => vec![
+                ("u", FmuStart::Real(operator.run.control())),
+                ("n", FmuStart::Real(operator.run.remnant())),
+            ],
+        }
+    }
+
+    /// The outputs, in the order of the description.
+    pub fn outputs(&self) -> Vec<FmuStart> {
+        self.named().into_iter().map(|(_, value)| value).collect()
+    }
+
+    #[cfg(test)]
+    pub fn output_names(&self) -> Vec<&'static str> {
+        self.named().into_iter().map(|(name, _)| name).collect()
+    }
+}
+
+impl TrackerModel {
+    fn new(settings: &FmuSettings, given: &Given<'_>) -> Done<Self> {
+        let text = given.text("options");
+        let mut options: Map<String, Value> = serde_json::from_str(if text.is_empty() { "{}" } else { text })
+            .map_err(|error| format!("options: no object in JSON ({error})"))?;
+        let element = given.text("controlled_element");
+        if !element.is_empty() {
+            options.insert("controlled_element".to_owned(), element.into());
+        }
+        let prior = given.text("prior");
+        let of_unit = prior == "fit";
+        // Methods that begin with the record have no prior.
+        if !of_unit && !["", "population"].contains(&prior) {
+            options.insert("prior".to_owned(), prior.into());
+        }
+        let fit = settings.fit.as_deref().filter(|_| of_unit);
+        if of_unit && fit.is_none() {
+            return Err(
+                "prior is the fit of the unit, which has none; make it by hoid fmu --prior FILE.json".to_owned(),
+            );
+        }
+        let options = Value::Object(options).to_string();
+        let method = Some(given.text("method")).filter(|name| !name.is_empty());
+        let session = Session::new(method, given.real("sample_time"), Some(&options), fit);
+        Ok(Self {
+            session: session.map_err(|failure| failure.text)?,
+            with_excitation: given.is("with_excitation"),
+            innovation: f64::NAN,
+            changes: 0,
+            change_t_s: f64::NAN,
+        })
+    }
+
+    fn take(&mut self, given: &Given<'_>, t_s: f64) {
+        let reference = given.real("f_t");
+        let sample = Sample {
+            e: given.real("e"),
+            u: given.real("u"),
+            reference: Some(reference).filter(|f| self.with_excitation && f.is_finite()),
+        };
+        self.innovation = self.session.take(sample, true).innovation;
+        if let Ok(change) = self.session.change() {
+            self.changes = self.changes.saturating_add(1);
+            self.change_t_s = t_s - change.seconds_ago;
+        }
+    }
+
+    fn named(&self) -> Vec<(&'static str, FmuStart)> {
+        let session = &self.session;
+        let operator = session.operator().unwrap_or_default();
+        let open_loop = session.open_loop().unwrap_or_default();
+        let mut all = Vec::with_capacity(32);
+        let pairs = [
+            (["K_e", "K_e_se"], operator.first()),
+            (["T_L", "T_L_se"], operator.get(1)),
+            (["K_e_dot", "K_e_dot_se"], operator.get(2)),
+            (["omega_nm", "omega_nm_se"], operator.get(3)),
+            (["zeta_nm", "zeta_nm_se"], operator.get(4)),
+            (["tau_e", "tau_e_se"], operator.get(5)),
+            (["crossover_rad_s", "crossover_rad_s_se"], open_loop.first()),
+            (["phase_margin_deg", "phase_margin_deg_se"], open_loop.get(1)),
+        ];
+        for ([name, error_name], estimate) in pairs {
+            let value = estimate.map_or(f64::NAN, |e| e.value);
+            let error = estimate.map_or(f64::NAN, |e| e.standard_error);
+            all.extend([(name, FmuStart::Real(value)), (error_name, FmuStart::Real(error))]);
+        }
+        let names = [
+            "K_e_determined",
+            "T_L_determined",
+            "K_e_dot_determined",
+            "omega_nm_determined",
+            "zeta_nm_determined",
+            "tau_e_determined",
+        ];
+        for (i, name) in names.into_iter().enumerate() {
+            let is = operator.get(i).is_some_and(|e| e.determined == 1);
+            all.push((name, FmuStart::Boolean(is)));
+        }
+        let counts = session.counts();
+        let count = |n: u64| FmuStart::Integer(i32::try_from(n).unwrap_or(i32::MAX));
+        all.extend([
+            ("innovation", FmuStart::Real(self.innovation)),
+            (
+                "change_log_odds",
+                FmuStart::Real(session.change_log_odds().unwrap_or(f64::NAN)),
+            ),
+            ("change_t", FmuStart::Real(self.change_t_s)),
+            ("changes", FmuStart::Integer(self.changes)),
+            ("level", FmuStart::Integer(number_of(session.level()))),
+            ("ready", FmuStart::Boolean(session.tracker().is_ok())),
+            ("samples", count(counts.samples)),
+            ("skipped", count(counts.skipped)),
+            ("held", count(counts.held)),
+            ("restarts", count(counts.restarts)),
+        ]);
+        all
+    }
+}
+
+impl OperatorModel {
+    fn new(settings: &FmuSettings, given: &Given<'_>, start_s: f64) -> Done<Self> {
+        let text = settings.scenario.as_deref();
+        let text = text.ok_or("the unit has no scenario; make it by hoid fmu --operator SCENARIO")?;
+        let scenario = match parse_any_scenario(text, "the scenario of the unit", "scenario")
+            .map_err(|error| error.to_string())?
+        {
+            AnyScenario::Reference(scenario) => scenario,
+            AnyScenario::Family(_) => {
+                return Err("a scenario with a form cannot be a unit yet; give one of a gain with a lead".to_owned());
+            }
+        };
+        let simulator = Simulator::new(&scenario).map_err(|error| error.to_string())?;
+        let seed = RunSeed {
+            seed: given.count("seed"),
+            replication: given.count("replication"),
+            ..RunSeed::default()
+        };
+        Ok(Self {
+            sample_time_s: scenario.sample_time.s(),
+            run: OperatorRun::new(simulator, seed, start_s),
+        })
+    }
+}

@@ -1,0 +1,45 @@
+//! The tracker of `hoid track` and `hoid stream` behind a C ABI.
+//!
+//! The one crate of the workspace with unsafe code. What is unsafe about a C boundary is that
+//! pointers are believed, so that is all the unsafe code does: `boundary` reads texts and writes
+//! results through pointers of the caller, and nothing else dereferences one. Behind it stands the
+//! safe `session`, which knows nothing of C.
+//!
+//! Three rules hold for every function:
+//!
+//! - **It answers with a status**, zero for done, positive where there is no value now, negative for
+//!   an error. What is behind it stands in [`hoid_last_error`] of the calling thread.
+//! - **No panic crosses.** A panic is caught, becomes [`HOID_PANIC`], and the tracker that was at work
+//!   answers [`HOID_BROKEN`] from then on: its state may be half moved.
+//! - **A null pointer is an error**, not a crash, and a list that is too short is left as it was.
+//!
+//! Names, order and units are those of Rust and Python.
+//!
+//! | module | what it holds |
+//! |---|---|
+//! | `session` | a tracker as its options ask for it, and what is known of it |
+//! | `options` | options in JSON, by the keywords of Python |
+//! | `saved` | a tracker as bytes |
+//! | `status`, `boundary` | statuses and their texts; pointers |
+//! | `types` | what is handed over |
+//! | `making`, `stepping`, `reading` | the functions |
+//! | [`fmi`] | the functions of the Functional Mock-up Interface |
+
+mod boundary;
+/// cbindgen:ignore
+pub mod fmi;
+mod making;
+mod options;
+mod reading;
+mod saved;
+mod session;
+mod status;
+mod stepping;
+mod types;
+
+pub use boundary::HoidTracker;
+pub use making::*;
+pub use reading::*;
+pub use status::*;
+pub use stepping::*;
+pub use types::*;

@@ -1,0 +1,336 @@
+//! What is to be tracked: method, sample time, options in JSON, a fit.
+//!
+//! The options are one object with the keywords of `pyhoid.Tracker`: `structure`, `na` to `nk` (a
+//! number, or a pair that is searched on the warm-up), `criterion`, `start` (coefficients by name, or
+//! "nothing"), `largest`, `at`, `controlled_element` ("90/(s(s+6))", or a pair of coefficients),
+//! `warm_up` in s, and the options of the method, whose values are those of the command line: a
+//! number, a text, true, a pair, values by name. `prior` may be a fit itself, as `hoid identify
+//! --json` prints it, or the name of its file.
+
+use std::{collections::BTreeMap, ops::RangeInclusive, path::Path};
+
+use hoid_ident::{NamedOrders, order_selection::Criterion};
+use hoid_io::{FitFile, is_fit_file, parse_fit, read_fit};
+use hoid_model::{
+    ContinuousTransferFunction, FittedOperator, MAX_DELAY, MAX_ORDER, NamedChoice, SampleTime, Structure,
+};
+use hoid_track::{Method, StartAt, TrackOptions, TrackPlan, ranges_of, theta_of};
+use serde_json::{Map, Value};
+
+use crate::status::Failure;
+
+/// Length of the warm-up of methods that have one, s.
+const USUAL_WARM_UP_S: f64 = 20.0;
+/// Longest warm-up, samples.
+const LONGEST_WARM_UP: f64 = 1e7;
+
+/// What was asked for, as it is saved.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Asked {
+    /// Name of the method; none for the usual one.
+    pub method: Option<String>,
+    pub sample_time_s: f64,
+    /// Options in JSON.
+    pub options: Option<String>,
+    /// A fit in JSON.
+    pub fit: Option<String>,
+}
+
+/// What it means.
+pub(crate) struct Understood {
+    pub plan: TrackPlan,
+    pub sample_time: SampleTime,
+    /// Samples of the warm-up.
+    pub warm_up: usize,
+}
+
+impl Asked {
+    pub fn understood(&self) -> Result<Understood, Failure> {
+        let sample_time = SampleTime::new(self.sample_time_s)?;
+        let mut options = object(self.options.as_deref().unwrap_or("{}"))?;
+        let mut method: Method = match &self.method {
+            Some(name) => name.parse()?,
+            None => Method::default(),
+        };
+        let structure: Option<Structure> = taken(&mut options, "structure", choice)?;
+        let criterion = taken(&mut options, "criterion", choice)?.unwrap_or(Criterion::Bic);
+        let largest = taken(&mut options, "largest", number)?;
+        let at_rad_s = taken(&mut options, "at", numbers)?;
+        let controlled_element = taken(&mut options, "controlled_element", element)?;
+        let start = taken(&mut options, "start", start)?;
+        let warm_up_s = taken(&mut options, "warm_up", number)?.unwrap_or(USUAL_WARM_UP_S);
+        let mut orders = NamedOrders::new();
+        for name in ["na", "nb", "nc", "nd", "nf", "nk"] {
+            if let Some(range) = taken(&mut options, name, |value| range(value, name))? {
+                orders.insert(name.to_owned(), range);
+            }
+        }
+        set(&mut method, options, self.fit.as_deref())?;
+        if method.smooths() {
+            return Err(Failure::option(
+                "smooth: what is still to come cannot say anything of a stream; drop it",
+            ));
+        }
+
+        let structure = structure.unwrap_or_else(|| method.usual_structure());
+        let start_names: Vec<String> = match &start {
+            Some(Start::Coefficients(named)) => named.keys().cloned().collect(),
+            _ => Vec::new(),
+        };
+        let ranges = ranges_of(&method, structure, &orders, &start_names, sample_time)?;
+        let combinations = ranges.combinations()?;
+        let most = combinations[combinations.len() - 1];
+        let start = match start {
+            None => StartAt::Span(None),
+            Some(Start::Nothing) => StartAt::Nothing,
+            Some(Start::Coefficients(named)) => StartAt::Theta(
+                theta_of(&most.parameter_names(), &named)
+                    .map_err(|reason| Failure::option(format!("start {reason}")))?,
+            ),
+        };
+        let usual = TrackOptions::new(method, structure, most);
+        let track_options = TrackOptions {
+            start,
+            largest: largest.unwrap_or(usual.largest),
+            at_rad_s: at_rad_s.unwrap_or_default(),
+            controlled_element,
+            ..usual
+        };
+        let warm_up = (warm_up_s / sample_time.s()).round();
+        if !(1.0..=LONGEST_WARM_UP).contains(&warm_up) {
+            return Err(Failure::option(format!(
+                "warm_up is {warm_up_s} s, expected a time of one sample to 10 million"
+            )));
+        }
+        Ok(Understood {
+            plan: TrackPlan::new(track_options, ranges, criterion, sample_time)?,
+            sample_time,
+            warm_up: warm_up as usize,
+        })
+    }
+}
+
+/// Options of the method, those first that others belong to, and the fit.
+fn set(method: &mut Method, mut options: Map<String, Value>, fit: Option<&str>) -> Result<(), Failure> {
+    let mut fitted = fit.map(|text| operator(text, "the fit")).transpose()?;
+    if let Some(prior) = options.get("prior") {
+        let other = match prior {
+            Value::Object(object) if object.contains_key("parameters") => {
+                Some(operator(&prior.to_string(), "the fit")?)
+            }
+            Value::String(name) if is_fit_file(name) => Some(read_fit(Path::new(name))?.operator()?),
+            _ => None,
+        };
+        if fit.is_some() {
+            return Err(Failure::option(
+                "prior is given twice, as a fit and by the options; drop one",
+            ));
+        }
+        if other.is_some() {
+            options.remove("prior");
+            fitted = other;
+        }
+    }
+    let listed = Method::registry().into_iter().flat_map(|spec| spec.settings);
+    for name in listed.map(|setting| setting.name) {
+        if let Some(text) = options.remove(name).and_then(|value| text(&value)) {
+            method.set(name, &text)?;
+        }
+    }
+    if let Some((unknown, _)) = options.into_iter().next() {
+        let own: Vec<&str> = method.settings().list().iter().map(|own| own.name).collect();
+        return Err(Failure::option(format!(
+            "there is no option {unknown}; there is structure, na to nk, criterion, start, largest, at, \
+             controlled_element, warm_up, and for {method} {}",
+            own.join(", ")
+        )));
+    }
+    match fitted {
+        Some(fit) => Ok(method.start_from(fit)?),
+        None => Ok(()),
+    }
+}
+
+fn operator(text: &str, source: &str) -> Result<FittedOperator, Failure> {
+    Ok(parse_fit(text, source).and_then(FitFile::operator)?)
+}
+
+fn object(text: &str) -> Result<Map<String, Value>, Failure> {
+    let text = if text.trim().is_empty() { "{}" } else { text };
+    serde_json::from_str(text).map_err(|error| {
+        Failure::option(format!(
+            "the options are no object in JSON ({error}); write them as {{\"nk\": 29, \"memory\": \"4s\"}}"
+        ))
+    })
+}
+
+/// Takes an option out; none where it is not there or null.
+fn taken<T>(
+    options: &mut Map<String, Value>,
+    name: &str,
+    read: impl FnOnce(&Value) -> Result<T, String>,
+) -> Result<Option<T>, Failure> {
+    match options.remove(name) {
+        None | Some(Value::Null) => Ok(None),
+        Some(value) => match read(&value) {
+            Ok(read) => Ok(Some(read)),
+            Err(expected) => Err(Failure::option(format!("{name} is {value}, expected {expected}"))),
+        },
+    }
+}
+
+fn choice<T: NamedChoice>(value: &Value) -> Result<T, String> {
+    let name = value.as_str().ok_or("its name as a text")?;
+    T::of_name(name).map_err(|error| error.to_string())
+}
+
+fn number(value: &Value) -> Result<f64, String> {
+    value.as_f64().ok_or_else(|| "a number".to_owned())
+}
+
+fn numbers(value: &Value) -> Result<Vec<f64>, String> {
+    let all = value.as_array().ok_or("a list of numbers")?;
+    all.iter().map(number).collect()
+}
+
+fn element(value: &Value) -> Result<ContinuousTransferFunction, String> {
+    let expected = "a text such as \"90/(s(s+6))\", or a pair of coefficients by descending powers of s";
+    match value {
+        Value::String(text) => text.parse().map_err(|error| format!("{expected} ({error})")),
+        Value::Array(pair) if pair.len() == 2 => {
+            let (num, den) = (numbers(&pair[0])?, numbers(&pair[1])?);
+            ContinuousTransferFunction::new(&num, &den).map_err(|error| format!("{expected} ({error})"))
+        }
+        _ => Err(expected.to_owned()),
+    }
+}
+
+/// Where the recursion starts.
+enum Start {
+    Nothing,
+    Coefficients(BTreeMap<String, f64>),
+}
+
+fn start(value: &Value) -> Result<Start, String> {
+    match value {
+        Value::String(text) if text == "nothing" => Ok(Start::Nothing),
+        Value::Object(named) => {
+            let each = named.iter().map(|(name, value)| Ok((name.clone(), number(value)?)));
+            each.collect::<Result<_, String>>().map(Start::Coefficients)
+        }
+        _ => Err("\"nothing\", or all coefficients by name".to_owned()),
+    }
+}
+
+fn range(value: &Value, name: &str) -> Result<RangeInclusive<usize>, String> {
+    let most = if name == "nk" { MAX_DELAY } else { MAX_ORDER };
+    let one = |value: &Value| {
+        let number = value.as_u64().and_then(|n| usize::try_from(n).ok());
+        number.filter(|n| *n <= most)
+    };
+    let ends = match value {
+        Value::Array(pair) if pair.len() == 2 => one(&pair[0]).zip(one(&pair[1])),
+        single => one(single).map(|n| (n, n)),
+    };
+    match ends {
+        Some((low, high)) if low <= high => Ok(low..=high),
+        _ => Err(format!(
+            "a whole number up to {most}, or a pair of them, the smaller first"
+        )),
+    }
+}
+
+/// A value as the command line writes it; none where it says nothing.
+fn text(value: &Value) -> Option<String> {
+    Some(match value {
+        Value::Null | Value::Bool(false) => return None,
+        Value::Bool(true) => "true".to_owned(),
+        Value::Number(number) => number.to_string(),
+        Value::String(text) => text.clone(),
+        Value::Array(ends) => {
+            let ends: Vec<String> = ends.iter().map(|end| text(end).unwrap_or_default()).collect();
+            ends.join("..")
+        }
+        Value::Object(named) if named.is_empty() => return None,
+        Value::Object(named) => {
+            let each: Vec<String> = (named.iter())
+                .map(|(name, value)| format!("{name}={}", text(value).unwrap_or_default()))
+                .collect();
+            each.join(",")
+        }
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    fn understood(method: &str, options: &str) -> Result<Understood, Failure> {
+        let asked = Asked {
+            method: Some(method.to_owned()),
+            sample_time_s: 0.01,
+            options: Some(options.to_owned()),
+            fit: None,
+        };
+        asked.understood()
+    }
+
+    #[test]
+    fn options_are_those_of_python() {
+        let found = understood(
+            "rpem",
+            r#"{"structure": "bj", "nk": 29, "nd": [1, 2], "memory": 256, "memory_of": {"b": "inf"}, "largest": 50,
+                "at": [1, 2.5], "controlled_element": "90/(s(s+6))", "warm_up": 10, "forgetting": "exponential",
+                "criterion": "aicc", "limit": null}"#,
+        )
+        .unwrap();
+        let options = found.plan.options();
+        assert_eq!((options.orders.nk, options.orders.nd, found.warm_up), (29, 2, 1000));
+        assert_eq!((options.largest, options.at_rad_s.clone()), (50.0, vec![1.0, 2.5]));
+        let memory = options.method.settings().get("memory_of").unwrap();
+        assert_eq!(memory, "b=inf");
+        assert!(!found.plan.is_settled());
+        let pair = understood("population", r#"{"controlled_element": [[90], [1, 6, 0]]}"#).unwrap();
+        assert_eq!(pair.plan.options().controlled_element, options.controlled_element);
+        let none = understood("population", " ").unwrap();
+        assert_eq!(none.plan.options().method, Method::population());
+    }
+
+    #[test]
+    fn what_cannot_be_says_why() {
+        for (method, options, reason) in [
+            ("kalman", "{}", "population"),
+            ("rpem", "[1]", "no object in JSON"),
+            ("rpem", "{\"nk\": -1}", "whole number"),
+            ("rpem", "{\"nk\": [30, 20]}", "smaller first"),
+            ("rpem", "{\"nd\": 65}", "64"),
+            ("rpem", "{\"colour\": 1}", "no option colour"),
+            ("rpem", "{\"at\": 1}", "list of numbers"),
+            ("rpem", "{\"structure\": \"curve\"}", "curve"),
+            ("rpem", "{\"prior\": \"none\"}", "population"),
+            ("rpem", "{\"start\": {\"b0\": 1}, \"nk\": 29, \"nd\": 1}", "start lacks"),
+            ("rpem", "{\"warm_up\": 0}", "one sample"),
+            ("rpem", "{\"controlled_element\": \"9/\"}", "coefficients"),
+            ("adaptive", "{\"smooth\": true}", "still to come"),
+            ("population", "{\"prior\": \"nowhere.json\"}", "nowhere.json"),
+            (
+                "population",
+                "{\"prior\": {\"parameters\": []}}",
+                "no form of an operator",
+            ),
+        ] {
+            let failure = understood(method, options).err().unwrap();
+            assert!(failure.text.contains(reason), "{options}: {}", failure.text);
+        }
+        let mut asked = Asked {
+            method: None,
+            sample_time_s: f64::NAN,
+            options: None,
+            fit: None,
+        };
+        assert!(asked.understood().is_err());
+        asked.sample_time_s = 0.01;
+        assert!(asked.understood().is_ok());
+    }
+}

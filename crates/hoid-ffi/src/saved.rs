@@ -1,0 +1,183 @@
+//! A tracker as bytes, to go on elsewhere with the same digits.
+//!
+//! | bytes | |
+//! |---|---|
+//! | 8 | `hoid` and the version of this layout |
+//! | 8 | length L of the description |
+//! | L | what was asked for and the orders, in JSON |
+//! | 8 N | the numbers of [`hoid_track::Live::saved`], as f64 |
+//! | 8 | FNV-1a over all before (G. Fowler, L. C. Noll, K.-P. Vo, 1991; 64 bits) |
+//!
+//! All least byte first. The sum guards against damage, not against an adversary.
+
+use hoid_model::Orders;
+use hoid_track::Live;
+use serde_json::{Value, json};
+
+use crate::{
+    options::Asked,
+    session::Session,
+    status::{Failure, HOID_BAD_STATE},
+};
+
+const MAGIC: [u8; 8] = *b"hoid\x01\0\0\0";
+const BASIS: u64 = 0xcbf2_9ce4_8422_2325;
+const PRIME: u64 = 0x0000_0100_0000_01b3;
+
+fn sum(bytes: &[u8]) -> u64 {
+    let next = |sum: u64, byte: &u8| (sum ^ u64::from(*byte)).wrapping_mul(PRIME);
+    bytes.iter().fold(BASIS, next)
+}
+
+impl Session {
+    /// The tracker as bytes. It does not change.
+    pub fn saved(&mut self) -> Vec<u8> {
+        let (asked, live) = self.parts();
+        let (orders, numbers) = live.saved();
+        let orders = orders.map(|o| json!([o.na, o.nb, o.nc, o.nd, o.nf, o.nk]));
+        let description = json!({
+            "hoid": env!("CARGO_PKG_VERSION"),
+            "method": asked.method,
+            "sample_time": asked.sample_time_s,
+            "options": asked.options,
+            "fit": asked.fit,
+            "orders": orders,
+        })
+        .to_string();
+        let mut bytes = MAGIC.to_vec();
+        bytes.extend_from_slice(&(description.len() as u64).to_le_bytes());
+        bytes.extend_from_slice(description.as_bytes());
+        bytes.extend(numbers.iter().flat_map(|number| number.to_le_bytes()));
+        let sum = sum(&bytes);
+        bytes.extend_from_slice(&sum.to_le_bytes());
+        bytes
+    }
+
+    /// The tracker that [`Session::saved`] was asked of.
+    pub fn restored(bytes: &[u8]) -> Result<Self, Failure> {
+        let wrong = |text: &str| Failure::new(HOID_BAD_STATE, format!("{text}; save the tracker again"));
+        let rest = (bytes.strip_prefix(&MAGIC))
+            .ok_or_else(|| wrong("the bytes are no tracker that this version of hoid has saved"))?;
+        let damaged = || wrong("the bytes were changed or cut since they were saved");
+        let (_, stated) = bytes.split_last_chunk::<8>().ok_or_else(damaged)?;
+        if sum(&bytes[..bytes.len() - 8]) != u64::from_le_bytes(*stated) {
+            return Err(damaged());
+        }
+        let (length, rest) = rest.split_first_chunk::<8>().ok_or_else(damaged)?;
+        let length = usize::try_from(u64::from_le_bytes(*length)).map_err(|_| damaged())?;
+        let (description, rest) = rest.split_at_checked(length).ok_or_else(damaged)?;
+        let numbers = &rest[..rest.len().saturating_sub(8)];
+        let (numbers, []) = numbers.as_chunks::<8>() else {
+            return Err(damaged());
+        };
+        let numbers: Vec<f64> = numbers.iter().map(|bytes| f64::from_le_bytes(*bytes)).collect();
+        let description: Value = serde_json::from_slice(description).map_err(|_| damaged())?;
+        let orders = match &description["orders"] {
+            Value::Null => None,
+            listed => Some(orders(listed).ok_or_else(damaged)?),
+        };
+        let text = |name: &str| description[name].as_str().map(str::to_owned);
+        let asked = Asked {
+            method: text("method"),
+            sample_time_s: description["sample_time"].as_f64().ok_or_else(damaged)?,
+            options: text("options"),
+            fit: text("fit"),
+        };
+        let live = |understood: &crate::options::Understood| {
+            Live::restored(&understood.plan, orders, &numbers, understood.sample_time)
+        };
+        Self::of(asked, live).map_err(|failure| Failure::new(HOID_BAD_STATE, failure.text))
+    }
+}
+
+fn orders(listed: &Value) -> Option<Orders> {
+    let all: Vec<usize> = (listed.as_array()?.iter())
+        .map(|n| usize::try_from(n.as_u64()?).ok())
+        .collect::<Option<_>>()?;
+    let &[na, nb, nc, nd, nf, nk] = all.as_slice() else {
+        return None;
+    };
+    Some(Orders { na, nb, nc, nd, nf, nk })
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use hoid_model::scenario::{Condition, Scenario};
+    use hoid_sim::{RunSeed, Simulator};
+    use hoid_track::Sample;
+
+    use super::*;
+
+    const AT_ONCE: &str =
+        r#"{"nk": 29, "nd": 1, "start": {"b0": 0.04, "b1": -0.04, "d1": -0.8, "f1": -1.9, "f2": 0.92}}"#;
+
+    fn samples() -> Vec<Sample> {
+        let simulator = Simulator::new(&Scenario::condition(Condition::C4)).unwrap();
+        let record = simulator.run(RunSeed::default(), false).unwrap();
+        let pairs = record.input().iter().zip(record.output());
+        let sample = |(e, u): (&f64, &f64)| Sample {
+            e: *e,
+            u: *u,
+            reference: None,
+        };
+        pairs.map(sample).collect()
+    }
+
+    #[test]
+    fn a_saved_tracker_goes_on_with_the_same_digits() {
+        let samples = samples();
+        for (method, options, taken) in [
+            ("population", None, 1500),
+            ("rpem", Some(AT_ONCE), 1500),
+            ("rpem", Some("{\"nk\": 29, \"nd\": 1, \"warm_up\": 20}"), 1500),
+            ("rpem", Some("{\"nk\": 29, \"nd\": [1, 2], \"warm_up\": 10}"), 1500),
+        ] {
+            let mut first = Session::new(Some(method), 0.01, options, None).unwrap();
+            for sample in &samples[..taken] {
+                first.take(*sample, true);
+            }
+            let bytes = first.saved();
+            assert_eq!(bytes, first.saved(), "saving changes nothing");
+            let mut second = Session::restored(&bytes).unwrap();
+            for sample in &samples[taken..2500] {
+                let (a, b) = (first.take(*sample, true), second.take(*sample, true));
+                assert_eq!(a.innovation.to_bits(), b.innovation.to_bits());
+            }
+            assert_eq!(first.covariance(), second.covariance(), "{method} {options:?}");
+            assert_eq!(first.counts(), second.counts());
+        }
+    }
+
+    #[test]
+    fn damaged_bytes_are_refused() {
+        let mut session = Session::new(None, 0.01, None, None).unwrap();
+        let bytes = session.saved();
+        let refused = |bytes: &[u8]| {
+            let failure = Session::restored(bytes).err().unwrap();
+            assert_eq!(failure.status, HOID_BAD_STATE);
+        };
+        for length in [0, 7, 8, 15, 16, 24, 100, bytes.len() - 1] {
+            refused(&bytes[..length.min(bytes.len())]);
+        }
+        for place in (0..bytes.len()).step_by(bytes.len() / 199 + 1) {
+            let mut changed = bytes.clone();
+            changed[place] ^= 0x40;
+            refused(&changed);
+        }
+        // With a true sum, the description still has to be one.
+        for (from, to) in [
+            ("population", "lopulation"),
+            ("\"orders\":[", "\"orders\":{"),
+            ("0.01", "-.01"),
+        ] {
+            let place = bytes.windows(from.len()).position(|window| window == from.as_bytes());
+            let Some(place) = place else { continue };
+            let mut changed = bytes[..bytes.len() - 8].to_vec();
+            changed[place..place + from.len()].copy_from_slice(to.as_bytes());
+            let true_sum = sum(&changed);
+            changed.extend_from_slice(&true_sum.to_le_bytes());
+            refused(&changed);
+        }
+    }
+}

@@ -1,0 +1,294 @@
+//! A tracker as it was asked for, from its warm-up on. Nothing here knows of C, but for the names,
+//! which C wants to keep.
+
+use std::ffi::{CStr, CString};
+
+use hoid_ident::IdentError;
+use hoid_model::{VerdictLevel, uncertainty::Estimate};
+use hoid_track::{Change, Counts, Live, Outcome, Sample, TrackPlan, Tracker};
+
+use crate::{
+    options::{Asked, Understood},
+    status::Failure,
+    types::{HOID_SHIFTS, HoidChange, HoidCounts, HoidEstimate, HoidOutcome, HoidShift},
+};
+
+/// Names of the operator's parameters with their units, in the order of the tables.
+const OPERATOR: [(&CStr, &CStr); 6] = [
+    (c"K_e", c""),
+    (c"T_L", c"s"),
+    (c"K_e_dot", c"s"),
+    (c"omega_nm", c"rad/s"),
+    (c"zeta_nm", c""),
+    (c"tau_e", c"s"),
+];
+/// What a change is of.
+const SHIFTED: [&CStr; HOID_SHIFTS] = [c"K_e", c"K_e_dot", c"omega_nm", c"zeta_nm", c"remnant", c"tau_e"];
+
+/// A tracker and what is known of it.
+pub(crate) struct Session {
+    asked: Asked,
+    plan: TrackPlan,
+    sample_time: hoid_model::SampleTime,
+    live: Live,
+    /// Names of the coefficients, once there are some.
+    names: Vec<CString>,
+}
+
+impl Session {
+    /// As asked for: by name of the method and sample time in s, with options and a fit in JSON.
+    pub fn new(
+        method: Option<&str>,
+        sample_time_s: f64,
+        options: Option<&str>,
+        fit: Option<&str>,
+    ) -> Result<Self, Failure> {
+        let asked = Asked {
+            method: method.map(str::to_owned),
+            sample_time_s,
+            options: options.map(str::to_owned),
+            fit: fit.map(str::to_owned),
+        };
+        Self::of(asked, |understood| {
+            Live::new(understood.plan.options(), understood.warm_up, understood.sample_time)
+        })
+    }
+
+    /// With the recursion that `live` makes.
+    pub fn of(asked: Asked, live: impl FnOnce(&Understood) -> Result<Live, IdentError>) -> Result<Self, Failure> {
+        let understood = asked.understood()?;
+        let mut session = Self {
+            live: live(&understood)?,
+            asked,
+            plan: understood.plan,
+            sample_time: understood.sample_time,
+            names: Vec::new(),
+        };
+        session.name();
+        Ok(session)
+    }
+
+    /// What it was made of, and its recursion to be saved.
+    pub fn parts(&mut self) -> (&Asked, &mut Live) {
+        (&self.asked, &mut self.live)
+    }
+
+    fn name(&mut self) {
+        if let Live::Tracking(tracker) = &self.live {
+            let names = tracker.parameter_names();
+            self.names = names.into_iter().filter_map(|name| CString::new(name).ok()).collect();
+        }
+    }
+
+    /// The tracker; while there is none, how far the warm-up is.
+    pub fn tracker(&self) -> Result<&Tracker, Failure> {
+        match &self.live {
+            Live::Tracking(tracker) => Ok(tracker),
+            Live::Collecting(warm_up) => {
+                let trouble = warm_up.trouble.as_deref().map_or(String::new(), |t| format!("; {t}"));
+                Err(Failure::nothing(format!(
+                    "the tracker is warming up: it has {} of {} samples{trouble}",
+                    warm_up.collected, warm_up.needed
+                )))
+            }
+        }
+    }
+
+    /// Takes a sample. With `moves` false the filters follow and the estimate stays.
+    pub fn take(&mut self, sample: Sample, moves: bool) -> HoidOutcome {
+        let outcome: Option<Outcome> = match &mut self.live {
+            Live::Tracking(tracker) if !moves => Some(tracker.update(sample, false)),
+            live => {
+                let plan = &self.plan;
+                let taken = live.update(sample, &|record| plan.choose(record, &|| {}));
+                if taken.started.is_some() {
+                    self.name();
+                }
+                taken.outcome
+            }
+        };
+        let tracker = self.tracker().ok();
+        let told = |of: fn(&Outcome) -> bool| i32::from(outcome.as_ref().is_some_and(of));
+        HoidOutcome {
+            innovation: outcome.and_then(|o| o.innovation).unwrap_or(f64::NAN),
+            ready: i32::from(tracker.is_some()),
+            skipped: told(|o| o.skipped),
+            held: told(|o| o.held),
+            shortened: told(|o| o.shortened),
+            changed: i32::from(tracker.is_some_and(|tracker| tracker.change().is_some())),
+        }
+    }
+
+    /// The coefficients, in the order of theta.
+    pub fn parameters(&self) -> Result<Vec<HoidEstimate>, Failure> {
+        let estimates = self.tracker()?.parameters();
+        let of = |(name, estimate): (&CString, Estimate)| HoidEstimate::new(name.as_ptr(), c"".as_ptr(), estimate);
+        Ok(self.names.iter().zip(estimates).map(of).collect())
+    }
+
+    /// The operator.
+    pub fn operator(&self) -> Result<Vec<HoidEstimate>, Failure> {
+        let tracker = self.tracker()?;
+        let operator = tracker
+            .operator()
+            .map_err(|reason| Failure::nothing(reason.to_string()))?;
+        let judged = tracker.determined(&operator);
+        let rows = operator.rows().into_iter().zip(OPERATOR);
+        Ok(rows
+            .map(|((name, _, estimate), (name_c, unit))| HoidEstimate {
+                determined: judged
+                    .iter()
+                    .find(|(known, _)| *known == name)
+                    .map_or(-1, |(_, yes)| i32::from(*yes)),
+                ..HoidEstimate::new(name_c.as_ptr(), unit.as_ptr(), estimate)
+            })
+            .collect())
+    }
+
+    /// Crossover and phase margin.
+    pub fn open_loop(&self) -> Result<Vec<HoidEstimate>, Failure> {
+        let found = self.tracker()?.open_loop().ok_or_else(|| {
+            Failure::nothing("there is no controlled element; name it in the options, as \"controlled_element\"")
+        })?;
+        let found = found.map_err(|reason| Failure::nothing(reason.words()))?;
+        Ok(vec![
+            HoidEstimate::new(c"crossover_rad_s".as_ptr(), c"rad/s".as_ptr(), found.crossover_rad_s),
+            HoidEstimate::new(c"phase_margin_deg".as_ptr(), c"deg".as_ptr(), found.phase_margin_deg),
+        ])
+    }
+
+    /// Gain and phase at a frequency in rad/s.
+    pub fn response(&self, omega_rad_s: f64) -> Result<Vec<HoidEstimate>, Failure> {
+        if !(omega_rad_s > 0.0 && omega_rad_s.is_finite()) {
+            return Err(Failure::option(format!(
+                "the frequency is {omega_rad_s} rad/s, expected a positive one"
+            )));
+        }
+        let found = self.tracker()?.response(omega_rad_s);
+        let found = found.ok_or_else(|| Failure::nothing("there is no estimate yet"))?;
+        Ok(vec![
+            HoidEstimate::new(c"gain_db".as_ptr(), c"dB".as_ptr(), found.gain_db()),
+            HoidEstimate::new(c"phase_deg".as_ptr(), c"deg".as_ptr(), found.phase_deg()),
+        ])
+    }
+
+    /// Covariance of the coefficients by rows.
+    pub fn covariance(&self) -> Result<Vec<f64>, Failure> {
+        let covariance = self.tracker()?.covariance();
+        covariance.ok_or_else(|| Failure::nothing("the estimate has no covariance yet"))
+    }
+
+    /// The change that was declared at the last sample.
+    pub fn change(&self) -> Result<HoidChange, Failure> {
+        let change = self.tracker()?.change();
+        let change = change.ok_or_else(|| Failure::nothing("no change was declared at the last sample"))?;
+        Ok(shown(&change))
+    }
+
+    /// Logarithm of the odds of a change within the last seconds.
+    pub fn change_log_odds(&self) -> Result<f64, Failure> {
+        let odds = self.tracker()?.change_odds();
+        odds.ok_or_else(|| Failure::nothing("the method tells no changes; adaptive does"))
+    }
+
+    /// What the estimate is worth now.
+    pub fn level(&self) -> VerdictLevel {
+        self.tracker().map_or(VerdictLevel::NotDetermined, |tracker| {
+            tracker.level(&tracker.operator())
+        })
+    }
+
+    /// Samples so far.
+    pub fn counts(&self) -> HoidCounts {
+        let counts = match &self.live {
+            Live::Tracking(tracker) => tracker.counts(),
+            Live::Collecting(warm_up) => Counts {
+                samples: warm_up.collected as u64,
+                ..Counts::default()
+            },
+        };
+        HoidCounts {
+            samples: counts.samples,
+            skipped: counts.skipped,
+            held: counts.held,
+            restarts: counts.restarts,
+            steps_shortened: counts.shortened,
+        }
+    }
+
+    /// Sample time, s.
+    pub fn sample_time_s(&self) -> f64 {
+        self.sample_time.s()
+    }
+}
+
+fn shown(change: &Change) -> HoidChange {
+    let [before, after] = change.innovation_variance.map(Estimate::fixed);
+    let pairs = [
+        change.k_e,
+        change.k_e_dot,
+        change.omega_nm_rad_s,
+        change.zeta_nm,
+        [before, after],
+        change.tau_e_s,
+    ];
+    let mut shifts = [HoidShift::default(); HOID_SHIFTS];
+    for (shift, ((name, [before, after]), z)) in shifts.iter_mut().zip(SHIFTED.into_iter().zip(pairs).zip(change.z)) {
+        *shift = HoidShift {
+            name: name.as_ptr(),
+            before: before.value,
+            before_standard_error: before.standard_error.unwrap_or(f64::NAN),
+            after: after.value,
+            after_standard_error: after.standard_error.unwrap_or(f64::NAN),
+            z,
+        };
+    }
+    HoidChange {
+        seconds_ago: change.seconds_ago,
+        log_odds: change.odds,
+        probability: change.probability(),
+        shifts,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use hoid_model::{OperatorParameters, uncertainty::OperatorEstimate};
+
+    use super::*;
+
+    #[test]
+    fn names_and_units_are_those_of_the_tables() {
+        let operator = OperatorParameters {
+            k_e: 0.09,
+            t_l_s: 0.4,
+            omega_nm_rad_s: 11.25,
+            zeta_nm: 0.35,
+            tau_e_s: 0.28,
+        };
+        let rows = OperatorEstimate::from(operator).rows();
+        for ((name, unit, _), (name_c, unit_c)) in rows.into_iter().zip(OPERATOR) {
+            assert_eq!((name, unit), (name_c.to_str().unwrap(), unit_c.to_str().unwrap()));
+        }
+        // Each quantity alone is the one that is said to have changed.
+        for (i, name) in SHIFTED.into_iter().enumerate() {
+            let fixed = [Estimate::fixed(1.0); 2];
+            let mut change = Change {
+                seconds_ago: 0.5,
+                odds: 3.0,
+                k_e: fixed,
+                k_e_dot: fixed,
+                omega_nm_rad_s: fixed,
+                zeta_nm: fixed,
+                tau_e_s: fixed,
+                t_l_s: [1.0; 2],
+                innovation_variance: [1.0; 2],
+                z: [0.0; 6],
+            };
+            change.z[i] = 5.0;
+            assert_eq!(change.changed(), [name.to_str().unwrap()]);
+            assert_eq!(shown(&change).shifts[i].z, 5.0);
+        }
+    }
+}

@@ -1,0 +1,115 @@
+//! Statuses, and the text behind the last one.
+//!
+//! The text belongs to the thread: two threads with a tracker each do not mix theirs up.
+
+use std::{
+    any::Any,
+    cell::RefCell,
+    ffi::{CStr, CString, c_char},
+    panic::{AssertUnwindSafe, catch_unwind},
+};
+
+use hoid_ident::IdentError;
+use hoid_io::IoError;
+use hoid_model::ModelError;
+
+/// What a function answers: zero for done, positive where there is no value, negative for an error.
+pub type HoidStatus = i32;
+
+/// Done.
+pub const HOID_OK: HoidStatus = 0;
+/// There is no such value now; hoid_last_error says why.
+pub const HOID_NOTHING: HoidStatus = 1;
+/// A pointer is null or not aligned.
+pub const HOID_BAD_POINTER: HoidStatus = -1;
+/// A text is not in UTF-8.
+pub const HOID_BAD_TEXT: HoidStatus = -2;
+/// A method, an option, a sample time or a fit that cannot be used.
+pub const HOID_BAD_OPTION: HoidStatus = -3;
+/// A list or buffer has not the room for what there is.
+pub const HOID_TOO_SMALL: HoidStatus = -4;
+/// Bytes that are not a saved tracker of this version, or were changed since.
+pub const HOID_BAD_STATE: HoidStatus = -5;
+/// A fault of hoid itself was caught.
+pub const HOID_PANIC: HoidStatus = -6;
+/// A fault was caught in this tracker before: free it.
+pub const HOID_BROKEN: HoidStatus = -7;
+
+/// A status that is not [`HOID_OK`], with its text.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Failure {
+    pub status: HoidStatus,
+    pub text: String,
+}
+
+impl Failure {
+    pub fn new(status: HoidStatus, text: impl Into<String>) -> Self {
+        Self {
+            status,
+            text: text.into(),
+        }
+    }
+
+    pub fn option(text: impl Into<String>) -> Self {
+        Self::new(HOID_BAD_OPTION, text)
+    }
+
+    pub fn nothing(text: impl Into<String>) -> Self {
+        Self::new(HOID_NOTHING, text)
+    }
+}
+
+impl From<IdentError> for Failure {
+    fn from(error: IdentError) -> Self {
+        Self::option(error.to_string())
+    }
+}
+
+impl From<ModelError> for Failure {
+    fn from(error: ModelError) -> Self {
+        Self::option(error.to_string())
+    }
+}
+
+impl From<IoError> for Failure {
+    fn from(error: IoError) -> Self {
+        Self::option(error.to_string())
+    }
+}
+
+thread_local! {
+    static LAST: RefCell<CString> = RefCell::new(CString::default());
+}
+
+/// Runs a function of the boundary: its status, its text for [`hoid_last_error`], no panic.
+pub(crate) fn guarded(call: impl FnOnce() -> Result<(), Failure>) -> HoidStatus {
+    let failure = match catch_unwind(AssertUnwindSafe(call)) {
+        Ok(Ok(())) => return HOID_OK,
+        Ok(Err(failure)) => failure,
+        Err(panic) => Failure::new(HOID_PANIC, said(&*panic)),
+    };
+    remember(&failure.text);
+    failure.status
+}
+
+/// What a panic says.
+pub(crate) fn said(panic: &(dyn Any + Send)) -> String {
+    let words = (panic.downcast_ref::<&str>().copied())
+        .or_else(|| panic.downcast_ref::<String>().map(String::as_str))
+        .unwrap_or("a fault without words");
+    format!("a fault of hoid itself, please report it: {words}")
+}
+
+fn remember(text: &str) {
+    let text = CString::new(text.replace('\0', " ")).unwrap_or_default();
+    // At the end of a thread there may be no place for it any more.
+    let _ = LAST.try_with(|last| *last.borrow_mut() = text);
+}
+
+/// The text behind the last status of this thread that was not HOID_OK, empty before the first. It
+/// stays until the next one.
+#[unsafe(no_mangle)]
+pub extern "C" fn hoid_last_error() -> *const c_char {
+    const EMPTY: &CStr = c"";
+    LAST.try_with(|last| last.borrow().as_ptr()).unwrap_or(EMPTY.as_ptr())
+}

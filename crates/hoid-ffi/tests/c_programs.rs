@@ -1,0 +1,168 @@
+//! The examples in C and C++, compiled by the compiler that is here and run without Rust: the digits
+//! of the tracker in Rust.
+#![cfg(unix)]
+#![allow(clippy::unwrap_used, clippy::print_stderr)]
+
+mod common;
+
+use std::{fs, path::PathBuf};
+
+use hoid_ident::{NamedOrders, order_selection::Criterion};
+use hoid_model::{Record, Structure, uncertainty::Estimate};
+use hoid_track::{Method, StartAt, TrackOptions, TrackPlan, Tracker, ranges_of};
+use tempfile::TempDir;
+
+use common::{compile, compiler, example, good, lines, record, run};
+
+const ELEMENT: &str = "90/(s(s+6))";
+
+fn built(name: &str, with: &str, options: &[&str]) -> Option<(TempDir, PathBuf)> {
+    let with = compiler(with)?;
+    let folder = TempDir::new().unwrap();
+    let program = folder.path().join("tracker");
+    good(&compile(&with, &example(name), &program, options));
+    Some((folder, program))
+}
+
+/// Value and error of each, NaN where there is none.
+fn numbers(estimates: &[Option<Estimate>]) -> Vec<f64> {
+    let pair = |e: &Option<Estimate>| {
+        let value = e.map_or(f64::NAN, |e| e.value);
+        let error = e.and_then(|e| e.standard_error).unwrap_or(f64::NAN);
+        [value, error]
+    };
+    estimates.iter().flat_map(pair).collect()
+}
+
+/// What the example prints, from the tracker itself.
+fn expected(record: &Record, options: &TrackOptions) -> Vec<Vec<f64>> {
+    let mut tracker = Tracker::new(options, None, record.sample_time()).unwrap();
+    let pairs = record.input().iter().zip(record.output());
+    pairs
+        .map(|(e, u)| {
+            let outcome = tracker.step(*e, *u);
+            let operator = tracker.operator().ok();
+            let rows = operator.map(|operator| operator.rows().map(|(.., e)| Some(e)));
+            let mut row = numbers(&rows.unwrap_or([None; 6]));
+            let found = tracker.open_loop().and_then(Result::ok);
+            row.extend(numbers(&[
+                found.map(|found| found.crossover_rad_s),
+                found.map(|found| found.phase_margin_deg),
+            ]));
+            row.push(outcome.innovation.unwrap_or(f64::NAN));
+            row
+        })
+        .collect()
+}
+
+fn usual(record: &Record) -> TrackOptions {
+    let (method, structure) = (Method::population(), Structure::BoxJenkins);
+    let ranges = ranges_of(&method, structure, &NamedOrders::new(), &[], record.sample_time()).unwrap();
+    let options = TrackOptions::usual(method, 29);
+    let plan = TrackPlan::new(options, ranges, Criterion::Bic, record.sample_time()).unwrap();
+    plan.options().clone()
+}
+
+fn same(found: &str, expected: &[Vec<f64>], columns: &[usize]) {
+    let mut rows = 0;
+    for (line, expected) in found.lines().zip(expected) {
+        let cells: Vec<f64> = line.split(',').map(|cell| cell.parse().unwrap()).collect();
+        assert_eq!(cells.len(), columns.len());
+        for (cell, column) in cells.iter().zip(columns) {
+            let other = expected[*column];
+            assert!(
+                cell.to_bits() == other.to_bits() || cell.is_nan() && other.is_nan(),
+                "row {rows}, column {column}: {cell} {other}"
+            );
+        }
+        rows += 1;
+    }
+    assert_eq!(rows, expected.len());
+}
+
+#[test]
+fn the_example_in_c_gives_the_digits_of_rust() {
+    let Some((_folder, program)) = built("tracker.c", "cc", &["-std=c11", "-pedantic"]) else {
+        return;
+    };
+    let record = record();
+    let with_element = TrackOptions {
+        controlled_element: Some(ELEMENT.parse().unwrap()),
+        ..usual(&record)
+    };
+    let expected_rows = expected(&record, &with_element);
+    let options = format!("{{\"controlled_element\": \"{ELEMENT}\"}}");
+    let all: Vec<usize> = (0..17).collect();
+    // Saved, freed and restored in the middle.
+    let output = run(&program, &["population", "0.01", &options, "4000"], &lines(&record));
+    same(&good(&output), &expected_rows, &all);
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(said.contains("after 8192 samples, 0 skipped"), "{said}");
+}
+
+#[test]
+fn a_change_is_told_in_c() {
+    let Some((_folder, program)) = built("tracker.c", "cc", &["-std=c11"]) else {
+        return;
+    };
+    let record = record();
+    let options = r#"{"nk": 29, "nd": 1, "warm_up": 20}"#;
+    let output = run(&program, &["adaptive", "0.01", options], &lines(&record));
+    assert_eq!(good(&output).lines().count(), record.len());
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    // The task changes at 40.96 s.
+    let place = |line: &str| line.strip_prefix("sample ")?.split(':').next()?.parse::<usize>().ok();
+    let declared: Vec<usize> = said.lines().filter_map(place).collect();
+    assert!(declared.iter().any(|k| (4096..5000).contains(k)), "{said}");
+    assert!(declared.iter().all(|k| *k >= 4096), "{said}");
+}
+
+#[test]
+fn the_example_in_cpp_gives_the_digits_of_rust() {
+    let Some((_folder, program)) = built("tracker.cpp", "c++", &["-std=c++14"]) else {
+        return;
+    };
+    let record = record();
+    let options = TrackOptions {
+        start: StartAt::Span(None),
+        ..usual(&record)
+    };
+    let rows = expected(&record, &options);
+    let found = good(&run(&program, &["population", "0.01"], &lines(&record)));
+    // Rows without an operator have the innovation alone.
+    let lines: Vec<&str> = found.lines().collect();
+    assert_eq!(lines.len(), rows.len());
+    let columns: Vec<usize> = (0..12).chain([16]).collect();
+    let first = lines.iter().position(|line| line.contains(',')).unwrap();
+    same(&lines[first..].join("\n"), &rows[first..], &columns);
+    same(&lines[..first].join("\n"), &rows[..first], &[16]);
+}
+
+#[test]
+fn the_example_in_c_is_clean_under_the_sanitizers() {
+    let sanitizers = ["-std=c11", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"];
+    let Some(with) = compiler("cc") else { return };
+    let folder = TempDir::new().unwrap();
+    let trial = folder.path().join("trial.c");
+    fs::write(&trial, "int main(void) { return 0; }\n").unwrap();
+    let program = folder.path().join("tracker");
+    let has = compile(&with, &trial, &program, &sanitizers).status.success();
+    if !has || !run(&program, &[], "").status.success() {
+        eprintln!("skipped: {with} has no address and undefined-behaviour sanitizer");
+        return;
+    }
+    good(&compile(&with, &example("tracker.c"), &program, &sanitizers));
+    let record = record();
+    let input = lines(&record);
+    good(&run(&program, &["population", "0.01", "{}", "1000"], &input));
+    good(&run(
+        &program,
+        &["rpem", "0.01", "{\"nk\": 29, \"nd\": 1}", "1000"],
+        &input,
+    ));
+    // What fails leaves nothing behind but what a program that ends does.
+    let refused = run(&program, &["kalman", "0.01"], "");
+    let said = String::from_utf8_lossy(&refused.stderr).into_owned();
+    assert_eq!(refused.status.code(), Some(1));
+    assert!(said.contains("population") && !said.contains("Sanitizer"), "{said}");
+}

@@ -1,0 +1,291 @@
+//! Whatever a caller hands over, the answer is a status: no panic, no value that is none.
+#![allow(clippy::unwrap_used)]
+
+use std::{
+    ffi::{CStr, CString},
+    ptr,
+};
+
+use hoid_ffi::*;
+use proptest::prelude::*;
+
+/// A tracker that frees itself.
+struct Owned(*mut HoidTracker);
+
+impl Drop for Owned {
+    fn drop(&mut self) {
+        // SAFETY: made by this library, freed once.
+        unsafe { hoid_tracker_free(self.0) };
+    }
+}
+
+fn made(method: &str, sample_time: f64, options: &str) -> Result<Owned, (HoidStatus, String)> {
+    let (method, options) = (CString::new(method).unwrap(), CString::new(options).unwrap());
+    let mut tracker = ptr::null_mut();
+    // SAFETY: texts that end with a zero, a place on the stack.
+    let status = unsafe { hoid_tracker_new(method.as_ptr(), sample_time, options.as_ptr(), &mut tracker) };
+    answered(status, tracker)
+}
+
+fn answered(status: HoidStatus, tracker: *mut HoidTracker) -> Result<Owned, (HoidStatus, String)> {
+    if status == HOID_OK {
+        return Ok(Owned(tracker));
+    }
+    assert!(tracker.is_null());
+    // SAFETY: a text of this thread.
+    let text = unsafe { CStr::from_ptr(hoid_last_error()) };
+    Err((status, text.to_str().unwrap().to_owned()))
+}
+
+fn saved(tracker: &Owned) -> Vec<u8> {
+    let mut length = 0;
+    // SAFETY: only the length is asked for.
+    let status = unsafe { hoid_tracker_save(tracker.0, ptr::null_mut(), 0, &mut length) };
+    assert_eq!(status, HOID_OK);
+    let mut bytes = vec![0; length];
+    // SAFETY: room for so many.
+    let status = unsafe { hoid_tracker_save(tracker.0, bytes.as_mut_ptr(), length, &mut length) };
+    assert_eq!(status, HOID_OK);
+    bytes
+}
+
+fn restored(bytes: &[u8]) -> Result<Owned, (HoidStatus, String)> {
+    let mut tracker = ptr::null_mut();
+    // SAFETY: a slice, a place on the stack.
+    let status = unsafe { hoid_tracker_restore(bytes.as_ptr(), bytes.len(), &mut tracker) };
+    answered(status, tracker)
+}
+
+const ANY: HoidEstimate = HoidEstimate {
+    name: ptr::null(),
+    unit: ptr::null(),
+    value: 0.0,
+    standard_error: 0.0,
+    determined: 0,
+};
+
+/// Everything that a tracker says, each with an answer that is not a fault.
+fn asked(tracker: &Owned) -> Vec<HoidStatus> {
+    let t = tracker.0;
+    let mut list = [ANY; 64];
+    let (room, list) = (list.len(), list.as_mut_ptr());
+    let mut count = 0;
+    let mut numbers = vec![0.0; 4096];
+    let (mut odds, mut level, mut ts) = (0.0, 0, 0.0);
+    let mut change = HoidChange {
+        seconds_ago: 0.0,
+        log_odds: 0.0,
+        probability: 0.0,
+        shifts: [HoidShift::default(); HOID_SHIFTS],
+    };
+    let mut counts = HoidCounts {
+        samples: 0,
+        skipped: 0,
+        held: 0,
+        restarts: 0,
+        steps_shortened: 0,
+    };
+    vec![
+        // SAFETY: a tracker.
+        unsafe { hoid_tracker_ready(t) },
+        // SAFETY: a tracker, and room as told.
+        unsafe { hoid_tracker_operator(t, list, room, &mut count) },
+        // SAFETY: a tracker, and room as told.
+        unsafe { hoid_tracker_parameters(t, list, room, &mut count) },
+        // SAFETY: a tracker, and room as told.
+        unsafe { hoid_tracker_open_loop(t, list, room, &mut count) },
+        // SAFETY: a tracker, and room as told.
+        unsafe { hoid_tracker_response(t, 2.5, list, room, &mut count) },
+        // SAFETY: a tracker, and room as told.
+        unsafe { hoid_tracker_covariance(t, numbers.as_mut_ptr(), numbers.len(), &mut count) },
+        // SAFETY: a tracker, and a place.
+        unsafe { hoid_tracker_change(t, &mut change) },
+        // SAFETY: a tracker, and a place.
+        unsafe { hoid_tracker_change_log_odds(t, &mut odds) },
+        // SAFETY: a tracker, and a place.
+        unsafe { hoid_tracker_level(t, &mut level) },
+        // SAFETY: a tracker, and a place.
+        unsafe { hoid_tracker_counts(t, &mut counts) },
+        // SAFETY: a tracker, and a place.
+        unsafe { hoid_tracker_sample_time(t, &mut ts) },
+    ]
+}
+
+#[test]
+fn null_pointers_are_refused_everywhere() {
+    let nothing = Owned(ptr::null_mut());
+    assert!(asked(&nothing).iter().all(|status| *status == HOID_BAD_POINTER));
+    // SAFETY: null is allowed.
+    let status = unsafe { hoid_tracker_step(ptr::null_mut(), 0.0, 0.0, ptr::null_mut()) };
+    assert_eq!(status, HOID_BAD_POINTER);
+    // SAFETY: null is allowed.
+    let status = unsafe { hoid_tracker_new(ptr::null(), 0.01, ptr::null(), ptr::null_mut()) };
+    assert_eq!(status, HOID_BAD_POINTER);
+    let mut tracker = ptr::null_mut();
+    // SAFETY: null is allowed.
+    let status = unsafe { hoid_tracker_from_fit(ptr::null(), 0.01, ptr::null(), &mut tracker) };
+    assert_eq!((status, tracker.is_null()), (HOID_BAD_POINTER, true));
+    // SAFETY: null is allowed.
+    let status = unsafe { hoid_tracker_restore(ptr::null(), 9, &mut tracker) };
+    assert_eq!(status, HOID_BAD_POINTER);
+    let tracker = made("population", 0.01, "").ok().unwrap();
+    // SAFETY: null is allowed.
+    let status = unsafe { hoid_tracker_operator(tracker.0, ptr::null_mut(), 6, ptr::null_mut()) };
+    assert!([HOID_BAD_POINTER, HOID_NOTHING].contains(&status));
+    // SAFETY: null is allowed.
+    let status = unsafe { hoid_tracker_counts(tracker.0, ptr::null_mut()) };
+    assert_eq!(status, HOID_BAD_POINTER);
+    // SAFETY: the outcome may be null.
+    let status = unsafe { hoid_tracker_step(tracker.0, 0.0, 0.0, ptr::null_mut()) };
+    assert_eq!(status, HOID_OK);
+}
+
+#[test]
+fn a_fit_is_what_a_tracker_begins_with() {
+    let fit = r#"{"structure": "grey-box", "form": "gain", "neuromuscular": true, "verdict": {"level": "trustworthy"},
+        "records": [{"sample_time": 0.01, "units": {"input": "", "output": ""}}], "parameters": [],
+        "noise": {"c": [], "d": [-0.9]}, "innovation_variance": 0.1,
+        "covariance": {"coordinates": ["gain", "ln omega_nm", "ln zeta_nm", "tau_e"], "values": [2.0, 2.4, -1.2, 0.2],
+                       "matrix": [[0.01, 0, 0, 0], [0, 0.01, 0, 0], [0, 0, 0.01, 0], [0, 0, 0, 0.0001]]}}"#;
+    let of = |sample_time: f64, fit: &str| {
+        let text = CString::new(fit).unwrap();
+        let mut tracker = ptr::null_mut();
+        // SAFETY: a text that ends with a zero, a place on the stack.
+        let status = unsafe { hoid_tracker_from_fit(text.as_ptr(), sample_time, ptr::null(), &mut tracker) };
+        answered(status, tracker)
+    };
+    let tracker = of(0.01, fit).ok().unwrap();
+    let options = format!("{{\"prior\": {fit}}}");
+    let same = made("population", 0.01, &options).ok().unwrap();
+    for tracker in [&tracker, &same] {
+        // SAFETY: a tracker.
+        unsafe { hoid_tracker_step(tracker.0, 0.1, 0.2, ptr::null_mut()) };
+    }
+    let first = |tracker: &Owned| {
+        let mut list = [ANY; 6];
+        let mut count = 0;
+        // SAFETY: a tracker, and room as told.
+        let status = unsafe { hoid_tracker_operator(tracker.0, list.as_mut_ptr(), 6, &mut count) };
+        assert_eq!((status, count), (HOID_OK, 6));
+        list.map(|e| (e.value.to_bits(), e.standard_error.to_bits()))
+    };
+    assert_eq!(first(&tracker), first(&same));
+    let value = f64::from_bits(first(&tracker)[0].0);
+    assert!((value - 2.0).abs() < 0.2, "the gain of the fit: {value}");
+    // It goes on from its bytes, which have the fit in them.
+    assert_eq!(first(&restored(&saved(&tracker)).ok().unwrap()), first(&tracker));
+    // The sample time is that of the fit.
+    let (status, said) = of(0.02, fit).err().unwrap();
+    assert_eq!(status, HOID_BAD_OPTION);
+    assert!(said.contains("samples here come at"), "{said}");
+    assert!(of(0.01, "{}").is_err());
+}
+
+fn hostile_number() -> impl Strategy<Value = f64> {
+    prop_oneof![
+        8 => -2.0..2.0,
+        1 => any::<f64>(),
+        1 => prop_oneof![Just(f64::NAN), Just(f64::INFINITY), Just(-f64::MAX), Just(5e-324), Just(1e6)],
+    ]
+}
+
+fn hostile_value() -> impl Strategy<Value = String> {
+    prop_oneof![
+        Just("null".to_owned()),
+        Just("true".to_owned()),
+        any::<i32>().prop_map(|n| n.to_string()),
+        (-1e3..1e3).prop_map(|x: f64| x.to_string()),
+        "[a-z0-9=:.,/()s -]{0,12}".prop_map(|text| format!("\"{text}\"")),
+        (any::<u16>(), any::<u16>()).prop_map(|(a, b)| format!("[{a}, {b}]")),
+        (0_u8..40, 0_u8..40).prop_map(|(a, b)| format!("[{a}, {b}]")),
+        "[a-z_]{1,8}".prop_map(|name| format!("{{\"{name}\": 1}}")),
+        Just("\"1e999\"".to_owned()),
+        Just("[[], []]".to_owned()),
+    ]
+}
+
+const NAMES: [&str; 24] = [
+    "structure",
+    "na",
+    "nb",
+    "nc",
+    "nd",
+    "nf",
+    "nk",
+    "criterion",
+    "start",
+    "largest",
+    "at",
+    "controlled_element",
+    "warm_up",
+    "prior",
+    "memory",
+    "memory_of",
+    "forgetting",
+    "covariance",
+    "limit",
+    "guard",
+    "track_delay",
+    "drift",
+    "smooth",
+    "false_alarms",
+];
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 200, failure_persistence: None, ..ProptestConfig::default() })]
+
+    /// Samples of any kind move no tracker out of its senses.
+    #[test]
+    fn any_samples_are_taken(
+        samples in prop::collection::vec((hostile_number(), hostile_number(), hostile_number(), any::<i32>()), 1..60),
+        method in prop_oneof![Just("population"), Just("rpem"), Just("adaptive")],
+    ) {
+        let options = if method == "population" { "" } else {
+            r#"{"nk": 9, "nd": 1, "start": "nothing"}"#
+        };
+        // What needs the fit of a warm-up has one.
+        let tracker = made(method, 0.01, options).or_else(|_| made(method, 0.01, r#"{"nk": 9, "nd": 1, "warm_up": 0.2}"#));
+        let tracker = tracker.map_err(|(_, said)| TestCaseError::fail(said))?;
+        let mut outcome = HoidOutcome { innovation: 0.0, ready: 0, skipped: 0, held: 0, shortened: 0, changed: 0 };
+        for (e, u, f_t, moves) in samples {
+            // SAFETY: a tracker, a place on the stack.
+            let status = unsafe { hoid_tracker_update(tracker.0, e, u, f_t, moves, &mut outcome) };
+            prop_assert_eq!(status, HOID_OK);
+        }
+        for status in asked(&tracker) {
+            prop_assert!([HOID_OK, HOID_NOTHING].contains(&status), "{}", status);
+        }
+        let again = restored(&saved(&tracker)).map_err(|(_, said)| TestCaseError::fail(said))?;
+        prop_assert_eq!(saved(&again), saved(&tracker));
+    }
+
+    /// Options of any kind make a tracker or say why not.
+    #[test]
+    fn any_options_have_an_answer(
+        method in prop_oneof![Just("population"), Just("rpem"), Just("adaptive"), Just("rls"), Just("window"), Just("ekf")],
+        sample_time in prop_oneof![4 => Just(0.01), 1 => hostile_number()],
+        given in prop::collection::btree_map(prop::sample::select(&NAMES[..]), hostile_value(), 0..5),
+    ) {
+        let each: Vec<String> = given.iter().map(|(name, value)| format!("\"{name}\": {value}")).collect();
+        let options = format!("{{{}}}", each.join(", "));
+        match made(method, sample_time, &options) {
+            Ok(tracker) => {
+                for status in asked(&tracker) {
+                    prop_assert!([HOID_OK, HOID_NOTHING, HOID_TOO_SMALL].contains(&status), "{}: {}", options, status);
+                }
+            }
+            Err((status, said)) => {
+                prop_assert_eq!(status, HOID_BAD_OPTION, "{}: {}", options, said);
+                prop_assert!(!said.is_empty());
+            }
+        }
+    }
+
+    /// Bytes of any kind are no tracker.
+    #[test]
+    fn any_bytes_are_refused(bytes in prop::collection::vec(any::<u8>(), 0..200), magic in any::<bool>()) {
+        let bytes = if magic { [b"hoid\x01\0\0\0".as_slice(), &bytes].concat() } else { bytes };
+        let status = restored(&bytes).err().map(|(status, _)| status);
+        prop_assert_eq!(status, Some(HOID_BAD_STATE));
+    }
+}

@@ -1,0 +1,271 @@
+//! The archive of a unit: its description, a library for each platform, its resources.
+
+use std::{
+    io::{Cursor, Write as _},
+    path::Path,
+};
+
+use zip::{CompressionMethod, DateTime, ZipWriter, result::ZipError, write::SimpleFileOptions};
+
+use super::{
+    description::{FmiVersion, MODEL, description},
+    settings::{FMU_SETTINGS, FmuSettings},
+};
+use crate::{IoError, read_bytes, write_atomically};
+
+/// A shared library for one platform.
+pub struct Library {
+    bytes: Vec<u8>,
+    platform: Platform,
+}
+
+/// What a shared library runs on: names of the folders, ending.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Platform {
+    in_two: &'static str,
+    in_three: &'static str,
+    ending: &'static str,
+}
+
+/// First bytes of ELF, place and values of the machine.
+const ELF: &[u8] = b"\x7fELF\x02\x01";
+const LINUX: [(u16, Platform); 2] = [
+    (
+        62,
+        Platform {
+            in_two: "linux64",
+            in_three: "x86_64-linux",
+            ending: "so",
+        },
+    ),
+    (
+        183,
+        Platform {
+            in_two: "aarch64-linux",
+            in_three: "aarch64-linux",
+            ending: "so",
+        },
+    ),
+];
+const WINDOWS: Platform = Platform {
+    in_two: "win64",
+    in_three: "x86_64-windows",
+    ending: "dll",
+};
+const MACHINE_OF_WINDOWS: u16 = 0x8664;
+/// Mach-O of 64 bits and its machines.
+const MACH_O: &[u8] = b"\xcf\xfa\xed\xfe";
+const MAC: [(u32, Platform); 2] = [
+    (
+        0x0100_0007,
+        Platform {
+            in_two: "darwin64",
+            in_three: "x86_64-darwin",
+            ending: "dylib",
+        },
+    ),
+    (
+        0x0100_000c,
+        Platform {
+            in_two: "aarch64-darwin",
+            in_three: "aarch64-darwin",
+            ending: "dylib",
+        },
+    ),
+];
+
+fn two_bytes(bytes: &[u8], at: usize) -> Option<u16> {
+    let found = bytes.get(at..at.checked_add(2)?)?;
+    Some(u16::from_le_bytes(found.try_into().ok()?))
+}
+
+fn four_bytes(bytes: &[u8], at: usize) -> Option<u32> {
+    let found = bytes.get(at..at.checked_add(4)?)?;
+    Some(u32::from_le_bytes(found.try_into().ok()?))
+}
+
+impl Platform {
+    /// By the head of a shared library: ELF, PE or Mach-O.
+    fn of(bytes: &[u8]) -> Option<Self> {
+        if bytes.starts_with(ELF) {
+            let machine = two_bytes(bytes, 18)?;
+            return LINUX.into_iter().find(|(known, _)| *known == machine).map(|(_, p)| p);
+        }
+        if bytes.starts_with(MACH_O) {
+            let machine = four_bytes(bytes, 4)?;
+            return MAC.into_iter().find(|(known, _)| *known == machine).map(|(_, p)| p);
+        }
+        let head = four_bytes(bytes, 0x3c).filter(|_| bytes.starts_with(b"MZ"))? as usize;
+        let is_one = bytes.get(head..head.checked_add(4)?)? == b"PE\0\0";
+        (is_one && two_bytes(bytes, head + 4)? == MACHINE_OF_WINDOWS).then_some(WINDOWS)
+    }
+}
+
+impl Library {
+    /// Reads a library; its platform is that of its head.
+    ///
+    /// # Errors
+    /// [`IoError::Unreadable`]; [`IoError::NoLibrary`] for what is no shared library of a known platform.
+    pub fn read(path: &Path) -> Result<Self, IoError> {
+        let bytes = read_bytes(path)?;
+        let platform = Platform::of(&bytes).ok_or_else(|| IoError::NoLibrary {
+            file: path.display().to_string(),
+        })?;
+        Ok(Self { bytes, platform })
+    }
+}
+
+/// Writes a unit whose sample time is `step_s`. The same parts give the same bytes.
+///
+/// # Errors
+/// Those of files; [`IoError::NoLibrary`] for settings that contradict themselves, or two libraries of one
+/// platform.
+pub fn write_fmu(
+    path: &Path,
+    version: FmiVersion,
+    settings: &FmuSettings,
+    libraries: &[Library],
+    step_s: f64,
+) -> Result<(), IoError> {
+    let unwritable = |source: std::io::Error| IoError::Unwritable {
+        file: path.display().to_string(),
+        source,
+    };
+    let wrong = |reason: String| unwritable(std::io::Error::other(reason));
+    let kind = settings.kind().map_err(wrong)?;
+    let variables = settings.variables().map_err(wrong)?;
+    let xml = description(version, kind, &variables, step_s);
+    let text = settings.text();
+    let mut parts: Vec<(String, &[u8])> = vec![
+        ("modelDescription.xml".to_owned(), xml.as_bytes()),
+        (format!("resources/{FMU_SETTINGS}"), text.as_bytes()),
+    ];
+    for library in libraries {
+        let platform = library.platform;
+        let folder = match version {
+            FmiVersion::Two => platform.in_two,
+            FmiVersion::Three => platform.in_three,
+        };
+        let name = format!("binaries/{folder}/{MODEL}.{}", platform.ending);
+        if parts.iter().any(|(other, _)| *other == name) {
+            return Err(wrong(format!(
+                "two libraries are for {folder}; give one of each platform"
+            )));
+        }
+        parts.push((name, &library.bytes));
+    }
+    let packed = packed(&parts).map_err(|error| wrong(error.to_string()))?;
+    write_atomically(path, |file| file.write_all(&packed))
+}
+
+fn packed(parts: &[(String, &[u8])]) -> Result<Vec<u8>, ZipError> {
+    let options = SimpleFileOptions::default()
+        .compression_method(CompressionMethod::Deflated)
+        .last_modified_time(DateTime::default())
+        .unix_permissions(0o755);
+    let mut archive = ZipWriter::new(Cursor::new(Vec::new()));
+    for (name, bytes) in parts {
+        archive.start_file(name.as_str(), options)?;
+        archive.write_all(bytes)?;
+    }
+    Ok(archive.finish()?.into_inner())
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use std::{fs, io::Read as _};
+
+    use zip::ZipArchive;
+
+    use super::*;
+    use crate::fmu::FmuKind;
+
+    /// Heads as the systems write them.
+    fn heads() -> [(Vec<u8>, &'static str, &'static str); 5] {
+        let elf = |machine: u16| {
+            let mut bytes = vec![0; 64];
+            bytes[..6].copy_from_slice(ELF);
+            bytes[18..20].copy_from_slice(&machine.to_le_bytes());
+            bytes
+        };
+        let mac = |machine: u32| [MACH_O, &machine.to_le_bytes()].concat();
+        let mut windows = vec![0; 0x100];
+        windows[..2].copy_from_slice(b"MZ");
+        windows[0x3c] = 0x80;
+        windows[0x80..0x86].copy_from_slice(b"PE\0\0\x64\x86");
+        [
+            (elf(62), "linux64/hoid.so", "x86_64-linux/hoid.so"),
+            (elf(183), "aarch64-linux/hoid.so", "aarch64-linux/hoid.so"),
+            (windows, "win64/hoid.dll", "x86_64-windows/hoid.dll"),
+            (mac(0x0100_0007), "darwin64/hoid.dylib", "x86_64-darwin/hoid.dylib"),
+            (
+                mac(0x0100_000c),
+                "aarch64-darwin/hoid.dylib",
+                "aarch64-darwin/hoid.dylib",
+            ),
+        ]
+    }
+
+    #[test]
+    fn each_library_lies_where_its_platform_looks() {
+        let folder = tempfile::tempdir().unwrap();
+        let files: Vec<_> = (heads().into_iter().enumerate())
+            .map(|(i, (bytes, ..))| {
+                let path = folder.path().join(format!("{i}"));
+                fs::write(&path, bytes).unwrap();
+                path
+            })
+            .collect();
+        let read = || {
+            files
+                .iter()
+                .map(|path| Library::read(path).unwrap())
+                .collect::<Vec<_>>()
+        };
+        for version in FmiVersion::ALL {
+            let path = folder.path().join("a.fmu");
+            let settings = FmuSettings::new(FmuKind::Tracker);
+            write_fmu(&path, version, &settings, &read(), 0.01).unwrap();
+            let written = fs::read(&path).unwrap();
+            let mut archive = ZipArchive::new(Cursor::new(&written)).unwrap();
+            for (bytes, in_two, in_three) in heads() {
+                let place = if version == FmiVersion::Two { in_two } else { in_three };
+                let mut found = Vec::new();
+                let mut file = archive.by_name(&format!("binaries/{place}")).unwrap();
+                file.read_to_end(&mut found).unwrap();
+                assert_eq!(found, bytes, "{place}");
+            }
+            for name in ["modelDescription.xml", "resources/hoid.json"] {
+                assert!(archive.by_name(name).is_ok(), "{name}");
+            }
+            write_fmu(&path, version, &settings, &read(), 0.01).unwrap();
+            assert_eq!(fs::read(&path).unwrap(), written, "the same parts, the same bytes");
+            let mut twice = read();
+            twice.push(Library::read(&files[0]).unwrap());
+            let refused = write_fmu(&path, version, &settings, &twice, 0.01)
+                .unwrap_err()
+                .to_string();
+            assert!(refused.contains("two libraries"), "{refused}");
+        }
+    }
+
+    #[test]
+    fn what_is_no_library_is_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a");
+        for (bytes, ..) in heads() {
+            for length in 0..bytes.len().min(0x86) {
+                assert!(Platform::of(&bytes[..length]).is_none() || length >= 8, "{length}");
+            }
+        }
+        let mut far = vec![0xff_u8; 0x40];
+        far[..2].copy_from_slice(b"MZ");
+        for wrong in [b"text".as_slice(), b"", &far] {
+            fs::write(&path, wrong).unwrap();
+            let refused = Library::read(&path).err().unwrap().to_string();
+            assert!(refused.contains("cargo xtask ffi"), "{refused}");
+        }
+        assert!(Library::read(&folder.path().join("nowhere")).is_err());
+    }
+}

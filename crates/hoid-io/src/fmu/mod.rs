@@ -1,0 +1,24 @@
+//! Functional mock-up units: an archive with a description in XML, a shared library and what it
+//! reads when it starts.
+//!
+//! *Functional Mock-up Interface for Model Exchange and Co-Simulation*, version 2.0.4 (Modelica
+//! Association, 2022), and *Functional Mock-up Interface Specification*, version 3.0.1 (2023). The
+//! library is that of `hoid-ffi`; what it and the description have to agree on stands here, the
+//! variables ([`FmuKind::variables`]), whose value references are their places, and the token.
+//!
+//! | file | what it holds |
+//! |---|---|
+//! | `variables` | the variables of a unit |
+//! | `settings` | what the library reads when it starts |
+//! | `description` | `modelDescription.xml` |
+//! | `archive` | the archive, with a library for each platform |
+
+mod archive;
+mod description;
+mod settings;
+mod variables;
+
+pub use archive::{Library, write_fmu};
+pub use description::FmiVersion;
+pub use settings::{FMU_SETTINGS, FmuSettings};
+pub use variables::{FmuKind, FmuStart, FmuVariable, Role};

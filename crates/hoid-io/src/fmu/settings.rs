@@ -1,0 +1,151 @@
+//! What the library of a unit reads when it starts, from the resources of the unit.
+
+use std::collections::BTreeMap;
+
+use hoid_model::NamedChoice;
+use serde::{Deserialize, Serialize};
+
+use super::variables::{FmuKind, FmuStart, FmuVariable, Role};
+
+/// Name of the file among the resources.
+pub const FMU_SETTINGS: &str = "hoid.json";
+
+/// What a unit is.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct FmuSettings {
+    kind: String,
+    /// Parameters that start with other values than usual.
+    #[serde(default)]
+    parameters: BTreeMap<String, Given>,
+    /// Text of the scenario file of an operator.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub scenario: Option<String>,
+    /// A fit as `hoid identify --json` prints it, which a tracker begins with.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub fit: Option<String>,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(untagged)]
+enum Given {
+    Boolean(bool),
+    Integer(i32),
+    Real(f64),
+    Text(String),
+}
+
+impl FmuSettings {
+    /// A unit with its usual parameters.
+    pub fn new(kind: FmuKind) -> Self {
+        Self {
+            kind: kind.name().to_owned(),
+            parameters: BTreeMap::new(),
+            scenario: None,
+            fit: None,
+        }
+    }
+
+    /// With the text of the scenario file of an operator.
+    pub fn with_scenario(self, text: String) -> Self {
+        Self {
+            scenario: Some(text),
+            ..self
+        }
+    }
+
+    /// With the text of a fit, which a tracker begins with.
+    pub fn with_fit(self, text: String) -> Self {
+        Self {
+            fit: Some(text),
+            ..self
+        }
+    }
+
+    /// With another start of a parameter.
+    pub fn with(mut self, parameter: &str, start: FmuStart) -> Self {
+        let given = match start {
+            FmuStart::Real(value) => Given::Real(value),
+            FmuStart::Integer(value) => Given::Integer(value),
+            FmuStart::Boolean(value) => Given::Boolean(value),
+            FmuStart::Text(text) => Given::Text(text),
+        };
+        self.parameters.insert(parameter.to_owned(), given);
+        self
+    }
+
+    /// From the text of the file.
+    ///
+    /// # Errors
+    /// What is wrong with it, in words.
+    pub fn parse(text: &str) -> Result<Self, String> {
+        let settings: Self = serde_json::from_str(text).map_err(|error| format!("{FMU_SETTINGS}: {error}"))?;
+        settings.kind()?;
+        Ok(settings)
+    }
+
+    /// The text of the file.
+    pub fn text(&self) -> String {
+        let mut text = serde_json::to_string_pretty(self).unwrap_or_default();
+        text.push('\n');
+        text
+    }
+
+    /// What the unit does.
+    ///
+    /// # Errors
+    /// For a kind that is none.
+    pub fn kind(&self) -> Result<FmuKind, String> {
+        FmuKind::of_name(&self.kind).map_err(|error| format!("{FMU_SETTINGS}: {error}"))
+    }
+
+    /// The variables, with the starts of this unit.
+    ///
+    /// # Errors
+    /// For a parameter that the unit does not have, or one of another type.
+    pub fn variables(&self) -> Result<Vec<FmuVariable>, String> {
+        let mut all = self.kind()?.variables();
+        for (name, given) in &self.parameters {
+            let parameter = (all.iter_mut())
+                .find(|variable| variable.role == Role::Parameter && variable.name == name)
+                .ok_or_else(|| format!("{FMU_SETTINGS}: the unit has no parameter {name}"))?;
+            parameter.start = match (&parameter.start, given) {
+                (FmuStart::Real(_), Given::Real(value)) => FmuStart::Real(*value),
+                (FmuStart::Real(_), Given::Integer(value)) => FmuStart::Real(f64::from(*value)),
+                (FmuStart::Integer(_), Given::Integer(value)) => FmuStart::Integer(*value),
+                (FmuStart::Boolean(_), Given::Boolean(value)) => FmuStart::Boolean(*value),
+                (FmuStart::Text(_), Given::Text(text)) => FmuStart::Text(text.clone()),
+                _ => return Err(format!("{FMU_SETTINGS}: the parameter {name} is of another type")),
+            };
+        }
+        Ok(all)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    #[test]
+    fn settings_come_back_from_their_text() {
+        let settings = FmuSettings::new(FmuKind::Tracker)
+            .with_fit("{}".to_owned())
+            .with("sample_time", FmuStart::Real(0.02))
+            .with("method", FmuStart::Text("adaptive".to_owned()));
+        let back = FmuSettings::parse(&settings.text()).unwrap();
+        assert_eq!(back.variables().unwrap()[0].start, FmuStart::Real(0.02));
+        assert_eq!(back, settings);
+        // A whole number of seconds is a number too.
+        let whole = settings.clone().with("sample_time", FmuStart::Integer(1));
+        assert_eq!(whole.variables().unwrap()[0].start, FmuStart::Real(1.0));
+        for wrong in [
+            settings.clone().with("colour", FmuStart::Real(1.0)),
+            settings.with("method", FmuStart::Real(1.0)),
+        ] {
+            assert!(wrong.variables().is_err());
+        }
+        for wrong in ["", "{}", "{\"kind\": \"cat\"}"] {
+            assert!(FmuSettings::parse(wrong).unwrap_err().contains(FMU_SETTINGS), "{wrong}");
+        }
+    }
+}

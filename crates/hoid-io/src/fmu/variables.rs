@@ -1,0 +1,220 @@
+//! The variables of a unit.
+
+/// What a unit does.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FmuKind {
+    /// Estimates a person from e and u.
+    Tracker,
+    /// Controls as the operator of a scenario does.
+    Operator,
+}
+
+hoid_model::named_choice!(FmuKind, "kind of unit", 2, {
+    Tracker => "tracker",
+    Operator => "operator",
+});
+
+/// What a variable is for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Role {
+    /// Set before the start.
+    Parameter,
+    /// Set at every sample.
+    Input,
+    /// Told at every sample.
+    Output,
+}
+
+/// Type of a variable, with its value at the start; that of an output is what it is before the first
+/// sample.
+#[derive(Debug, Clone, PartialEq)]
+pub enum FmuStart {
+    /// A number.
+    Real(f64),
+    /// A count or a choice.
+    Integer(i32),
+    /// Yes or no.
+    Boolean(bool),
+    /// A text.
+    Text(String),
+}
+
+/// A variable; its value reference is its place in the list.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FmuVariable {
+    /// Its name.
+    pub name: &'static str,
+    /// Its unit, empty for none.
+    pub unit: &'static str,
+    /// What it is for.
+    pub role: Role,
+    /// Type and start.
+    pub start: FmuStart,
+    /// One line.
+    pub help: &'static str,
+}
+
+fn variable(role: Role, name: &'static str, unit: &'static str, start: FmuStart, help: &'static str) -> FmuVariable {
+    FmuVariable {
+        name,
+        unit,
+        role,
+        start,
+        help,
+    }
+}
+
+impl FmuKind {
+    /// The variables, in the order of their value references: parameters, inputs, outputs.
+    pub fn variables(self) -> Vec<FmuVariable> {
+        match self {
+            Self::Tracker => tracker(),
+            Self::Operator => operator(),
+        }
+    }
+}
+
+fn tracker() -> Vec<FmuVariable> {
+    use FmuStart::{Boolean, Integer, Real, Text};
+    let parameter = |name, unit, start, help| variable(Role::Parameter, name, unit, start, help);
+    let input = |name, help| variable(Role::Input, name, "", Real(0.0), help);
+    let output = |name, unit, start, help| variable(Role::Output, name, unit, start, help);
+    let text = |text: &str| Text(text.to_owned());
+    let mut all = vec![
+        parameter(
+            "sample_time",
+            "s",
+            Real(0.01),
+            "sample time; steps may be shorter, not longer",
+        ),
+        parameter("method", "", text("population"), "recursive method, as of hoid track"),
+        parameter(
+            "prior",
+            "",
+            text("population"),
+            "population, none, names with values, or the file of a fit",
+        ),
+        parameter(
+            "controlled_element",
+            "",
+            text(""),
+            "what the person controls, as 90/(s(s+6)); empty for none",
+        ),
+        parameter(
+            "options",
+            "",
+            text(""),
+            "further options in JSON, by the keywords of pyhoid.Tracker",
+        ),
+        parameter("with_excitation", "", Boolean(false), "true where f_t is connected"),
+        input("e", "tracking error"),
+        input("u", "control output of the person"),
+        input("f_t", "excitation: target or disturbance"),
+    ];
+    for [(name, unit, help), (error, _, error_help)] in [
+        [("K_e", "", "gain"), ("K_e_se", "", "its standard error")],
+        [("T_L", "s", "lead time"), ("T_L_se", "s", "its standard error")],
+        [
+            ("K_e_dot", "s", "gain of the rate"),
+            ("K_e_dot_se", "s", "its standard error"),
+        ],
+        [
+            ("omega_nm", "rad/s", "natural frequency of the neuromuscular system"),
+            ("omega_nm_se", "rad/s", "its standard error"),
+        ],
+        [("zeta_nm", "", "its damping"), ("zeta_nm_se", "", "its standard error")],
+        [("tau_e", "s", "delay"), ("tau_e_se", "s", "its standard error")],
+        [
+            (
+                "crossover_rad_s",
+                "rad/s",
+                "crossover frequency with the controlled element",
+            ),
+            ("crossover_rad_s_se", "rad/s", "its standard error"),
+        ],
+        [
+            ("phase_margin_deg", "deg", "phase margin with the controlled element"),
+            ("phase_margin_deg_se", "deg", "its standard error"),
+        ],
+    ] {
+        all.push(output(name, unit, Real(f64::NAN), help));
+        all.push(output(error, unit, Real(f64::NAN), error_help));
+    }
+    for name in [
+        "K_e_determined",
+        "T_L_determined",
+        "K_e_dot_determined",
+        "omega_nm_determined",
+        "zeta_nm_determined",
+        "tau_e_determined",
+    ] {
+        all.push(output(name, "", Boolean(false), "true where the data determine it"));
+    }
+    all.extend([
+        output("innovation", "", Real(f64::NAN), "a-priori innovation"),
+        output(
+            "change_log_odds",
+            "",
+            Real(f64::NAN),
+            "logarithm of the odds of a change within the last seconds",
+        ),
+        output(
+            "change_t",
+            "s",
+            Real(f64::NAN),
+            "when the person changed last, as declared",
+        ),
+        output("changes", "", Integer(0), "changes that were declared"),
+        output("level", "", Integer(2), "0 trustworthy, 1 doubtful, 2 not determined"),
+        output("ready", "", Boolean(false), "true once there is an estimate"),
+        output("samples", "", Integer(0), "samples taken"),
+        output("skipped", "", Integer(0), "samples with a fault in e or u"),
+        output("held", "", Integer(0), "samples that the guard held back"),
+        output(
+            "restarts",
+            "",
+            Integer(0),
+            "how often the guard began the estimate again",
+        ),
+    ]);
+    all
+}
+
+fn operator() -> Vec<FmuVariable> {
+    use FmuStart::{Integer, Real};
+    vec![
+        variable(Role::Parameter, "seed", "", Integer(0), "seed of the remnant"),
+        variable(
+            Role::Parameter,
+            "replication",
+            "",
+            Integer(0),
+            "another run with the same seed",
+        ),
+        variable(Role::Input, "e", "deg", Real(0.0), "tracking error"),
+        variable(Role::Output, "u", "deg", Real(0.0), "control output"),
+        variable(Role::Output, "n", "deg", Real(0.0), "remnant in it"),
+    ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_are_unique_and_in_the_order_of_roles() {
+        for kind in FmuKind::ALL {
+            let all = kind.variables();
+            let roles: Vec<u8> = all.iter().map(|v| v.role as u8).collect();
+            assert!(roles.is_sorted(), "{kind}");
+            for (i, variable) in all.iter().enumerate() {
+                assert!(
+                    all[..i].iter().all(|other| other.name != variable.name),
+                    "{}",
+                    variable.name
+                );
+                assert!(!variable.help.is_empty());
+            }
+        }
+    }
+}

@@ -1,0 +1,161 @@
+//! The operator of a scenario alone, a sample at a time: for a loop that is closed elsewhere.
+//!
+//! What [`Simulator`] does of `u = y(k - tau_e/Ts) + n`, with the same random numbers: a loop that
+//! answers u as its controlled element does gives the same run to the last bit. The control of a
+//! sample does not hang on the error of the same sample, for the operator's response holds e over a
+//! sample first.
+
+use crate::{RunSeed, Simulator, cascade::MOST};
+
+/// An operator that is at work.
+#[derive(Debug, Clone)]
+pub struct OperatorRun {
+    simulator: Simulator,
+    run: RunSeed,
+    /// White noise of the remnant, from the first sample of the run-in on.
+    noise: Vec<f64>,
+    operator: [f64; 2],
+    remnant: [f64; MOST],
+    /// The last responses, that of sample k in place k of a ring.
+    memory: Vec<f64>,
+    /// The sample that is next.
+    k: usize,
+}
+
+impl OperatorRun {
+    /// An operator at rest before the sample at `start_s`, in s from the start of the measurement.
+    /// What the run-in would have been before it is left out; its random numbers are passed over.
+    pub fn new(simulator: Simulator, run: RunSeed, start_s: f64) -> Self {
+        let scenario = simulator.scenario();
+        let after_run_in = (start_s / scenario.scenario().sample_time.s()).round() as isize;
+        let k = scenario.run_in_samples().saturating_add_signed(after_run_in);
+        let mut run = Self {
+            noise: run.white_noise(simulator.samples()),
+            run,
+            operator: [0.0; 2],
+            remnant: [0.0; MOST],
+            memory: vec![0.0; (simulator.longest_delay() + 1).next_power_of_two()],
+            k,
+            simulator,
+        };
+        run.respond();
+        run
+    }
+
+    /// The control u of the sample that is next, deg.
+    pub fn control(&self) -> f64 {
+        let m = self.matrices();
+        let response = self.memory[self.k.wrapping_sub(m.delay) & (self.memory.len() - 1)];
+        response + self.remnant()
+    }
+
+    /// The remnant n of the sample that is next, deg.
+    pub fn remnant(&self) -> f64 {
+        self.matrices().k_n * self.remnant[self.simulator.cascade.order() - 1]
+    }
+
+    /// Takes the error e of the sample, deg: the next one is one sample later.
+    pub fn take(&mut self, e: f64) {
+        self.operator = self.matrices().operator.step(self.operator, e);
+        let white = self.white();
+        self.remnant = match self.simulator.cascade.order() {
+            1 => self.filtered::<1>(white),
+            2 => self.filtered::<2>(white),
+            3 => self.filtered::<3>(white),
+            _ => self.filtered::<MOST>(white),
+        };
+        self.k += 1;
+        self.respond();
+    }
+
+    /// What stands in the ring for the sample that is next.
+    fn respond(&mut self) {
+        let [of_output, of_rate] = self.matrices().operator_output;
+        let last = self.memory.len() - 1;
+        self.memory[self.k & last] = of_output * self.operator[0] + of_rate * self.operator[1];
+    }
+
+    fn matrices(&self) -> crate::simulator::Matrices {
+        let all = &self.simulator.matrices;
+        all[self.k.min(all.len() - 1)]
+    }
+
+    /// The white noise of the sample that is next; behind the end of the scenario it goes on.
+    fn white(&mut self) -> f64 {
+        if self.k >= self.noise.len() {
+            self.noise = self.run.white_noise(2 * self.k + 1);
+        }
+        self.noise[self.k]
+    }
+
+    fn filtered<const M: usize>(&self, white: f64) -> [f64; MOST] {
+        let mut sections: [f64; M] = [0.0; M];
+        sections.copy_from_slice(&self.remnant[..M]);
+        let mut next = [0.0; MOST];
+        next[..M].copy_from_slice(&self.simulator.cascade.step(sections, white));
+        next
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use hoid_model::scenario::{Condition, Scenario};
+
+    use super::*;
+
+    /// Given the error of a run from its run-in on, the operator gives its control to the last bit, at
+    /// every order of the remnant and through a change of the task.
+    #[test]
+    fn the_operator_of_a_run_gives_its_control() {
+        for (condition, order) in [
+            (Condition::C1, 1),
+            (Condition::C4, 2),
+            (Condition::C6, 3),
+            (Condition::C4, 4),
+        ] {
+            let mut scenario = Scenario::condition(condition);
+            scenario.remnant.order = order;
+            let simulator = Simulator::new(&scenario).unwrap();
+            let seed = RunSeed {
+                seed: 5,
+                ..RunSeed::default()
+            };
+            let record = simulator.run(seed, true).unwrap();
+            let mut operator = OperatorRun::new(simulator, seed, record.time_s(0));
+            let remnant = record.channel("n").unwrap();
+            for (k, e) in record.input().iter().enumerate() {
+                assert_eq!(
+                    operator.control().to_bits(),
+                    record.output()[k].to_bits(),
+                    "{condition} {k}"
+                );
+                assert_eq!(operator.remnant().to_bits(), remnant[k].to_bits());
+                operator.take(*e);
+            }
+        }
+    }
+
+    #[test]
+    fn behind_its_end_a_scenario_goes_on() {
+        let mut scenario = Scenario::condition(Condition::C4);
+        let long = Simulator::new(&scenario).unwrap();
+        scenario.measurement_s = 1.0;
+        let short = Simulator::new(&scenario).unwrap();
+        let samples = short.samples() + 500;
+        let seed = RunSeed::default();
+        let mut of = [long, short].map(|simulator| {
+            let start_s = -(simulator.scenario().run_in_samples() as f64) * 0.01;
+            OperatorRun::new(simulator, seed, start_s)
+        });
+        for k in 0..samples {
+            let e = (0.1 * k as f64).sin();
+            // The task changes long after both.
+            assert!((of[0].control() - of[1].control()).abs() < 1e-3, "{k}");
+            of.iter_mut().for_each(|operator| operator.take(e));
+        }
+        // A start before the run-in is that of the run-in.
+        let simulator = Simulator::new(&scenario).unwrap();
+        assert_eq!(OperatorRun::new(simulator, seed, -1e9).k, 0);
+    }
+}

@@ -1,0 +1,203 @@
+"""Functional mock-up units in a simulator: the digits of the command line."""
+
+from __future__ import annotations
+
+import csv
+import math
+import os
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+fmpy = pytest.importorskip("fmpy")
+
+from fmpy.fmi2 import FMU2Slave  # noqa: E402
+from fmpy.fmi3 import FMU3Slave  # noqa: E402
+from fmpy.validation import validate_fmu  # noqa: E402
+
+ELEMENT = "90/(s(s+6))"
+STEP = 0.01
+
+
+@pytest.fixture(scope="module")
+def library(cli: Any) -> Path:
+    """The shared library of the same sources; `cargo xtask test` builds it beside the program."""
+    folder = Path(cli.binary).parent
+    names = ("libhoid_ffi.so", "libhoid_ffi.dylib", "hoid_ffi.dll")
+    built = [place / name for place in (folder, folder / "deps") for name in names]
+    there = [path for path in built if path.exists()]
+    if not there:
+        pytest.skip("no shared library: build it by cargo build -p hoid-ffi")
+    return max(there, key=lambda path: path.stat().st_mtime)
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory, cli: Any) -> Path:
+    """A run of 82 s in which the task changes."""
+    path = tmp_path_factory.mktemp("runs") / "c4.csv"
+    cli.run("simulate", "--condition", "C4", "--seed", 3, "--out", path)
+    return path
+
+
+def columns(path: Path) -> dict[str, list[float]]:
+    with path.open(newline="") as file:
+        rows = list(csv.DictReader(line for line in file if not line.startswith("#")))
+    return {
+        name: [float(row[name]) if row[name] else math.nan for row in rows] for name in rows[0]
+    }
+
+
+class Unit:
+    """A unit that is at work."""
+
+    def __init__(self, path: Path, start: float = 0.0, **parameters: Any) -> None:
+        self.said: list[str] = []
+        self.description = fmpy.read_model_description(path)
+        self.types = {v.name: v.type for v in self.description.modelVariables}
+        self.references = {v.name: v.valueReference for v in self.description.modelVariables}
+        folder = fmpy.extract(path)
+        self.two = self.description.fmiVersion == "2.0"
+        slave = FMU2Slave if self.two else FMU3Slave
+        self.unit = slave(
+            guid=self.description.guid,
+            unzipDirectory=folder,
+            modelIdentifier=self.description.coSimulation.modelIdentifier,
+            instanceName="tried",
+        )
+        self.unit.instantiate()
+        for name, value in parameters.items():
+            self.set(name, value)
+        if self.two:
+            self.unit.setupExperiment(startTime=start)
+            self.unit.enterInitializationMode()
+        else:
+            self.unit.enterInitializationMode(startTime=start)
+        self.unit.exitInitializationMode()
+
+    def _call(self, what: str, name: str, *values: Any) -> Any:
+        kind = self.types[name].replace("Real", "Real" if self.two else "Float64")
+        return getattr(self.unit, what + kind)([self.references[name]], *values)
+
+    def set(self, name: str, value: Any) -> None:
+        self._call("set", name, [value])
+
+    def get(self, name: str) -> Any:
+        return self._call("get", name)[0]
+
+    def numbers(self, names: list[str]) -> list[float]:
+        read = self.unit.getReal if self.two else self.unit.getFloat64
+        return [float(value) for value in read([self.references[name] for name in names])]
+
+    def step(self, t: float) -> None:
+        self.unit.doStep(currentCommunicationPoint=t, communicationStepSize=STEP)
+
+    def end(self) -> None:
+        self.unit.terminate()
+        self.unit.freeInstance()
+
+
+@pytest.fixture
+def empty_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    folder = tmp_path / "empty"
+    folder.mkdir()
+    monkeypatch.chdir(folder)
+    return folder
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_the_tracker_gives_the_digits_of_track(
+    cli: Any, library: Path, run: Path, empty_folder: Path, tmp_path: Path, fmi: int
+) -> None:
+    trace, unit = tmp_path / "trace.csv", tmp_path / "tracker.fmu"
+    cli.run("track", run, "--controlled-element", ELEMENT, "--out", trace)
+    cli.run(
+        *("fmu", "--out", unit, "--library", library, "--fmi", fmi),
+        *("--controlled-element", ELEMENT),
+    )
+    assert validate_fmu(str(unit)) == []
+    expected, record = columns(trace), columns(run)
+    variables = fmpy.read_model_description(unit).modelVariables
+    names = [
+        name
+        for name in expected
+        if name in {v.name for v in variables if v.type in ("Real", "Float64")} and name != "time"
+    ]
+    assert {"K_e", "K_e_se", "tau_e", "crossover_rad_s", "phase_margin_deg_se"} <= set(names)
+    tracker = Unit(unit)
+    for k, (e, u) in enumerate(zip(record["e"], record["u"], strict=True)):
+        tracker.set("e", e)
+        tracker.set("u", u)
+        tracker.step(k * STEP)
+        for name, found in zip(names, tracker.numbers(names), strict=True):
+            wanted = expected[name][k]
+            assert found == wanted or (math.isnan(found) and math.isnan(wanted)), (k, name)
+    assert tracker.get("ready") and tracker.get("samples") == len(record["e"])
+    tracker.end()
+    assert os.listdir(empty_folder) == []
+
+
+def test_a_simulator_takes_the_tracker(
+    cli: Any, library: Path, run: Path, empty_folder: Path, tmp_path: Path
+) -> None:
+    import numpy as np
+
+    unit = tmp_path / "tracker.fmu"
+    options = '{"nk": 29, "nd": 1, "warm_up": 20}'
+    cli.run("fmu", "--out", unit, "--library", library, "--method", "adaptive")
+    record = columns(run)
+    signals = np.array(
+        list(zip(record["t"], record["e"], record["u"], strict=True)),
+        dtype=[("time", float), ("e", float), ("u", float)],
+    )
+    result = fmpy.simulate_fmu(
+        str(unit),
+        stop_time=len(signals) * STEP,
+        output_interval=STEP,
+        input=signals,
+        start_values={"options": options},
+        output=["K_e_dot", "change_t", "changes", "level"],
+    )
+    # The task changes at 40.96 s.
+    assert result["changes"][-1] >= 1
+    assert 39.0 < result["change_t"][-1] < 43.0
+    assert abs(result["K_e_dot"][-1] - 0.084) < 0.03
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_the_operator_gives_the_digits_of_simulate(
+    cli: Any, library: Path, empty_folder: Path, tmp_path: Path, fmi: int
+) -> None:
+    run, unit = tmp_path / "run.csv", tmp_path / "person.fmu"
+    cli.run("simulate", "--condition", "C4", "--seed", 3, "--keep-run-in", "--out", run)
+    cli.run(
+        "fmu", "--out", unit, "--library", library, "--operator", "C4", "--seed", 3, "--fmi", fmi
+    )
+    assert validate_fmu(str(unit)) == []
+    record = columns(run)
+    start = record["t"][0]
+    person = Unit(unit, start)
+    for k, (e, u, n) in enumerate(zip(record["e"], record["u"], record["n"], strict=True)):
+        assert person.numbers(["u", "n"]) == [u, n], k
+        person.set("e", e)
+        person.step(start + k * STEP)
+    person.end()
+    other = Unit(unit, start, seed=4)
+    for k in range(50):
+        other.set("e", 0.0)
+        other.step(start + k * STEP)
+    assert other.get("u") != record["u"][50]
+    other.end()
+
+
+def test_what_cannot_run_says_why(
+    cli: Any, library: Path, empty_folder: Path, tmp_path: Path
+) -> None:
+    unit = tmp_path / "tracker.fmu"
+    cli.run("fmu", "--out", unit, "--library", library)
+    with pytest.raises(Exception, match="fmi2ExitInitializationMode"):
+        Unit(unit, method="kalman")
+    tracker = Unit(unit, sample_time=0.001)
+    with pytest.raises(Exception, match="fmi2DoStep"):
+        tracker.step(0.0)
+    tracker.end()
