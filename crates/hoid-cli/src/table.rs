@@ -1,7 +1,8 @@
 //! Tables for people: three rules, as in print, and as wide as the screen.
 //!
 //! On a narrow screen cells are wrapped between words, never within a word or a number with its
-//! error. A table that is too wide even so becomes a list for each row.
+//! error. A table that is too wide even so becomes a list for each row, and a course of values a table
+//! on its side, with as many of its times as there is room for.
 
 use std::fmt;
 
@@ -28,6 +29,8 @@ const FIXED_BLANK: &str = "\u{a0}";
 pub struct Rows {
     header: Vec<String>,
     rows: Vec<Vec<String>>,
+    /// True where rows are instants of one course.
+    course: bool,
 }
 
 impl Rows {
@@ -35,7 +38,13 @@ impl Rows {
         Self {
             header: header.iter().map(|&name| name.to_owned()).collect(),
             rows: Vec::new(),
+            course: false,
         }
+    }
+
+    /// Rows of which some may be left out for want of room, but not the last.
+    pub fn as_course(self) -> Self {
+        Self { course: true, ..self }
     }
 
     pub fn add_row<T: Into<String>>(&mut self, cells: impl IntoIterator<Item = T>) {
@@ -53,8 +62,32 @@ impl Rows {
         let blanks = least.len() * PADDING + least.len().saturating_sub(1) * BETWEEN;
         match least.iter().sum::<usize>() + blanks <= width {
             true => self.drawn(Some((width, &least))),
-            false => self.as_lists(),
+            false => self.on_its_side(width).unwrap_or_else(|| self.as_lists()),
         }
+    }
+
+    /// A course with its times above and its names before, for a narrow screen; none where not even the
+    /// last fits.
+    fn on_its_side(&self, width: usize) -> Option<String> {
+        let last = self.rows.len().checked_sub(1).filter(|_| self.course)?;
+        (1..=self.rows.len()).rev().find_map(|count| {
+            let picked: Vec<usize> = match count {
+                1 => vec![last],
+                _ => (0..count).map(|i| last * i / (count - 1)).collect(),
+            };
+            let cell = |row: &usize, k: usize| self.rows[*row].get(k).cloned().unwrap_or_default();
+            let line = |k: usize| -> Vec<String> {
+                let values = picked.iter().map(|row| cell(row, k));
+                std::iter::once(self.header[k].clone()).chain(values).collect()
+            };
+            let turned = Self {
+                header: line(0),
+                rows: (1..self.header.len()).map(line).collect(),
+                course: false,
+            };
+            let drawn = turned.drawn(None);
+            drawn.lines().all(|l| l.chars().count() <= width).then_some(drawn)
+        })
     }
 
     fn drawn(&self, on: Option<(usize, &[usize])>) -> String {
@@ -129,6 +162,40 @@ mod tests {
         rows.add_row(["anna", "13.5 ± 1.9", "at the end of its range"]);
         rows.add_row(["bert", "7 ± 19", ""]);
         rows
+    }
+
+    #[test]
+    fn a_course_turns_on_its_side_and_keeps_its_end() {
+        let names = [
+            "K_e",
+            "T_L (s)",
+            "K_e_dot (s)",
+            "omega_nm (rad/s)",
+            "zeta_nm",
+            "tau_e (s)",
+        ];
+        let mut course = Rows::under(&[&["t in s"], names.as_slice()].concat()).as_course();
+        for t in 1..9 {
+            let values = names.iter().map(|_| "0.0914 ± 0.0062".to_owned());
+            course.add_row(std::iter::once(format!("{t}.00")).chain(values));
+        }
+        let times = |width| {
+            let drawn = course.on(Some(width));
+            assert_eq!(drawn.lines().count(), 10, "{drawn}");
+            assert!(drawn.lines().all(|l| l.chars().count() <= width), "{drawn}");
+            drawn
+                .lines()
+                .nth(1)
+                .unwrap_or_default()
+                .split_whitespace()
+                .skip(3)
+                .map(str::to_owned)
+                .collect::<Vec<_>>()
+        };
+        assert_eq!(times(80), ["1.00", "4.00", "8.00"]);
+        assert_eq!(times(60), ["1.00", "8.00"]);
+        assert_eq!(times(40), ["8.00"]);
+        assert!(course.on(Some(30)).starts_with("1.00"));
     }
 
     #[test]
