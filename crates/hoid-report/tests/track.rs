@@ -126,7 +126,7 @@ fn three_methods_over_each_other_show_all_that_is_asked_for() {
     }
     let operator = figure(&html, "operator");
     assert!(operator.contains(">truth<") && operator.contains(">batch fit<"));
-    assert!(html.contains("Black dashes: the truth") && html.contains("Dots in colour: batch fits"));
+    assert!(html.contains("Dashed: the truth") && html.contains("Dots in colour: batch fits"));
     assert!(html.contains("Shaded") && html.contains("Upright dots"));
     assert!(
         figure(&html, "coefficients").contains(", f</tspan><tspan"),
@@ -190,7 +190,7 @@ fn a_recording_has_no_truth() {
     check_page(&html);
     assert!(!html.contains("<b>") && !html.contains("<deg>"));
     assert!(!html.contains(">truth<") && !html.contains("Relative error"));
-    assert!(!html.contains("dashes") && !html.contains("Dots in colour"));
+    assert!(!html.contains("Dashed") && !html.contains("dashes") && !html.contains("Dots in colour"));
     // Only the operator's own parameters move, so that their errors are shown.
     assert!(html.contains("Standard errors of the parameters of the operator"));
 }

@@ -67,13 +67,14 @@ pub fn run(mut stream: TcpStream, key: &str, lab: &Lab) {
             let told = serde_json::to_string(&words).map(|text| socket.send(Message::text(text)));
             // A page that does not keep to the rules is not of this program.
             if matches!(error, LabError::Message(_)) || !matches!(told, Ok(Ok(()))) {
-                let _ = socket.close(None);
-                let _ = socket.flush();
                 break;
             }
         }
     }
+    // First: a page that sees its connection closed, and comes back, finds its run ended.
     lab.leave(id);
+    let _ = socket.close(None);
+    let _ = socket.flush();
 }
 
 fn heard(lab: &Lab, id: u64, text: &str) -> Result<(), LabError> {

@@ -193,7 +193,7 @@ impl CurveGrid {
             }
         }
         // The truth stands last, so that the levels of a method stay in one row.
-        entries.sort_by_key(|entry| entry.sample == Sample::Dashed);
+        entries.sort_by_key(|entry| entry.sample == Sample::Dashed && entry.colour == BLACK);
         entries
     }
 
