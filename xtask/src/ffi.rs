@@ -25,6 +25,16 @@ const SYSTEM_LIBRARIES: &str = if cfg!(target_os = "linux") {
     ""
 };
 
+const EXAMPLES: [&str; 7] = [
+    "tracker.c",
+    "tracker.cpp",
+    "CMakeLists.txt",
+    "simulink/sfun_hoid.c",
+    "dueca/HoidTracker.cxx",
+    "dueca/PersonSample.dco",
+    "dueca/PersonEstimate.dco",
+];
+
 const USAGE: &str = "usage: cargo xtask ffi [--dev] [--out DIR] | --header | --check";
 
 /// Builds the libraries, makes the header, or checks that other tools find them.
@@ -96,7 +106,7 @@ fn build(profile: &str, out: &Path) -> Result<(), String> {
     write("lib/pkgconfig/hoid.pc", pkg_config(version))?;
     write("lib/cmake/hoid/hoid-config.cmake", cmake())?;
     write("lib/cmake/hoid/hoid-config-version.cmake", cmake_version(version))?;
-    for example in ["tracker.c", "tracker.cpp", "CMakeLists.txt"] {
+    for example in EXAMPLES {
         let to = out.join("share/hoid/examples").join(example);
         copy(&source().join("examples").join(example), &to)?;
     }

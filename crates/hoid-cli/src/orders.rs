@@ -39,10 +39,9 @@ pub enum DelayRange {
 impl DelayRange {
     /// nk of both ends: tau_e = (nk - 1) Ts.
     pub fn samples(&self, sample_time: SampleTime) -> RangeInclusive<usize> {
-        let nk = |delay_s: f64| (delay_s / sample_time.s()).round() as usize + 1;
         match self {
             Self::Samples(range) => range.clone(),
-            Self::Seconds(low, high) => nk(*low)..=nk(*high),
+            Self::Seconds(low, high) => sample_time.nk(*low)..=sample_time.nk(*high),
         }
     }
 }

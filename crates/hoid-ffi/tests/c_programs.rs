@@ -100,6 +100,35 @@ fn the_example_in_c_gives_the_digits_of_rust() {
     assert!(said.contains("after 8192 samples, 0 skipped"), "{said}");
 }
 
+/// Compiled with a stand-in of Simulink's header: Simulink itself is not here.
+#[test]
+fn the_s_function_gives_the_digits_of_rust() {
+    let stubs = format!("-I{}/tests/stubs", env!("CARGO_MANIFEST_DIR"));
+    let Some((_folder, program)) = built("simulink/sfun_hoid.c", "cc", &["-std=c11", &stubs]) else {
+        return;
+    };
+    let record = record();
+    let rows = expected(&record, &usual(&record));
+    let output = run(&program, &["population", "0.01", ""], &lines(&record));
+    same(&good(&output), &rows, &(0..17).collect::<Vec<_>>());
+    let refused = run(&program, &["kalman", "0.01", ""], "");
+    let said = String::from_utf8_lossy(&refused.stderr).into_owned();
+    assert!(!refused.status.success() && said.contains("population"), "{said}");
+}
+
+/// Compiled with a stand-in of DUECA's headers, likewise.
+#[test]
+fn the_dueca_module_gives_the_digits_of_rust() {
+    let stubs = format!("-I{}/tests/stubs/dueca", env!("CARGO_MANIFEST_DIR"));
+    let Some((_folder, program)) = built("../tests/stubs/dueca/drive.cpp", "c++", &["-std=c++14", &stubs]) else {
+        return;
+    };
+    let record = record();
+    let rows = expected(&record, &usual(&record));
+    let found = good(&run(&program, &[], &lines(&record)));
+    same(&found, &rows, &[0, 1, 2, 3, 6, 8, 10]);
+}
+
 #[test]
 fn a_change_is_told_in_c() {
     let Some((_folder, program)) = built("tracker.c", "cc", &["-std=c11"]) else {

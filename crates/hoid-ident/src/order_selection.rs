@@ -463,8 +463,7 @@ const CHI_SQUARE_95: f64 = 3.841_458_820_694_124;
 /// Delays of human operators, 0.05 to 0.6 s, in samples: the default range of nk.
 pub fn default_delay_range(sample_time: hoid_model::SampleTime) -> RangeInclusive<usize> {
     // tau_e = (nk - 1) Ts.
-    let samples = |delay_s: f64| (delay_s / sample_time.s()).round() as usize + 1;
-    samples(0.05)..=samples(0.6)
+    sample_time.nk(0.05)..=sample_time.nk(0.6)
 }
 
 /// The operator's orders with the defaults of the command line: nk searched, and nd over 1 to 4 for

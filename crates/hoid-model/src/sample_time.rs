@@ -29,6 +29,12 @@ impl SampleTime {
         }
     }
 
+    /// The nearest delay of b0 in samples, `nk = tau_e/Ts + 1`, for a delay tau_e in s; without end where
+    /// no number is as large.
+    pub fn nk(self, tau_e_s: f64) -> usize {
+        ((tau_e_s / self.0).round() as usize).saturating_add(1)
+    }
+
     /// Ts in s.
     pub fn s(self) -> f64 {
         self.0
@@ -75,5 +81,7 @@ mod tests {
         assert_eq!(ts.whole_samples(0.285), None);
         assert_eq!(ts.whole_samples(-0.01), None);
         assert_eq!(ts.whole_samples(f64::NAN), None);
+        assert_eq!((ts.nk(0.28), ts.nk(0.284), ts.nk(-1.0)), (29, 29, 1));
+        assert_eq!(SampleTime::new(1e-300).unwrap().nk(0.2), usize::MAX);
     }
 }

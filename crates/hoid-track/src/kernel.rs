@@ -129,7 +129,7 @@ impl<'a> Plan<'a> {
     /// Smallest delay in samples, where tau_e is tracked.
     fn smallest_nk(&self) -> Option<usize> {
         // Up to rounding: 0.29/0.01 is 28.999999999999996.
-        let whole = |low: f64| (low / self.sample_time.s() + 1e-9) as usize + 1;
+        let whole = |low: f64| ((low / self.sample_time.s() + 1e-9) as usize).saturating_add(1);
         self.setup.track_delay_s.map(|(low, _)| whole(low))
     }
 

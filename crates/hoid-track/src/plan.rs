@@ -111,7 +111,7 @@ impl TrackPlan {
 /// Ranges of a method that searches none: the orders that are usual, as near as the ranges allow.
 fn usual_ranges(method: &Method, ranges: &OrderRanges, sample_time: SampleTime) -> OrderRanges {
     let known = method.person_prior().and_then(PersonPrior::delay_s);
-    let nk = (known.unwrap_or(USUAL_DELAY_S) / sample_time.s()).round() as usize + 1;
+    let nk = sample_time.nk(known.unwrap_or(USUAL_DELAY_S));
     let usual = method.usual_orders(nk);
     let only = |usual: usize, range: &RangeInclusive<usize>| {
         let one = usual.clamp(*range.start(), (*range.end()).max(*range.start()));
@@ -189,8 +189,7 @@ fn narrowed(
     sample_time: SampleTime,
 ) -> OrderRanges {
     if let Some((low, high)) = track_delay_s {
-        let samples = |delay_s: f64| (delay_s.max(0.0) / sample_time.s()).round() as usize + 1;
-        ranges.nk = samples(low)..=samples(high);
+        ranges.nk = sample_time.nk(low)..=sample_time.nk(high);
     }
     if start_names.is_empty() {
         return ranges;

@@ -299,7 +299,7 @@ pub(crate) fn guard_of(
 ) -> Option<Box<Guard>> {
     let method = options.method.inner();
     let latest = method.track_delay_s().map_or(0.0, |(_, high)| high / sample_time.s());
-    let nk = options.orders.nk.max(latest.ceil() as usize + 1);
+    let nk = options.orders.nk.max((latest.ceil() as usize).saturating_add(1));
     if !method.is_guarded() {
         return None;
     }

@@ -6,6 +6,7 @@
 | `cargo run --release -p CRATE --example NAME -- ...` | the example, as the tests have compiled it |
 | `cargo xtask slow NAME ...` | its example, the same |
 | `cargo test -p CRATE ...` | with the features of the whole workspace, as the tests have compiled it |
+| `cargo xtask ffi --out DIR` | the same with the libraries of the tests |
 | `cargo xtask test` | nothing: that is what runs |
 """
 
@@ -28,6 +29,11 @@ def command(arguments: list[str]) -> list[str]:
         return [example(program, words[words.index("--example") + 1]), *rest]
     if words[:2] == ["xtask", "slow"]:
         return [example(program, words[2].replace("-", "_")), *words[3:]]
+    if words[:3] == ["xtask", "ffi", "--out"]:
+        out = str(Path(words[3]).absolute())
+        os.chdir(ROOT)
+        os.environ["CARGO_TARGET_DIR"] = target_folder(program)
+        return [real_cargo(), "xtask", "ffi", "--dev", "--out", out]
     if words[:2] == ["xtask", "test"]:
         return ["true"]
     if words[0] == "test":
@@ -38,10 +44,13 @@ def command(arguments: list[str]) -> list[str]:
             words.insert(2, "--lib")
         # Where the configuration of cargo is.
         os.chdir(ROOT)
-        folder = os.environ.get("CARGO_TARGET_DIR") or str(program.parents[1])
-        target = ["--target-dir", folder]
+        target = ["--target-dir", target_folder(program)]
         return [real_cargo(), words[0], *target, *words[1:]]
     sys.exit(f"cargo {' '.join(words)}: the tests of the book do not know this command")
+
+
+def target_folder(program: Path) -> str:
+    return os.environ.get("CARGO_TARGET_DIR") or str(program.parents[1])
 
 
 def example(program: Path, name: str) -> str:

@@ -234,10 +234,7 @@ pub(crate) fn check_model_of_change(name: &str, setup: &Setup) -> Result<(), Ide
 fn delays(setup: &Setup, sample_time: SampleTime) -> RangeInclusive<usize> {
     match setup.track_delay_s {
         None => setup.orders.nk..=setup.orders.nk,
-        Some((low, high)) => {
-            let nk = |delay_s: f64| (delay_s / sample_time.s()).round().max(0.0) as usize + 1;
-            nk(low)..=nk(high)
-        }
+        Some((low, high)) => sample_time.nk(low)..=sample_time.nk(high),
     }
 }
 

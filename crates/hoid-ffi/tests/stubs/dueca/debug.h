@@ -1,0 +1,5 @@
+// As dueca.h beside it: messages to standard error.
+#undef W_MOD
+#undef E_MOD
+#define W_MOD(A) (std::cerr << A << '\n')
+#define E_MOD(A) (std::cerr << A << '\n')
