@@ -129,8 +129,9 @@ impl RecursiveMethod for PopulationOptions {
 
     fn memory_in_words(&self) -> Option<String> {
         Some(format!(
-            "since the last change where nothing changes; a change is declared so that {} false alarms an hour are to be expected",
-            self.false_alarms
+            "since the last change where nothing changes; a change is declared so that {} false alarm{} an hour may be expected",
+            self.false_alarms,
+            if self.false_alarms == 1.0 { "" } else { "s" }
         ))
     }
 

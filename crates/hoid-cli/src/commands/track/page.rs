@@ -103,7 +103,7 @@ impl Tracked<'_> {
         } else {
             header.extend(trace.parameter_names().into_iter().take(COEFFICIENTS_SHOWN));
         }
-        let mut rows = text::table(&header.iter().map(String::as_str).collect::<Vec<_>>()).as_course();
+        let mut rows = text::table(&header.iter().map(String::as_str).collect::<Vec<_>>()).in_course();
         for row in picked {
             let mut cells = vec![format!("{:.2}", trace.times_s()[row])];
             if with_operator {
