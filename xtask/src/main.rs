@@ -9,6 +9,7 @@
 //! | `cargo xtask book` | the book in `docs/`, into `docs/book/` (needs mdbook) |
 //! | `cargo xtask lab` | that the page of `hoid lab` is what its sources build, and the page in a browser (module `lab`) |
 //! | `cargo xtask ffi [--dev] [--out DIR]` | the libraries for C with header, pkg-config file, CMake package and examples, into `target/ffi/`; `--header` makes the header anew, `--check` builds the examples by them (module `ffi`) |
+//! | `cargo xtask embedded` | the kernel for processors without an operating system (module `embedded`) |
 //! | `cargo xtask bench [OPTION...]` | the tasks of the page "Speed beside others" beside the peers that are installed, or how cost grows (module `bench`) |
 //! | `cargo xtask slow NAME [ARGUMENT...]` | a study that takes too long for a test: `people-coverage`, `faults`, `faults-clean`, `tracker-faults`, `mutations`, `kills`, `lab`, `challenge`, `challenge-people` |
 //!
@@ -18,6 +19,7 @@
 mod bench;
 mod counts;
 mod crates;
+mod embedded;
 mod ffi;
 mod lab;
 mod process;
@@ -31,7 +33,7 @@ use std::{
 use counts::Counts;
 use process::{cargo, cargo_command, each_line, run};
 
-const USAGE: &str = "usage: cargo xtask test [ARGUMENT...] | python [ARGUMENT...] | check | crates | book | lab | ffi [OPTION...] | bench [OPTION...] | slow NAME [ARGUMENT...]";
+const USAGE: &str = "usage: cargo xtask test [ARGUMENT...] | python [ARGUMENT...] | check | crates | book | lab | ffi [OPTION...] | embedded | bench [OPTION...] | slow NAME [ARGUMENT...]";
 
 fn main() -> ExitCode {
     let mut arguments = env::args().skip(1);
@@ -43,6 +45,7 @@ fn main() -> ExitCode {
         Some("book") => book(),
         Some("bench") => bench::bench(&arguments.collect::<Vec<_>>()),
         Some("lab") => lab::lab(),
+        Some("embedded") => embedded::embedded(),
         Some("ffi") => ffi::ffi(&arguments.collect::<Vec<_>>()),
         Some("slow") => slow(&arguments.collect::<Vec<_>>()),
         _ => Err(USAGE.to_owned()),
