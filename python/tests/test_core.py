@@ -390,7 +390,7 @@ def test_the_version_is_that_of_the_package() -> None:
 def test_figures_and_clusters_are_loaded_at_their_first_use() -> None:
     program = """
 import sys, pyhoid
-assert {"plots", "dask"} <= set(dir(pyhoid))
+assert {"plots", "dask", "lsl"} <= set(dir(pyhoid))
 assert not {"matplotlib", "pandas", "dask", "distributed"} & set(sys.modules)
 assert callable(pyhoid.plots.bode) and "matplotlib" in sys.modules
 assert callable(pyhoid.dask.study)

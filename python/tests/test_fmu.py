@@ -43,9 +43,7 @@ def run(tmp_path_factory: pytest.TempPathFactory, cli: Any) -> Path:
 def columns(path: Path) -> dict[str, list[float]]:
     with path.open(newline="") as file:
         rows = list(csv.DictReader(line for line in file if not line.startswith("#")))
-    return {
-        name: [float(row[name]) if row[name] else math.nan for row in rows] for name in rows[0]
-    }
+    return {name: [float(row[name]) if row[name] else math.nan for row in rows] for name in rows[0]}
 
 
 class Unit:

@@ -52,6 +52,7 @@ from .verdict import Verdict
 
 if TYPE_CHECKING:
     from . import dask as dask
+    from . import lsl as lsl
     from . import plots as plots
 
 __all__ = [
@@ -115,7 +116,7 @@ __all__ = [
 ]
 
 #: Modules that are imported at their first use, because of what they import themselves.
-_LAZY = ("dask", "plots")
+_LAZY = ("dask", "lsl", "plots")
 
 
 def __getattr__(name: str) -> Any:

@@ -289,6 +289,41 @@ mod tests {
         assert!(f64::from_bits(expected[0]).is_finite());
     }
 
+    /// A fit lies in the unit; what it is of shows before the data do.
+    #[test]
+    fn a_unit_begins_with_its_fit() {
+        let fit = r#"{"form": "gain", "neuromuscular": true, "verdict": {"level": "trustworthy"}, "parameters": [],
+            "records": [{"sample_time": 0.01, "units": {"input": "", "output": ""}}],
+            "noise": {"c": [], "d": [-0.9]}, "innovation_variance": 0.1,
+            "covariance": {"coordinates": ["gain", "ln omega_nm", "ln zeta_nm", "tau_e"], "values": [2, 2.4, -1.2, 0.2],
+                           "matrix": [[0.01, 0, 0, 0], [0, 0.01, 0, 0], [0, 0, 0.01, 0], [0, 0, 0, 0.0001]]}}"#;
+        let folder = tempfile::tempdir().unwrap();
+        let settings = FmuSettings::new(FmuKind::Tracker)
+            .with("prior", FmuStart::Text("fit".to_owned()))
+            .with("controlled_element", FmuStart::Text("1/s".to_owned()));
+        let started = |settings: &FmuSettings| {
+            fs::write(folder.path().join(FMU_SETTINGS), settings.text()).unwrap();
+            let mut instance = Instance::new(&FmuKind::Tracker.token(), Some(folder.path())).unwrap();
+            instance.start().map(|()| instance)
+        };
+        let refused = started(&settings).err().unwrap();
+        assert!(refused.contains("hoid fmu --prior"), "{refused}");
+        let mut instance = started(&settings.clone().with_fit(fit.to_owned())).unwrap();
+        instance.step(0.0, 0.01).unwrap();
+        assert!((real(&instance, "K_e") - 2.0).abs() < 0.1);
+        assert!(
+            (real(&instance, "crossover_rad_s") - 2.0).abs() < 0.3,
+            "a gain over an integrator crosses at the gain"
+        );
+        let wrong = settings.with("options", FmuStart::Text("[".to_owned()));
+        assert!(
+            started(&wrong.with_fit(fit.to_owned()))
+                .err()
+                .unwrap()
+                .contains("options")
+        );
+    }
+
     #[test]
     fn what_cannot_be_is_said() {
         let why = |done: Done| done.unwrap_err();
