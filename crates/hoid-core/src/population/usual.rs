@@ -28,8 +28,8 @@ pub const ORDER: usize = 16;
 pub const LIMIT: f64 = 3.5;
 /// Time after which the estimate begins, s.
 pub const HOLD_S: f64 = 1.0;
-/// How much higher than that of Y the threshold of what is held is, by the same hours as [`RATE`] (7.3, 9.9,
-/// 13.5, 20.7): it is to be the lesser source of alarms.
+/// How much higher than that of Y the threshold of what is held is: in the hours by which that was set two
+/// blocks passed 7.3, 9.9, 13.5 and 20.7, and it is to be the lesser source of alarms.
 pub const OF_HELD: f64 = 1.5;
 
 /// Standard deviations of the gains' drift in one second, over |Y| at 2 rad/s, and what is supposed
