@@ -7,7 +7,7 @@
 A job runs for the entry of its matrix that is this platform, in a clone of the committed state. Commands run as
 they stand; `cargo publish` and other steps that publish are made dry. Of the actions, maturin's runs maturin from
 PyPI, artifacts are folders, check-out and tools are what is here already; what is left (deployments, tokens) is
-told by name. It ends with a count, and with an error where a step has failed.
+told by name. Jobs that need artifacts need the jobs that make them. It ends with a count, and with an error where a step has failed.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ HERE = ("x86_64-unknown-linux-gnu", "linux-x86_64", "ubuntu-latest", "ubuntu-22.
 AT_HAND = ("actions/checkout", "dtolnay/rust-toolchain", "Swatinem/rust-cache", "actions/setup-python", "actions/setup-node")
 #: Commands that publish, and what is run in their place.
 DRY = {"cargo publish ": "cargo package --allow-dirty --no-verify ", "gh release create": "echo gh release create"}
-#: Where the answers of a step stand in this process.
+#: What may become of a step.
 OUTCOMES = ("passed", "failed", "not here")
 
 
@@ -104,7 +104,7 @@ def run(workflow: str, jobs: list[str], directory: Path) -> dict[str, int]:
                 done = subprocess.run(
                     ["bash", "-euo", "pipefail", "-c", command],
                     cwd=checkout,
-                    env={**os.environ, "PATH": path, **environment},
+                    env={**os.environ, "PATH": path, "GITHUB_REF_NAME": "v0.0.0-dry", **environment},
                     stdin=subprocess.DEVNULL,
                     capture_output=True,
                     text=True,
