@@ -49,6 +49,8 @@ pub fn description(args: &IdentifyArgs, records: &[Record]) -> Result<Descriptio
 /// A polynomial model in a figure.
 pub fn of_polynomials(fit: &Fit, records: &[Record], described: Option<&Description>) -> String {
     let title = fit.title();
+    // What is behind the semicolon does not fit below a figure of one column.
+    let title = title.split(';').next().unwrap_or(&title).to_owned();
     let delay_s = fit.orders().nk as f64 * fit.model().sample_time().s();
     match described {
         Some(described) => {
