@@ -21,8 +21,8 @@ pub struct FmuArgs {
     pub operator: Option<OperatorChoice>,
     /// Shared library that `cargo xtask ffi` has built; may be repeated, one for each platform
     /// [default: libhoid beside this program]
-    #[arg(long, value_name = "FILE")]
-    pub library: Vec<PathBuf>,
+    #[arg(long = "library", value_name = "FILE")]
+    pub libraries: Vec<PathBuf>,
     /// Version of the Functional Mock-up Interface
     #[arg(long, value_name = "N", default_value = "2", value_parser = choice_of(&FmiVersion::ALL))]
     pub fmi: FmiVersion,

@@ -21,7 +21,7 @@ use crate::{
 };
 
 pub fn run(args: &FmuArgs) -> Result<(), CliError> {
-    let libraries = match args.library.as_slice() {
+    let libraries = match args.libraries.as_slice() {
         [] => vec![beside_this_program()?],
         named => named.to_vec(),
     };

@@ -2,7 +2,7 @@
 
 use hoid_io::{
     AnyScenario,
-    fmu::{FmuKind, FmuSettings, FmuStart, FmuVariable},
+    fmu::{DETERMINED, FmuKind, FmuSettings, FmuStart, FmuVariable},
     parse_any_scenario,
 };
 use hoid_sim::{OperatorRun, RunSeed, Simulator};
@@ -191,15 +191,7 @@ impl TrackerModel {
             let error = estimate.map_or(f64::NAN, |e| e.standard_error);
             all.extend([(name, FmuStart::Real(value)), (error_name, FmuStart::Real(error))]);
         }
-        let names = [
-            "K_e_determined",
-            "T_L_determined",
-            "K_e_dot_determined",
-            "omega_nm_determined",
-            "zeta_nm_determined",
-            "tau_e_determined",
-        ];
-        for (i, name) in names.into_iter().enumerate() {
+        for (i, name) in DETERMINED.into_iter().enumerate() {
             let is = operator.get(i).is_some_and(|e| e.determined == 1);
             all.push((name, FmuStart::Boolean(is)));
         }

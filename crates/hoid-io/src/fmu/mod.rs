@@ -21,4 +21,4 @@ mod variables;
 pub use archive::{Library, write_fmu};
 pub use description::FmiVersion;
 pub use settings::{FMU_SETTINGS, FmuSettings};
-pub use variables::{FmuKind, FmuStart, FmuVariable, Role};
+pub use variables::{DETERMINED, FmuKind, FmuStart, FmuVariable, Role};

@@ -1,5 +1,15 @@
 //! The variables of a unit.
 
+/// Whether the data determine a parameter of the operator, in the order of its parameters.
+pub const DETERMINED: [&str; 6] = [
+    "K_e_determined",
+    "T_L_determined",
+    "K_e_dot_determined",
+    "omega_nm_determined",
+    "zeta_nm_determined",
+    "tau_e_determined",
+];
+
 /// What a unit does.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FmuKind {
@@ -140,14 +150,7 @@ fn tracker() -> Vec<FmuVariable> {
         all.push(output(name, unit, Real(f64::NAN), help));
         all.push(output(error, unit, Real(f64::NAN), error_help));
     }
-    for name in [
-        "K_e_determined",
-        "T_L_determined",
-        "K_e_dot_determined",
-        "omega_nm_determined",
-        "zeta_nm_determined",
-        "tau_e_determined",
-    ] {
+    for name in DETERMINED {
         all.push(output(name, "", Boolean(false), "true where the data determine it"));
     }
     all.extend([
