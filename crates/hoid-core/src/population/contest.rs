@@ -62,13 +62,18 @@ impl Contest {
         }
     }
 
-    /// Begins, with the rivals from `first` on. Their slow modes go on from those of the one who is
-    /// believed.
-    pub fn begin(&mut self, prior: &PopulationPrior, believed: &Follower, past: &Past, first: usize) {
+    /// Begins. Their slow modes go on from those of the one who is believed. At a change all take part,
+    /// and their gains may walk at once, as those of the one who is believed do; at the first sample the
+    /// one who is believed is the first of them.
+    pub fn begin(&mut self, prior: &PopulationPrior, believed: &Follower, past: &Past, at_a_change: bool) {
+        let first = usize::from(!at_a_change);
         let delayed = believed.delayed(past);
         for (i, point) in prior.rivals.into_iter().enumerate().skip(first) {
             let basis = believed.place.basis().moved(point, delayed);
-            if let Some(rival) = basis.and_then(|basis| believed.beside(basis, prior)) {
+            if let Some(mut rival) = basis.and_then(|basis| believed.beside(basis, prior)) {
+                if at_a_change {
+                    rival.gains.walk_at_once();
+                }
                 self.rivals[i] = rival;
                 self.open[i] = true;
             }

@@ -77,7 +77,7 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> PopulationFilter<E> {
             newest: 0,
             u: &u,
         };
-        contest.begin(&prior, &believed, &past, 1);
+        contest.begin(&prior, &believed, &past, false);
         Some(Self {
             prior,
             origin,
@@ -127,7 +127,7 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> PopulationFilter<E> {
                     newest: self.newest,
                     u: &self.u,
                 };
-                self.contest.begin(&self.prior, &self.believed, &past, 0);
+                self.contest.begin(&self.prior, &self.believed, &past, true);
             }
         }
         self.remember(u);

@@ -4,7 +4,10 @@
 //!   second is the first with a covariance of the gains that leaves them no other direction, in what
 //!   is not known at the beginning and in every drift.
 //! - **Drifts.** Of each form one filter says that the gains hardly move, others that they walk at
-//!   random. A filter whose weight has fallen below `LEAST` takes over the state of the best.
+//!   random. A filter whose weight has fallen below `LEAST` takes over the state of the best. Who begins
+//!   with nothing does not walk at first: an error near one frequency is explained by gains that follow
+//!   its phase as well as by the right poles and delay, and better than by poles and delay that are not
+//!   found yet, so that they never would be.
 //! - **Newborns.** Others say that the gains have just changed: they begin as the first, with a
 //!   variance added, and walk at random. After their life they are born again; one that foretells
 //!   better than the first then takes its place. So a change is followed at once, and what comes
@@ -46,6 +49,8 @@ pub struct GainPrior {
     pub odds: f64,
     /// Their life, s.
     pub life: f64,
+    /// Time from the beginning in which the gains do not walk, s.
+    pub steady: f64,
     /// Degrees of freedom of the Student distribution.
     pub freedom: f64,
     /// Standard deviations beyond which an innovation moves the estimate no further.
@@ -71,6 +76,7 @@ impl GainPrior {
             && self.shares.iter().all(|s| *s > 0.0 && *s <= 1.0)
             && self.odds > 0.0
             && self.life > 0.0
+            && self.steady >= 0.0
             && self.freedom > 0.0
             && self.limit > 0.0
             && self.sample_time > 0.0
@@ -97,9 +103,11 @@ pub struct Gains {
     filters: [[Kalman; FILTERS]; FORMS],
     log_weights: [f64; FORMS],
     samples: u64,
+    /// Samples up to which the gains do not walk.
+    steady: u64,
 }
 
-crate::state!([] Gains { filters, log_weights, samples });
+crate::state!([] Gains { filters, log_weights, samples, steady });
 
 impl Gains {
     /// With gains of zero and nothing known of them. The basis gives the scale of the gains. `None`
@@ -116,6 +124,7 @@ impl Gains {
             filters: [[nobody; FILTERS]; FORMS],
             log_weights: [-libm::log(FORMS as f64); FORMS],
             samples: 0,
+            steady: libm::round(prior.steady / prior.sample_time) as u64,
         };
         gains.weigh_anew();
         prior.is_sound().then_some(gains)
@@ -154,7 +163,13 @@ impl Gains {
         for filter in self.filters.iter_mut().flatten() {
             (filter.state, filter.covariance) = (*state, *covariance);
         }
+        self.walk_at_once();
         self.weigh_anew();
+    }
+
+    /// Lets the gains walk from now on.
+    pub(super) fn walk_at_once(&mut self) {
+        self.steady = 0;
     }
 
     /// Lets the level be anything within this standard deviation.
@@ -255,6 +270,13 @@ impl Gains {
         let jump = self.prior.newborn[1] * unit;
         let odds = libm::log(self.prior.odds);
         for (filters, shape) in self.filters.iter_mut().zip(&self.shapes) {
+            if self.samples < self.steady {
+                let steady = filters[0];
+                filters[1..DRIFTS].fill(Kalman {
+                    log_weight: AGAIN,
+                    ..steady
+                });
+            }
             let best = best_of(filters);
             for k in 0..DRIFTS {
                 if filters[k].log_weight < LEAST {

@@ -40,6 +40,8 @@ const SHARES: [f64; DRIFTS] = [0.9, 0.05, 0.05];
 const NEWBORN: [f64; 2] = [0.1, 0.5];
 const ODDS: f64 = 0.01;
 const LIFE_S: f64 = 2.0;
+/// Time from the beginning in which the gains do not walk, s.
+const STEADY_S: f64 = 15.0;
 /// Degrees of freedom of the innovations.
 const FREEDOM: f64 = 5.0;
 /// Time constants with which the weights of forms and of drifts are forgotten, s.
@@ -137,6 +139,7 @@ impl Usual {
                 newborn: NEWBORN,
                 odds: ODDS,
                 life: LIFE_S,
+                steady: STEADY_S,
                 freedom: FREEDOM,
                 limit: self.limit,
                 forgotten: [FORM_MEMORY_S, DRIFT_MEMORY_S].map(|memory| (sample_time / memory).min(1.0)),

@@ -22,6 +22,7 @@ fn prior() -> GainPrior {
         newborn: [0.0; 2],
         odds: 1e-300,
         life: 1e9,
+        steady: 0.0,
         freedom: 1e300,
         limit: f64::INFINITY,
         forgotten: [0.0; 2],
@@ -192,6 +193,39 @@ fn newborns_follow_a_jump_that_the_steady_would_take_long_for() {
     assert!(with < 0.15 && without > 0.5, "{with} {without}");
 }
 
+/// A gain that walks is followed by those that walk, but for the time in which none does.
+#[test]
+fn who_begins_with_nothing_does_not_walk_at_first() {
+    let errors = |steady: f64| {
+        let prior = GainPrior {
+            drifts: [0.0, 0.5, 0.5],
+            shares: [0.9, 0.05, 0.05],
+            steady,
+            ..prior()
+        };
+        let mut gains = Gains::new(prior, &basis()).unwrap();
+        gains.begin(2.0, 0.5);
+        let mut sums = [0.0; 2];
+        for t in 0..2000 {
+            let (y, regressors) = sample(t);
+            let gain = 1.5 + (f64::from(t) / 150.0).sin();
+            gains.update(
+                y + (gain - 1.5) * regressors.x[0],
+                &regressors,
+                0.3,
+                basis().point(),
+                &AROUND,
+            );
+            sums[usize::from(t >= 1000)] += (gains.state()[0] - gain).abs() / 1000.0;
+        }
+        sums
+    };
+    let [early, late] = errors(10.0);
+    let [at_once, _] = errors(0.0);
+    assert!(at_once < 0.25 && early > 2.0 * at_once, "{early} {at_once}");
+    assert!(late < 0.25, "{late}");
+}
+
 #[test]
 fn what_makes_no_sense_is_refused() {
     for wrong in [
@@ -200,6 +234,10 @@ fn what_makes_no_sense_is_refused() {
             ..prior()
         },
         GainPrior { life: 0.0, ..prior() },
+        GainPrior {
+            steady: -1.0,
+            ..prior()
+        },
         GainPrior {
             freedom: f64::NAN,
             ..prior()
