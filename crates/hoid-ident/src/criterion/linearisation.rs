@@ -105,8 +105,6 @@ impl Criterion<'_> {
 }
 
 impl Objective for Criterion<'_> {
-    type Workspace = Workspace;
-
     /// Roots of C and F inside the unit circle; a stationary past needs those of the noise poles
     /// there too.
     fn is_feasible(&self, theta: &[f64]) -> bool {

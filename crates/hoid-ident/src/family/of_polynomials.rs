@@ -27,6 +27,7 @@ use super::{
 };
 use crate::{
     Fit, SearchOptions,
+    criterion::Workspace,
     linalg::least_squares::solve_symmetric,
     optimize::{Linearisation, Minimum, Objective, minimise},
 };
@@ -204,7 +205,15 @@ fn nearest(
     let found = criterion
         .starts()
         .into_iter()
-        .filter_map(|start| minimise(&criterion, start, &SearchOptions::default(), None, &mut ()))
+        .filter_map(|start| {
+            minimise(
+                &criterion,
+                start,
+                &SearchOptions::default(),
+                None,
+                &mut Workspace::default(),
+            )
+        })
         .min_by(|a, b| a.at.sum_of_squares.total_cmp(&b.at.sum_of_squares))?;
     Some((criterion.mismatch(&found.theta)?, found))
 }
@@ -359,13 +368,11 @@ fn response(held: &HeldFamily, angle: f64, p: usize) -> (Complex64, Vec<Complex6
 }
 
 impl Objective for Nearest<'_> {
-    type Workspace = ();
-
     fn is_feasible(&self, x: &[f64]) -> bool {
         FamilyOperator::new(self.form, self.reading.neuromuscular.is_some(), x).is_ok()
     }
 
-    fn linearise(&self, x: &[f64], _: &mut ()) -> Linearisation {
+    fn linearise(&self, x: &[f64], _: &mut Workspace) -> Linearisation {
         let mut total = Linearisation::empty(x.len());
         let Some(responses) = self.responses(x) else {
             total.sum_of_squares = f64::NAN;

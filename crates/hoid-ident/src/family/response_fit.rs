@@ -18,6 +18,7 @@ use hoid_model::{
 use super::{coordinates, prior::OperatorPrior};
 use crate::{
     IdentError, SearchOptions, Termination,
+    criterion::Workspace,
     grey_box::objective::Penalty,
     linalg::least_squares::solve_symmetric,
     optimize::{Linearisation, Minimum, Objective, minimise},
@@ -111,7 +112,7 @@ impl<'p> ResponseCriterion<'p> {
         let mut best: Option<Minimum> = None;
         for (_, start) in starts.into_iter().take(SEARCHES) {
             let known = best.as_ref().map(|b| b.at.sum_of_squares);
-            if let Some(found) = minimise(self, start, search, None, &mut ())
+            if let Some(found) = minimise(self, start, search, None, &mut Workspace::default())
                 && known.is_none_or(|known| found.at.sum_of_squares < known)
             {
                 best = Some(found);
@@ -122,7 +123,7 @@ impl<'p> ResponseCriterion<'p> {
 
     /// The search from one point.
     pub fn fit_from(&self, start: &[f64], search: &SearchOptions) -> Option<ResponseMinimum> {
-        minimise(self, start.to_vec(), search, None, &mut ()).map(|minimum| self.result(minimum))
+        minimise(self, start.to_vec(), search, None, &mut Workspace::default()).map(|minimum| self.result(minimum))
     }
 
     /// Covariance of the coordinates where the points have theirs, `information^-1`; zero for those
@@ -199,19 +200,17 @@ impl<'p> ResponseCriterion<'p> {
             power += model.norm_sqr() / point.variance;
         }
         x[0] = cross / power;
-        let value = self.linearise(x, &mut ()).sum_of_squares;
+        let value = self.linearise(x, &mut Workspace::default()).sum_of_squares;
         (value.is_finite() && x[0] != 0.0).then_some(value)
     }
 }
 
 impl Objective for ResponseCriterion<'_> {
-    type Workspace = ();
-
     fn is_feasible(&self, x: &[f64]) -> bool {
         FamilyOperator::new(self.form, self.neuromuscular, x).is_ok()
     }
 
-    fn linearise(&self, x: &[f64], _: &mut ()) -> Linearisation {
+    fn linearise(&self, x: &[f64], _: &mut Workspace) -> Linearisation {
         let mut total = Linearisation::empty(x.len());
         let Ok(operator) = FamilyOperator::new(self.form, self.neuromuscular, x) else {
             total.sum_of_squares = f64::NAN;
@@ -299,12 +298,12 @@ mod tests {
         let prior = OperatorPrior::population();
         let criterion = ResponseCriterion::new(Form::LeadLag, true, &points, &prior, (0.0, 0.6), ts);
         let x = [3.0, 0.8, 0.3, 2.2, -1.0, 0.25];
-        let at = criterion.linearise(&x, &mut ());
+        let at = criterion.linearise(&x, &mut Workspace::default());
         for i in 0..x.len() {
             let value = |by: f64| {
                 let mut moved = x;
                 moved[i] += by;
-                criterion.linearise(&moved, &mut ()).sum_of_squares
+                criterion.linearise(&moved, &mut Workspace::default()).sum_of_squares
             };
             let difference = -(value(1e-6) - value(-1e-6)) / 4e-6;
             assert!(

@@ -218,8 +218,6 @@ impl<'a, P: Parametrisation> PhysicalCriterion<'a, P> {
 const NEAR_BORDER: f64 = 1e-6;
 
 impl<P: Parametrisation> Objective for PhysicalCriterion<'_, P> {
-    type Workspace = Workspace;
-
     fn is_feasible(&self, eta: &[f64]) -> bool {
         eta.iter().all(|v| v.is_finite())
             && (0..self.data.len()).all(|record| {

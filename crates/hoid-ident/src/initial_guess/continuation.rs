@@ -126,7 +126,7 @@ pub(crate) struct Continuation<'c> {
     trial: Option<Start>,
     tried: usize,
     ranked: Vec<Start>,
-    searches: Option<MultiStart<'c, Criterion<'c>>>,
+    searches: Option<MultiStart<'c>>,
 }
 
 impl<'c> Continuation<'c> {

@@ -41,6 +41,7 @@ use super::{
 };
 use crate::{
     IdentError, Reason, SearchOptions, Termination,
+    criterion::Workspace,
     linalg::least_squares::{add_scaled, dot, solve_symmetric},
     optimize::{Linearisation, Objective, minimise},
 };
@@ -72,13 +73,11 @@ struct GivenInstruments<'p, 'a> {
 }
 
 impl Objective for GivenInstruments<'_, '_> {
-    type Workspace = ();
-
     fn is_feasible(&self, system: &[f64]) -> bool {
         system.iter().all(|v| v.is_finite()) && roots_inside(&system[..self.problem.poles], 1.0)
     }
 
-    fn linearise(&self, system: &[f64], (): &mut ()) -> Linearisation {
+    fn linearise(&self, system: &[f64], _: &mut Workspace) -> Linearisation {
         let (eps, psi) = self
             .problem
             .prediction_error(self.noise.prefilter(&system[..self.problem.poles]), system);
@@ -134,7 +133,8 @@ pub(super) fn solve_for_own_poles(
             q: problem.basis(&equation.z)?,
             power: 1e26 * (INNER * limits.tolerance).powi(2) * variance,
         };
-        let end = minimise(&objective, system.clone(), &options, None, &mut ()).ok_or(IdentError::NoFiniteLoss)?;
+        let end = minimise(&objective, system.clone(), &options, None, &mut Workspace::default())
+            .ok_or(IdentError::NoFiniteLoss)?;
         iterations += 1;
         without_gain += 1;
         let step: Vec<f64> = end.theta.iter().zip(&system).map(|(a, b)| a - b).collect();

@@ -12,7 +12,7 @@ use hoid_model::Orders;
 
 use crate::{
     SearchOptions,
-    criterion::Block,
+    criterion::{Block, Workspace},
     multistart::Start,
     optimize::{
         Linearisation, Minimum, Objective,
@@ -22,8 +22,8 @@ use crate::{
 };
 
 /// The searches.
-pub(crate) struct MultiStart<'s, O> {
-    objective: &'s O,
+pub(crate) struct MultiStart<'s> {
+    objective: &'s dyn Objective,
     orders: Orders,
     options: &'s SearchOptions,
     /// Starts from which there is a search at most.
@@ -32,14 +32,20 @@ pub(crate) struct MultiStart<'s, O> {
     /// best last.
     starts: Vec<Start>,
     /// The present search, with the label of its start.
-    searching: Option<(String, GaussNewton<'s, O>)>,
+    searching: Option<(String, GaussNewton<'s>)>,
     /// The minima, each with its start.
     pub minima: Vec<(String, Minimum)>,
 }
 
-impl<'s, O: Objective> MultiStart<'s, O> {
+impl<'s> MultiStart<'s> {
     /// From these starts, the best of which are searched from.
-    pub fn new(objective: &'s O, orders: Orders, options: &'s SearchOptions, most: usize, starts: Vec<Start>) -> Self {
+    pub fn new(
+        objective: &'s dyn Objective,
+        orders: Orders,
+        options: &'s SearchOptions,
+        most: usize,
+        starts: Vec<Start>,
+    ) -> Self {
         let mut searches = Self {
             objective,
             orders,
@@ -69,7 +75,7 @@ impl<'s, O: Objective> MultiStart<'s, O> {
     }
 
     /// Continues with the linearisation at [`MultiStart::evaluation_point`].
-    pub fn update(&mut self, there: Linearisation, workspace: &mut O::Workspace) {
+    pub fn update(&mut self, there: Linearisation, workspace: &mut Workspace) {
         if let Some((label, mut descent)) = self.searching.take() {
             let known = self.best().filter(|_| descent.is_at_its_start());
             if known.is_some_and(|known| lies_in_basin(known, descent.evaluation_point(), there.sum_of_squares)) {

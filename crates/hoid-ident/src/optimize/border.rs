@@ -7,26 +7,27 @@ use super::{
     search_options::{SearchMethod, SearchOptions},
     termination::{Reason, Termination},
 };
+use crate::criterion::Workspace;
 
 /// Searches from `theta`. `None` when the start is unstable or its loss is not finite, or when the
 /// search comes close to `rival`, the sum of squares of a minimum that is known already, and is
 /// predicted to end no lower.
-pub(crate) fn minimise<O: Objective>(
-    objective: &O,
+pub(crate) fn minimise(
+    objective: &dyn Objective,
     theta: Vec<f64>,
     options: &SearchOptions,
     rival: Option<f64>,
-    workspace: &mut O::Workspace,
+    workspace: &mut Workspace,
 ) -> Option<Minimum> {
     let mut descent = GaussNewton::new(objective, theta, options, rival)?;
     let reason = descent.run(workspace)?;
     descent.finish(reason, workspace)
 }
 
-impl<O: Objective> GaussNewton<'_, O> {
+impl GaussNewton<'_> {
     /// The minimum, once the search has ended for this reason; the automatic search may continue
     /// along the border of stability.
-    pub fn finish(mut self, reason: Reason, workspace: &mut O::Workspace) -> Option<Minimum> {
+    pub fn finish(mut self, reason: Reason, workspace: &mut Workspace) -> Option<Minimum> {
         let reason = if self.options.method == SearchMethod::Automatic && reason == Reason::NoDescent {
             self.follow_the_border(workspace)?
         } else {
@@ -44,7 +45,7 @@ impl<O: Objective> GaussNewton<'_, O> {
 
     /// Goes on in coordinates in which the border of stability is a bound. `None` where the loss is
     /// not finite or the rival will not be beaten.
-    fn follow_the_border(&mut self, workspace: &mut O::Workspace) -> Option<Reason> {
+    fn follow_the_border(&mut self, workspace: &mut Workspace) -> Option<Reason> {
         let Some((coordinates, kappa)) = StableCoordinates::of(self.objective, &self.theta) else {
             return Some(Reason::NoDescent);
         };

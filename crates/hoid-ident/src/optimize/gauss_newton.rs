@@ -6,6 +6,7 @@ use super::{
     search_options::{SearchMethod, SearchOptions},
     termination::Reason,
 };
+use crate::criterion::Workspace;
 use crate::linalg::least_squares::{dot, solve_symmetric};
 
 /// Relative decrease of the loss that a step predicts from which on the second derivative is learnt
@@ -17,8 +18,8 @@ const NEAR: f64 = 1e-2;
 const ROUNDING: f64 = 1e-10;
 
 /// A search that is driven from outside, so that several can run side by side.
-pub(crate) struct GaussNewton<'s, O> {
-    pub(super) objective: &'s O,
+pub(crate) struct GaussNewton<'s> {
+    pub(super) objective: &'s dyn Objective,
     pub(super) options: &'s SearchOptions,
     pub(super) rival: Option<f64>,
     output_power: f64,
@@ -59,10 +60,15 @@ pub(crate) enum Progress {
     Ended(Option<Reason>),
 }
 
-impl<'s, O: Objective> GaussNewton<'s, O> {
+impl<'s> GaussNewton<'s> {
     /// A search from `theta`, drawn inside the limits; `None` when the predictor does not exist
     /// there.
-    pub fn new(objective: &'s O, mut theta: Vec<f64>, options: &'s SearchOptions, rival: Option<f64>) -> Option<Self> {
+    pub fn new(
+        objective: &'s dyn Objective,
+        mut theta: Vec<f64>,
+        options: &'s SearchOptions,
+        rival: Option<f64>,
+    ) -> Option<Self> {
         if let Some(limits) = objective.limits() {
             for (t, (low, high)) in theta.iter_mut().zip(limits) {
                 *t = t.max(*low).min(*high);
@@ -96,7 +102,7 @@ impl<'s, O: Objective> GaussNewton<'s, O> {
     }
 
     /// Until it ends, alone.
-    pub(super) fn run(&mut self, workspace: &mut O::Workspace) -> Option<Reason> {
+    pub(super) fn run(&mut self, workspace: &mut Workspace) -> Option<Reason> {
         loop {
             let there = self.objective.linearise(&self.evaluation_point, workspace);
             if let Progress::Ended(reason) = self.update(there) {
@@ -373,7 +379,7 @@ fn curvature(matrix: &[f64], delta: &[f64]) -> f64 {
 }
 
 /// Parameters that may move: neither fixed nor at a bound beyond which the loss falls.
-pub(crate) fn free_parameters(objective: &impl Objective, theta: &[f64], descent: &[f64]) -> Vec<usize> {
+pub(crate) fn free_parameters(objective: &dyn Objective, theta: &[f64], descent: &[f64]) -> Vec<usize> {
     let Some(limits) = objective.limits() else {
         return (0..theta.len()).collect();
     };

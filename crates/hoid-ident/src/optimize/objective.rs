@@ -5,6 +5,7 @@ use std::ops::Range;
 use hoid_model::Complex64;
 
 use super::termination::Termination;
+use crate::criterion::Workspace;
 
 /// Sum of squares, `psi' eps` and the projected `psi' psi` (by rows).
 #[derive(Debug, Clone, Default)]
@@ -37,15 +38,15 @@ impl Linearisation {
     }
 }
 
-/// A sum of squares over theta with its derivatives: what the search needs to know of a model.
+/// A sum of squares over theta with its derivatives: what the search needs to know of a model. The
+/// search takes it as `dyn`: a call is nothing beside a pass over a record, and it is compiled once
+/// for all models.
 pub(crate) trait Objective {
-    /// Room for signals that a linearisation needs, kept from one to the next.
-    type Workspace;
-
     /// True where the predictor exists: finite theta, stable polynomials.
     fn is_feasible(&self, theta: &[f64]) -> bool;
-    /// Sum of squares, `psi' eps` and `psi' psi` at a feasible theta.
-    fn linearise(&self, theta: &[f64], workspace: &mut Self::Workspace) -> Linearisation;
+    /// Sum of squares, `psi' eps` and `psi' psi` at a feasible theta; the workspace is room for
+    /// signals, kept from one linearisation to the next.
+    fn linearise(&self, theta: &[f64], workspace: &mut Workspace) -> Linearisation;
     /// Sum of squares of the output, against which residuals count as zero.
     fn output_power(&self) -> f64;
     /// Lower and upper bound of each parameter; equal bounds fix it. By default there are none.

@@ -12,21 +12,22 @@
 
 use std::ops::Range;
 
+use crate::criterion::Workspace;
 use crate::optimize::objective::{Linearisation, Objective};
 
 /// Largest reflection coefficient: a root this close to the circle is on it for any record.
 pub(crate) const BORDER: f64 = 1.0 - 1e-8;
 
 /// An objective in reflection coefficients in place of some of its polynomials.
-pub(crate) struct StableCoordinates<'o, O> {
-    objective: &'o O,
+pub(crate) struct StableCoordinates<'o> {
+    objective: &'o dyn Objective,
     blocks: Vec<Range<usize>>,
     limits: Vec<(f64, f64)>,
 }
 
-impl<'o, O: Objective> StableCoordinates<'o, O> {
+impl<'o> StableCoordinates<'o> {
     /// The coordinates, and theta in them. `None` when there is no polynomial to keep stable.
-    pub fn of(objective: &'o O, theta: &[f64]) -> Option<(Self, Vec<f64>)> {
+    pub fn of(objective: &'o dyn Objective, theta: &[f64]) -> Option<(Self, Vec<f64>)> {
         let blocks = objective.stable_blocks();
         if blocks.is_empty() {
             return None;
@@ -65,14 +66,12 @@ impl<'o, O: Objective> StableCoordinates<'o, O> {
     }
 }
 
-impl<O: Objective> Objective for StableCoordinates<'_, O> {
-    type Workspace = O::Workspace;
-
+impl Objective for StableCoordinates<'_> {
     fn is_feasible(&self, kappa: &[f64]) -> bool {
         self.objective.is_feasible(&self.theta(kappa))
     }
 
-    fn linearise(&self, kappa: &[f64], workspace: &mut O::Workspace) -> Linearisation {
+    fn linearise(&self, kappa: &[f64], workspace: &mut Workspace) -> Linearisation {
         let at = self.objective.linearise(&self.theta(kappa), workspace);
         let p = kappa.len();
         let mut jacobian = vec![0.0; p * p];

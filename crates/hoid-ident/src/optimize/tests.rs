@@ -83,13 +83,11 @@ struct Valley {
 }
 
 impl Objective for Valley {
-    type Workspace = ();
-
     fn is_feasible(&self, theta: &[f64]) -> bool {
         theta.iter().all(|t| t.is_finite())
     }
 
-    fn linearise(&self, theta: &[f64], (): &mut ()) -> Linearisation {
+    fn linearise(&self, theta: &[f64], _: &mut Workspace) -> Linearisation {
         let (x, y) = (theta[0], theta[1]);
         let eps = [10.0 * (y - x * x), 1.0 - x];
         // Negative derivatives by rows of eps.
@@ -117,7 +115,7 @@ fn descend(valley: &Valley, method: SearchMethod, max_iterations: usize) -> Mini
         max_iterations,
         ..SearchOptions::default()
     };
-    minimise(valley, vec![-1.2, 1.0], &options, None, &mut ()).unwrap()
+    minimise(valley, vec![-1.2, 1.0], &options, None, &mut Workspace::default()).unwrap()
 }
 
 #[test]

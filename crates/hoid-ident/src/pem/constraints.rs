@@ -39,8 +39,6 @@ impl ConstrainedCriterion<'_, '_> {
 }
 
 impl Objective for ConstrainedCriterion<'_, '_> {
-    type Workspace = Workspace;
-
     fn is_feasible(&self, theta: &[f64]) -> bool {
         self.criterion.is_feasible(theta) && (!self.stable || roots_inside(&theta[..self.criterion.orders.na], 1.0))
     }

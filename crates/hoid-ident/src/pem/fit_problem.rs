@@ -18,7 +18,7 @@ pub(crate) struct FitProblem<'q, 'a> {
     settings: &'q FitSettings,
     constrained: &'q ConstrainedCriterion<'q, 'a>,
     sample_time: SampleTime,
-    searches: MultiStart<'q, ConstrainedCriterion<'q, 'a>>,
+    searches: MultiStart<'q>,
 }
 
 impl<'q, 'a> FitProblem<'q, 'a> {

@@ -360,8 +360,6 @@ fn eliminate(columns: Vec<Vec<f64>>, eps: &mut [f64]) -> (Vec<Vec<f64>>, Vec<(f6
 }
 
 impl Objective for ChangeCriterion<'_> {
-    type Workspace = Workspace;
-
     fn is_feasible(&self, theta: &[f64]) -> bool {
         theta.iter().all(|v| v.is_finite())
             && self.layout.muscles.is_none_or(|[_, zeta]| theta[zeta] > 0.0)
