@@ -10,7 +10,8 @@ hoid="$(realpath "$1")"
 replications="${2:-20}"
 page="$(cd "$(dirname "$0")/.." && pwd)/src/guides/cluster.md"
 work="$(mktemp -d)"
-export PATH="$(dirname "$hoid"):$PATH"
+PATH="$(dirname "$hoid"):$PATH"
+export PATH
 
 command -v slurmctld >/dev/null || { apt-get update -q; apt-get install -y -q slurm-wlm munge; }
 host="$(hostname -s)"
@@ -52,10 +53,10 @@ for _ in $(seq 100); do job="$(squeue -h -o %A | sort -n | head -1)"; [ -n "$job
 job="$(squeue -h -r -o %F | head -1)"
 until [ "$(state "${job}_1")" = JobState=RUNNING ]; do sleep 0.2; done
 sleep 1
-echo "task 1 is killed: $(scancel --signal=KILL --full "${job}_1" && echo done)"
+echo "task 1 is killed: $(scancel --signal=KILL --full "${job}_1" && echo "done")"
 until [ "$(state "${job}_3")" = JobState=RUNNING ]; do sleep 0.2; done
 sleep 1
-echo "task 3 goes back into the queue: $(scontrol requeue "${job}_3" && echo done)"
+echo "task 3 goes back into the queue: $(scontrol requeue "${job}_3" && echo "done")"
 # A task that waits after a requeue may have a start time in the future; it is begun at once.
 sleep 2
 scontrol update jobid="${job}_3" StartTime=now 2>/dev/null || true
@@ -70,4 +71,4 @@ bash block4.sh
 
 hoid study run plan.toml --out alone >/dev/null
 for table in fits summary cells; do cmp "alone/$table.parquet" "results/$table.parquet"; done
-echo "the tables are those of one machine, byte for byte: $(ls results/*.parquet | wc -l) files, $replications replications"
+echo "the tables are those of one machine, byte for byte: $(find results -maxdepth 1 -name "*.parquet" | wc -l) files, $replications replications"

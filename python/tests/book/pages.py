@@ -7,6 +7,7 @@ A mark is a comment of HTML, which readers do not see:
 | `<!-- file: NAME -->` | the block is the file of this name, which blocks after it use |
 | `<!-- given: CODE -->` | what the reader has already: run before the block, with it |
 | `<!-- then: CODE -->` | what shows that a file is right: run after the block |
+| `<!-- picture: FILE => PICTURE -->` | the file that the block draws is this one of `docs/src/images`; with HOID_UPDATE_DOCS=1 it becomes it |
 | `<!-- smaller: TEXT => OTHER -->` | run with OTHER in place of TEXT: the same in less time |
 | `<!-- ends with: N -->` | the exit code of the block, where it is not 0 |
 | `<!-- not run: REASON -->` | an exception; `test_book.py` counts them |
@@ -30,7 +31,7 @@ BOOK = ROOT / "docs" / "src"
 GENERATED = {"docs/src/reference/command-line.md"}
 
 FENCE = re.compile(r"^```(\S*)\s*$")
-MARK = re.compile(r"<!--\s*(file|given|then|smaller|ends with|not run):\s*(.*?)\s*-->", re.DOTALL)
+MARK = re.compile(r"<!--\s*(file|given|then|picture|smaller|ends with|not run):\s*(.*?)\s*-->", re.DOTALL)
 
 
 @dataclass

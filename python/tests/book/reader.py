@@ -18,7 +18,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
-from .pages import ROOT, Block
+from .pages import BOOK, ROOT, Block
 
 #: No block takes longer than this, in s.
 PATIENCE = 400
@@ -90,6 +90,19 @@ class Reader:
         then = block.mark("then")
         if then:
             self.shell(then)
+        for kind, value in block.marks:
+            if kind == "picture":
+                self.picture(*(side.strip() for side in value.split("=>")))
+
+    def picture(self, file: str, picture: str) -> None:
+        """What a block has drawn is what the book shows; elsewhere its last digits may be others."""
+        drawn, shown = self.folder / file, BOOK / "images" / picture
+        assert drawn.exists(), f"no picture {file}"
+        if os.environ.get("HOID_UPDATE_DOCS"):
+            shown.write_bytes(drawn.read_bytes())
+        elif sys.platform == "linux":
+            same = shown.exists() and drawn.read_bytes() == shown.read_bytes()
+            assert same, f"{file} is no longer images/{picture}: HOID_UPDATE_DOCS=1 renews it"
 
     def shell(self, code: str, expected: int = 0) -> None:
         done = subprocess.run(
