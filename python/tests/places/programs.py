@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from . import told
-from .told import COLUMNS, ELEMENT, LOOP, OPERATOR, Missing, Place, Run, Told
+from .told import COLUMNS, ELEMENT, LOOP, OF_LOOP, OPERATOR, Missing, Place, Run, Told
 from .tools import HERE, ROOT, Tools, output, program
 
 CORTEX = "thumbv7em-none-eabihf"
@@ -126,6 +126,6 @@ PLACES: Iterable[Place] = (
     Place("Rust, `hoid`", "a call", rust),
     Place("C, `libhoid`", "three calls", c),
     Place("C++, `libhoid`", "three calls", cpp),
-    Place("WebAssembly (Node.js)", "three calls", wasm),
+    Place("WebAssembly (Node.js)", "three calls", wasm, other_functions=OF_LOOP),
     Place("Cortex-M4 (QEMU)", "a line", cortex, ("--nk", "29", "--guard", "no")),
 )

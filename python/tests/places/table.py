@@ -57,9 +57,10 @@ def row(place: Place, told: Told, compared: Compared) -> str:
 
 
 def digits(compared: Compared) -> str:
-    if compared.other == 0:
+    if not compared.off:
         return f"all equal, {compared.samples} rows"
-    return f"{compared.other} of {compared.samples} rows differ, by {compared.largest:.0e} at most"
+    names = ", ".join(f"{name} by {by:.0e}" for name, by in compared.off.items())
+    return f"equal, {compared.samples} rows, but {names}"
 
 
 def time(seconds: float) -> str:

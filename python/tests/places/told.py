@@ -23,6 +23,7 @@ OPERATOR = ("K_e", "T_L", "K_e_dot", "omega_nm", "zeta_nm", "tau_e")
 #: What the person controls, and what is told of the loop.
 ELEMENT = "90/(s(s+6))"
 LOOP = ("crossover_rad_s", "phase_margin_deg")
+OF_LOOP = tuple(f"{name}{end}" for name in LOOP for end in ("", "_se"))
 COLUMNS = tuple(f"{name}{end}" for name in (*OPERATOR, *LOOP) for end in ("", "_se"))
 
 
@@ -67,19 +68,20 @@ class Told:
         if self.at is not None:
             wanted = wanted[list(self.at)]
         same = (self.rows == wanted) | (np.isnan(self.rows) & np.isnan(wanted))
-        other = np.flatnonzero(~same.all(axis=1))
         scale = np.maximum(np.abs(wanted), 1e-300)
-        off = np.where(same, 0.0, np.abs(self.rows - wanted) / scale)
-        return Compared(len(self.rows), len(other), float(off.max(initial=0.0)))
+        off = np.where(same, 0.0, np.abs(self.rows - wanted) / scale).max(axis=0, initial=0.0)
+        return Compared(
+            len(self.rows),
+            {name: float(by) for name, by in zip(self.columns, off, strict=True) if by != 0},
+        )
 
 
 @dataclass(frozen=True)
 class Compared:
-    """Samples compared, those of other digits among them, and the largest relative difference."""
+    """Samples compared, and the largest relative difference of each column that has one."""
 
     samples: int
-    other: int
-    largest: float
+    off: dict[str, float]
 
 
 @dataclass(frozen=True)
@@ -90,6 +92,10 @@ class Place:
     run: Callable[[Run, Tools], Told]
     #: Options of `hoid track` that it is compared with.
     options: tuple[str, ...] = ("--controlled-element", ELEMENT)
+    #: Columns that other elementary functions make (sine, arctangent), and by how much they may be
+    #: off there, relatively: rounding, and its magnification in the error bars.
+    other_functions: tuple[str, ...] = ()
+    off: float = 1e-9
 
 
 def table(path: Path) -> dict[str, list[float]]:

@@ -43,7 +43,7 @@ class Tools:
         folder = self.binary.parents[1] / target
         places = [folder / profile / name for profile in ("release", "debug")]
         found = newest(places, f"not built for {target}: cargo xtask places")
-        # The chore has just built it; what lies about from another day is no place of these sources.
+        # The chore has just built it; what lies about from another day is none of these sources.
         if not self.whole and found.stat().st_mtime < self.binary.stat().st_mtime:
             raise Missing(f"built for {target} before the program was: cargo xtask places")
         return found
