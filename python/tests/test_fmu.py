@@ -1,14 +1,20 @@
-"""Functional mock-up units in a simulator: the digits of the command line."""
+"""Functional mock-up units in a simulator.
+
+That the digits of a tracker are those of `hoid track` is tested with all other places, in
+``test_places.py``.
+"""
 
 from __future__ import annotations
 
 import csv
 import math
-import os
 from pathlib import Path
 from typing import Any
 
 import pytest
+
+from places import Missing, Tools
+from places.tools import stripped
 
 fmpy = pytest.importorskip("fmpy")
 
@@ -16,20 +22,17 @@ from fmpy.fmi2 import FMU2Slave  # noqa: E402
 from fmpy.fmi3 import FMU3Slave  # noqa: E402
 from fmpy.validation import validate_fmu  # noqa: E402
 
-ELEMENT = "90/(s(s+6))"
 STEP = 0.01
 
 
 @pytest.fixture(scope="module")
-def library(cli: Any) -> Path:
+def library(cli: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The shared library of the same sources; `cargo xtask test` builds it beside the program."""
-    folder = Path(cli.binary).parent
-    names = ("libhoid_ffi.so", "libhoid_ffi.dylib", "hoid_ffi.dll")
-    built = [place / name for place in (folder, folder / "deps") for name in names]
-    there = [path for path in built if path.exists()]
-    if not there:
-        pytest.skip("no shared library: build it by cargo build -p hoid-ffi")
-    return max(there, key=lambda path: path.stat().st_mtime)
+    folder = tmp_path_factory.mktemp("library")
+    try:
+        return stripped(Tools(Path(cli.binary), folder).library(), folder)
+    except Missing as reason:
+        pytest.skip(str(reason))
 
 
 @pytest.fixture(scope="module")
@@ -103,38 +106,6 @@ def empty_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return folder
 
 
-@pytest.mark.parametrize("fmi", [2, 3])
-def test_the_tracker_gives_the_digits_of_track(
-    cli: Any, library: Path, run: Path, empty_folder: Path, tmp_path: Path, fmi: int
-) -> None:
-    trace, unit = tmp_path / "trace.csv", tmp_path / "tracker.fmu"
-    cli.run("track", run, "--controlled-element", ELEMENT, "--out", trace)
-    cli.run(
-        *("fmu", "--out", unit, "--library", library, "--fmi", fmi),
-        *("--controlled-element", ELEMENT),
-    )
-    assert validate_fmu(str(unit)) == []
-    expected, record = columns(trace), columns(run)
-    variables = fmpy.read_model_description(unit).modelVariables
-    names = [
-        name
-        for name in expected
-        if name in {v.name for v in variables if v.type in ("Real", "Float64")} and name != "time"
-    ]
-    assert {"K_e", "K_e_se", "tau_e", "crossover_rad_s", "phase_margin_deg_se"} <= set(names)
-    tracker = Unit(unit)
-    for k, (e, u) in enumerate(zip(record["e"], record["u"], strict=True)):
-        tracker.set("e", e)
-        tracker.set("u", u)
-        tracker.step(k * STEP)
-        for name, found in zip(names, tracker.numbers(names), strict=True):
-            wanted = expected[name][k]
-            assert found == wanted or (math.isnan(found) and math.isnan(wanted)), (k, name)
-    assert tracker.get("ready") and tracker.get("samples") == len(record["e"])
-    tracker.end()
-    assert os.listdir(empty_folder) == []
-
-
 def test_a_simulator_takes_the_tracker(
     cli: Any, library: Path, run: Path, empty_folder: Path, tmp_path: Path
 ) -> None:
@@ -186,6 +157,57 @@ def test_the_operator_gives_the_digits_of_simulate(
         other.step(start + k * STEP)
     assert other.get("u") != record["u"][50]
     other.end()
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+@pytest.mark.parametrize("kind", ["tracker", "operator"])
+def test_a_unit_goes_back_and_goes_on_elsewhere(
+    cli: Any, library: Path, run: Path, empty_folder: Path, tmp_path: Path, kind: str, fmi: int
+) -> None:
+    path = tmp_path / "unit.fmu"
+    operator = ("--operator", "C4", "--seed", 3) if kind == "operator" else ()
+    cli.run("fmu", "--out", path, "--library", library, "--fmi", fmi, *operator)
+    assert validate_fmu(str(path)) == []
+    record = columns(run)
+    names = ["u", "n"] if operator else ["K_e", "K_e_se", "tau_e_se", "innovation"]
+
+    def went(unit: Unit, first: int, last: int) -> list[list[float]]:
+        told = []
+        for k in range(first, last):
+            unit.set("e", record["e"][k])
+            if not operator:
+                unit.set("u", record["u"][k])
+            unit.step(k * STEP)
+            told.append(unit.numbers(names))
+        return told
+
+    unit = Unit(path)
+    went(unit, 0, 300)
+    state = unit.unit.getFMUState()
+    expected = went(unit, 300, 500)
+    assert not any(math.isnan(number) for number in expected[-1])
+    unit.unit.setFMUState(state)
+    assert went(unit, 300, 500) == expected
+    data = unit.unit.serializeFMUState(state)
+    unit.unit.freeFMUState(state)
+    # In an instance of its own, which was elsewhere before.
+    other = Unit(path)
+    went(other, 0, 7)
+    other.unit.setFMUState(other.unit.deserializeFMUState(data))
+    assert went(other, 300, 500) == expected
+    for damaged in (data[:-1], data[:100] + bytes([data[100] ^ 1]) + data[101:], b""):
+        with pytest.raises(Exception, match="FMU[sS]tate"):
+            other.unit.deserializeFMUState(damaged)
+    # That of another unit is none of this one.
+    cli.run(
+        *("fmu", "--out", path, "--library", library, "--fmi", fmi),
+        *(() if operator else ("--operator", "C4")),
+    )
+    stranger = Unit(path)
+    with pytest.raises(Exception, match="SetFMU[sS]tate"):
+        stranger.unit.setFMUState(stranger.unit.deserializeFMUState(data))
+    for one in (unit, other, stranger):
+        one.end()
 
 
 def test_what_cannot_run_says_why(

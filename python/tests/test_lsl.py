@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 import threading
+import warnings
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,6 +13,8 @@ import pytest
 
 import pyhoid
 import pyhoid.lsl
+
+import xdf
 
 pylsl = pytest.importorskip("pylsl")
 
@@ -87,6 +91,50 @@ def test_the_digits_are_those_of_the_tracker(c4: pyhoid.Record) -> None:
     assert found[-1] == 100
     assert abs(running.stamp - (start + 2999 * STEP)) < 0.1
     assert running.end() == {"samples": 2900, "lost": 100, "late": 1}
+
+
+def test_a_recording_of_both_streams_is_read_back(c4: pyhoid.Record, tmp_path: Path) -> None:
+    pyxdf = pytest.importorskip("pyxdf")
+    name, count = "hoid-test-recorded", 400
+    outlet = person(name, ("e", "u"))
+    recorder = pylsl.StreamInlet(pylsl.resolve_byprop("name", name, timeout=20)[0])
+    recorder.open_stream(timeout=20)
+    running = Running(name, outlet, pyhoid.Tracker(sample_time=STEP))
+    start = pylsl.local_clock()
+    for k in range(count):
+        outlet.push_sample([c4.e[k], c4.u[k]], start + k * STEP)
+    streams = []
+    for label, inlet, labels in (
+        (name, recorder, ("e", "u")),
+        (f"{name}-estimate", running.inlet, pyhoid.lsl.CHANNELS),
+    ):
+        pulled = [inlet.pull_sample(timeout=20) for _ in range(count)]
+        offset = (pylsl.local_clock(), inlet.time_correction(timeout=20))
+        rows, stamps = zip(*pulled, strict=True)
+        streams.append(xdf.Stream(label, 1 / STEP, labels, stamps, rows, [offset]))
+    assert running.end()["samples"] == count
+    path = tmp_path / "both.xdf"
+    xdf.write(path, streams)
+
+    theirs = {found["info"]["name"][0]: found for found in pyxdf.load_xdf(path)[0]}
+    for stream in streams:
+        found = theirs[stream.name]["time_series"]
+        assert np.array_equal(found, np.array(stream.rows), equal_nan=True)
+    with warnings.catch_warnings():
+        # How the clocks were brought together.
+        warnings.simplefilter("ignore")
+        run = pyhoid.read(path, input=f"{name}.e", output=f"{name}.u")
+        # Of the estimate from where there is one.
+        of = f"{name}-estimate"
+        estimate = pyhoid.read(path, input=f"{of}.K_e", output=f"{of}.tau_e_se", start=2.0)
+    assert np.array_equal(np.array([run.e, run.u]).T, theirs[name]["time_series"])
+    assert np.array_equal(run.e, c4.e[:count]) and np.array_equal(run.u, c4.u[:count])
+    columns = [pyhoid.lsl.CHANNELS.index(label) for label in ("K_e", "tau_e_se")]
+    wanted = theirs[of]["time_series"][-len(estimate.e) :, columns]
+    assert len(estimate.e) >= count - 201
+    assert np.array_equal(np.array([estimate.e, estimate.u]).T, wanted)
+    stamps = theirs[name]["time_stamps"]
+    assert abs(run.sample_time * (count - 1) - (stamps[-1] - stamps[0])) < 1e-6
 
 
 def test_what_cannot_be_tracked_says_why() -> None:

@@ -9,10 +9,13 @@ use std::{
     process::{Command, Stdio},
 };
 
-use crate::process::{cargo, output, target_directory};
+use crate::{
+    places::installed_targets,
+    process::{cargo, output, target_directory},
+};
 
 /// The processor that is run, and the one that is built for.
-const CORTEX: &str = "thumbv7em-none-eabihf";
+pub const CORTEX: &str = "thumbv7em-none-eabihf";
 const RISC_V: &str = "riscv32imac-unknown-none-elf";
 /// Seconds of the run that QEMU is given where the whole is not asked for: it runs at a fiftieth of the host's speed.
 const SHORT_S: usize = 15;
@@ -25,9 +28,9 @@ pub fn embedded(arguments: &[String]) -> Result<(), String> {
         [one] if one == "--all" => true,
         _ => return Err("usage: cargo xtask embedded [--all]".to_owned()),
     };
-    let installed = output(Command::new("rustup").args(["target", "list", "--installed"])).unwrap_or_default();
+    let installed = installed_targets();
     for target in [CORTEX, RISC_V] {
-        if !installed.lines().any(|line| line == target) {
+        if !installed.iter().any(|one| one == target) {
             println!("skipped: hoid on {target} (rustup target add {target})");
             continue;
         }
@@ -40,7 +43,7 @@ pub fn embedded(arguments: &[String]) -> Result<(), String> {
     let host = output(Command::new(target.join("debug").join(name("hoid-embedded"))).current_dir(&directory))?;
     compared("the host", &host, &track)?;
 
-    if !installed.lines().any(|line| line == CORTEX) {
+    if !installed.iter().any(|one| one == CORTEX) {
         return Ok(());
     }
     cargo(&["build", "--release", "-p", "hoid-embedded", "--target", CORTEX], &[])?;

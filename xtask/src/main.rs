@@ -10,8 +10,9 @@
 //! | `cargo xtask lab` | that the page of `hoid lab` is what its sources build, and the page in a browser (module `lab`) |
 //! | `cargo xtask embedded [--all]` | the kernel on bare processors, with the digits of the host (module `embedded`) |
 //! | `cargo xtask ffi [--dev] [--out DIR]` | the libraries for C with header, pkg-config file, CMake package and examples, into `target/ffi/`; `--header` makes the header anew, `--check` builds the examples by them (module `ffi`) |
+//! | `cargo xtask places [--dry or --dev]` | one run through every place in which hoid runs, as the table of the page "In your simulator" (module `places`) |
 //! | `cargo xtask bench [OPTION...]` | the tasks of the page "Speed beside others" beside the peers that are installed, or how cost grows (module `bench`) |
-//! | `cargo xtask slow NAME [ARGUMENT...]` | a study that takes too long for a test: `people-coverage`, `faults`, `faults-clean`, `tracker-faults`, `mutations`, `kills`, `lab`, `challenge`, `challenge-people` |
+//! | `cargo xtask slow NAME [ARGUMENT...]` | a study that takes too long for a test: `people-coverage`, `faults`, `faults-clean`, `tracker-faults`, `mutations`, `kills`, `latency`, `lab`, `challenge`, `challenge-people` |
 //!
 //! Little but the standard library: a chore must start at once on a fresh machine.
 #![allow(clippy::print_stdout, clippy::print_stderr)]
@@ -22,6 +23,8 @@ mod crates;
 mod embedded;
 mod ffi;
 mod lab;
+mod page;
+mod places;
 mod process;
 mod python;
 
@@ -33,7 +36,7 @@ use std::{
 use counts::Counts;
 use process::{cargo, cargo_command, each_line, run};
 
-const USAGE: &str = "usage: cargo xtask test [ARGUMENT...] | python [ARGUMENT...] | check | crates | book | lab | embedded [--all] | ffi [OPTION...] | bench [OPTION...] | slow NAME [ARGUMENT...]";
+const USAGE: &str = "usage: cargo xtask test [ARGUMENT...] | python [ARGUMENT...] | check | crates | book | lab | embedded [--all] | ffi [OPTION...] | places [--dry | --dev] | bench [OPTION...] | slow NAME [ARGUMENT...]";
 
 fn main() -> ExitCode {
     let mut arguments = env::args().skip(1);
@@ -47,6 +50,7 @@ fn main() -> ExitCode {
         Some("lab") => lab::lab(),
         Some("embedded") => embedded::embedded(&arguments.collect::<Vec<_>>()),
         Some("ffi") => ffi::ffi(&arguments.collect::<Vec<_>>()),
+        Some("places") => places::places(&arguments.collect::<Vec<_>>()),
         Some("slow") => slow(&arguments.collect::<Vec<_>>()),
         _ => Err(USAGE.to_owned()),
     };
@@ -102,7 +106,7 @@ const fn slow_of(name: &'static str, package: &'static str, example: &'static st
     }
 }
 
-const SLOW: [Slow; 9] = [
+const SLOW: [Slow; 10] = [
     slow_of("people-coverage", "hoid", "people_coverage"),
     Slow {
         program: Some("hoid-cli"),
@@ -117,6 +121,10 @@ const SLOW: [Slow; 9] = [
     Slow {
         program: Some("hoid-cli"),
         ..slow_of("kills", "hoid-cli", "kills")
+    },
+    Slow {
+        program: Some("hoid-cli"),
+        ..slow_of("latency", "hoid-cli", "latency")
     },
     slow_of("lab", "hoid-lab", "lab"),
     slow_of("challenge", "hoid-study", "challenge"),

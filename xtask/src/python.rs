@@ -20,41 +20,20 @@ const OLDEST: (u32, u32) = (3, 10);
 
 /// Builds and installs the wheel, and runs pytest with these arguments.
 pub fn test(arguments: &[String]) -> Result<Counts, String> {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR"))
-        .parent()
-        .ok_or("the folder of xtask has no parent")?;
-    let (package, target) = (root.join("python"), target_directory());
-    let work = target.join("python");
-    let environment = work.join("venv");
-    let python = fresh_environment(&environment)?;
-    let wheels = work.join("wheels");
-    let _ = fs::remove_dir_all(&wheels);
-    pip(&python, &["maturin>=1.9.4,<2"])?;
+    let target = target_directory();
     // The same command line as the tests', to compare with, and the examples that the book runs; with the tests, because alone they have
     // other features and would be compiled again.
     cargo(
         &["build", "--quiet", "--workspace", "--bins", "--tests", "--examples"],
         &[],
     )?;
-    run(Command::new(&python)
-        .args(["-m", "maturin", "build", "--profile", "dev"])
-        .args(["--features", "as-in-workspace", "--out"])
-        .arg(&wheels)
-        .current_dir(&package)
-        .env("CARGO_TARGET_DIR", &target))?;
-    let wheel = fs::read_dir(&wheels)
-        .map_err(|e| format!("{}: {e}", wheels.display()))?
-        .filter_map(Result::ok)
-        .map(|entry| entry.path())
-        .find(|path| path.extension().is_some_and(|e| e == "whl"))
-        .ok_or_else(|| format!("maturin has left no wheel in {}", wheels.display()))?;
-    pip(&python, &[&format!("{}[test]", wheel.display())])?;
+    let python = environment(Wheel::OfTests)?;
     let mut counts = Counts::default();
     let mut command = Command::new(&python);
     command
         .args(["-W", "error", "-m", "pytest", "--color=no", "--durations=5"])
         .args(arguments)
-        .current_dir(&package)
+        .current_dir(package()?)
         .env("MPLBACKEND", "Agg")
         .env(
             "HOID_BINARY",
@@ -66,6 +45,56 @@ pub fn test(arguments: &[String]) -> Result<Counts, String> {
         return Err(format!("failed ({status}): {shown}"));
     }
     Ok(counts)
+}
+
+/// How the wheel is built and what comes with it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Wheel {
+    /// As the tests have compiled it, with what they require.
+    OfTests,
+    /// As it is released, with what the places need.
+    Released,
+}
+
+/// A fresh environment with the package in it; its interpreter. For that of the tests the workspace is built before.
+pub fn environment(wheel: Wheel) -> Result<PathBuf, String> {
+    let target = target_directory();
+    let work = target.join("python");
+    let (place, extra, others, profile) = match wheel {
+        Wheel::OfTests => (
+            "venv",
+            "test",
+            &[][..],
+            &["--profile", "dev", "--features", "as-in-workspace"][..],
+        ),
+        Wheel::Released => ("venv-released", "lsl", &["fmpy"][..], &["--release"][..]),
+    };
+    let python = fresh_environment(&work.join(place))?;
+    let wheels = work.join("wheels");
+    let _ = fs::remove_dir_all(&wheels);
+    pip(&python, &["maturin>=1.9.4,<2"])?;
+    run(Command::new(&python)
+        .args(["-m", "maturin", "build"])
+        .args(profile)
+        .arg("--out")
+        .arg(&wheels)
+        .current_dir(package()?)
+        .env("CARGO_TARGET_DIR", &target))?;
+    let built = fs::read_dir(&wheels)
+        .map_err(|e| format!("{}: {e}", wheels.display()))?
+        .filter_map(Result::ok)
+        .map(|entry| entry.path())
+        .find(|path| path.extension().is_some_and(|e| e == "whl"))
+        .ok_or_else(|| format!("maturin has left no wheel in {}", wheels.display()))?;
+    let with_extra = format!("{}[{extra}]", built.display());
+    pip(&python, &[&[with_extra.as_str()], others].concat())?;
+    Ok(python)
+}
+
+/// The folder of the package.
+pub fn package() -> Result<PathBuf, String> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent();
+    Ok(root.ok_or("the folder of xtask has no parent")?.join("python"))
 }
 
 /// A virtual environment with nothing in it; returns its interpreter.

@@ -19,7 +19,7 @@
 //! |---|---|
 //! | `session` | a tracker as its options ask for it, and what is known of it |
 //! | `options` | options in JSON, by the keywords of Python |
-//! | `saved` | a tracker as bytes |
+//! | `saved`, `packed` | a tracker as bytes |
 //! | `status`, `boundary` | statuses and their texts; pointers |
 //! | `types` | what is handed over |
 //! | `making`, `stepping`, `reading` | the functions |
@@ -30,6 +30,7 @@ mod boundary;
 pub mod fmi;
 mod making;
 mod options;
+mod packed;
 mod reading;
 mod saved;
 mod session;

@@ -1,14 +1,7 @@
 //! A tracker as bytes, to go on elsewhere with the same digits.
 //!
-//! | bytes | |
-//! |---|---|
-//! | 8 | `hoid` and the version of this layout |
-//! | 8 | length L of the description |
-//! | L | what was asked for and the orders, in JSON |
-//! | 8 N | the numbers of [`hoid_track::Live::saved`], as f64 |
-//! | 8 | FNV-1a over all before (G. Fowler, L. C. Noll, K.-P. Vo, 1991; 64 bits) |
-//!
-//! All least byte first. The sum guards against damage, not against an adversary.
+//! The description is what was asked for and the orders, the bytes are the numbers of
+//! [`hoid_track::Live::saved`] (`packed`).
 
 use hoid_model::Orders;
 use hoid_track::Live;
@@ -16,19 +9,12 @@ use serde_json::{Value, json};
 
 use crate::{
     options::Asked,
+    packed::{Closed, as_bytes, as_numbers, opened, packed},
     session::Session,
     status::{Failure, HOID_BAD_STATE},
 };
 
 const MAGIC: [u8; 8] = *b"hoid\x01\0\0\0";
-const BASIS: u64 = 0xcbf2_9ce4_8422_2325;
-const PRIME: u64 = 0x0000_0100_0000_01b3;
-
-fn sum(bytes: &[u8]) -> u64 {
-    let next = |sum: u64, byte: &u8| (sum ^ u64::from(*byte)).wrapping_mul(PRIME);
-    bytes.iter().fold(BASIS, next)
-}
-
 impl Session {
     /// The tracker as bytes. It does not change.
     pub fn saved(&mut self) -> Vec<u8> {
@@ -42,36 +28,19 @@ impl Session {
             "options": asked.options,
             "fit": asked.fit,
             "orders": orders,
-        })
-        .to_string();
-        let mut bytes = MAGIC.to_vec();
-        bytes.extend_from_slice(&(description.len() as u64).to_le_bytes());
-        bytes.extend_from_slice(description.as_bytes());
-        bytes.extend(numbers.iter().flat_map(|number| number.to_le_bytes()));
-        let sum = sum(&bytes);
-        bytes.extend_from_slice(&sum.to_le_bytes());
-        bytes
+        });
+        packed(MAGIC, &description, &as_bytes(&numbers))
     }
 
     /// The tracker that [`Session::saved`] was asked of.
     pub fn restored(bytes: &[u8]) -> Result<Self, Failure> {
         let wrong = |text: &str| Failure::new(HOID_BAD_STATE, format!("{text}; save the tracker again"));
-        let rest = (bytes.strip_prefix(&MAGIC))
-            .ok_or_else(|| wrong("the bytes are no tracker that this version of hoid has saved"))?;
         let damaged = || wrong("the bytes were changed or cut since they were saved");
-        let (_, stated) = bytes.split_last_chunk::<8>().ok_or_else(damaged)?;
-        if sum(&bytes[..bytes.len() - 8]) != u64::from_le_bytes(*stated) {
-            return Err(damaged());
-        }
-        let (length, rest) = rest.split_first_chunk::<8>().ok_or_else(damaged)?;
-        let length = usize::try_from(u64::from_le_bytes(*length)).map_err(|_| damaged())?;
-        let (description, rest) = rest.split_at_checked(length).ok_or_else(damaged)?;
-        let numbers = &rest[..rest.len().saturating_sub(8)];
-        let (numbers, []) = numbers.as_chunks::<8>() else {
-            return Err(damaged());
-        };
-        let numbers: Vec<f64> = numbers.iter().map(|bytes| f64::from_le_bytes(*bytes)).collect();
-        let description: Value = serde_json::from_slice(description).map_err(|_| damaged())?;
+        let (description, numbers) = opened(MAGIC, bytes).map_err(|closed| match closed {
+            Closed::Other => wrong("the bytes are no tracker that this version of hoid has saved"),
+            Closed::Damaged => damaged(),
+        })?;
+        let numbers = as_numbers(numbers).ok_or_else(damaged)?;
         let orders = match &description["orders"] {
             Value::Null => None,
             listed => Some(orders(listed).ok_or_else(damaged)?),
@@ -175,7 +144,7 @@ mod tests {
             let Some(place) = place else { continue };
             let mut changed = bytes[..bytes.len() - 8].to_vec();
             changed[place..place + from.len()].copy_from_slice(to.as_bytes());
-            let true_sum = sum(&changed);
+            let true_sum = crate::packed::sum(&changed);
             changed.extend_from_slice(&true_sum.to_le_bytes());
             refused(&changed);
         }

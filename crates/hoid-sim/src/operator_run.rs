@@ -7,6 +7,9 @@
 
 use crate::{RunSeed, Simulator, cascade::MOST};
 
+/// Most samples of an operator that goes on.
+const MOST_SAMPLES: f64 = 1e9;
+
 /// An operator that is at work.
 #[derive(Debug, Clone)]
 pub struct OperatorRun {
@@ -66,6 +69,35 @@ impl OperatorRun {
         };
         self.k += 1;
         self.respond();
+    }
+
+    /// Where it stands, as numbers.
+    pub fn saved(&self) -> Vec<f64> {
+        let mut numbers = vec![self.k as f64];
+        numbers.extend(self.operator);
+        numbers.extend(self.remnant);
+        numbers.extend(&self.memory);
+        numbers
+    }
+
+    /// Goes on from where an operator of the same scenario and run stood ([`OperatorRun::saved`]), with the same
+    /// digits. False where the numbers are of another; then nothing has changed.
+    pub fn restore(&mut self, numbers: &[f64]) -> bool {
+        let Some(([k], rest)) = numbers.split_first_chunk::<1>() else {
+            return false;
+        };
+        let Some((operator, rest)) = rest.split_first_chunk::<2>() else {
+            return false;
+        };
+        let Some((remnant, memory)) = rest.split_first_chunk::<MOST>() else {
+            return false;
+        };
+        if memory.len() != self.memory.len() || !(0.0..=MOST_SAMPLES).contains(k) || k.fract() != 0.0 {
+            return false;
+        }
+        (self.k, self.operator, self.remnant) = (*k as usize, *operator, *remnant);
+        self.memory.copy_from_slice(memory);
+        true
     }
 
     /// What stands in the ring for the sample that is next.
@@ -134,6 +166,35 @@ mod tests {
                 operator.take(*e);
             }
         }
+    }
+
+    /// An operator goes on in another, behind the end of its scenario too.
+    #[test]
+    fn a_saved_operator_goes_on_with_the_same_digits() {
+        let mut scenario = Scenario::condition(Condition::C4);
+        scenario.measurement_s = 1.0;
+        let new = || OperatorRun::new(Simulator::new(&scenario).unwrap(), RunSeed::default(), 0.0);
+        let mut first = new();
+        let e = |k: usize| (0.1 * k as f64).sin();
+        (0..700).for_each(|k| first.take(e(k)));
+        let saved = first.saved();
+        let mut second = new();
+        assert!(second.restore(&saved));
+        for k in 700..900 {
+            assert_eq!(first.control().to_bits(), second.control().to_bits(), "{k}");
+            first.take(e(k));
+            second.take(e(k));
+        }
+        let before = second.saved();
+        let mut other = saved.clone();
+        for k in [-1.0, 0.5, f64::NAN, 1e300] {
+            other[0] = k;
+            assert!(!second.restore(&other));
+        }
+        for length in [0, 1, 3, saved.len() - 1] {
+            assert!(!second.restore(&saved[..length]));
+        }
+        assert_eq!(second.saved(), before);
     }
 
     #[test]

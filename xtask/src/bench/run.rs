@@ -10,9 +10,14 @@ use super::{
     growth, instructions,
     lines::{self, Line, Outcome},
     options::{Options, Peers},
-    page, table,
+    table,
 };
-use crate::process::{cargo_command, output, run};
+use crate::{
+    page,
+    process::{cargo_command, output, run},
+};
+
+const PAGE: &str = "reference/speed-peers.md";
 
 const PEERS: &str = "crates/hoid/benches/peers";
 /// Belongs to the example `evidence` and prints no lines.
@@ -40,7 +45,7 @@ pub fn bench(arguments: &[String]) -> Result<(), String> {
         let hoid = build(&["-p", "hoid-cli"], "hoid", Profile::Release)?;
         let text = growth::tables(&ours, &hoid, Path::new(WORK), options.quick)?;
         println!("\n{text}");
-        return page::write("growth", &text, options.dry);
+        return page::write(PAGE, "growth", &text, options.dry);
     }
     let interpreter = interpreter(options.peers)?;
     let mut lines = Vec::new();
@@ -57,7 +62,7 @@ pub fn bench(arguments: &[String]) -> Result<(), String> {
     let text = table::ratios(&lines::best(lines), &machine());
     println!("\n{text}");
     // A part of the tasks is for the eye, not for the page.
-    page::write("ratios", &text, options.dry || !options.only.is_empty())
+    page::write(PAGE, "ratios", &text, options.dry || !options.only.is_empty())
 }
 
 /// How a program is built.

@@ -118,10 +118,16 @@ pub struct StreamArgs {
     /// Column of the output (control) in the header line, where there is one
     #[arg(long, value_name = "NAME", default_value = "u")]
     pub output: String,
-    /// Samples and answers as datagrams of UDP in place of lines: a line of text, or a struct of C, each
-    /// answered in kind. Ports of 127.0.0.1, or addresses and ports, as 0.0.0.0:5005:192.168.1.7:5006
+    /// Samples and answers as datagrams of UDP in place of lines: a line of text, an object of JSON as
+    /// {"t": 0.01, "e": 0.5, "u": -1}, or a struct of C, each answered in kind (text by JSON). Ports of 127.0.0.1, or addresses and ports, as 0.0.0.0:5005:192.168.1.7:5006
     #[arg(long, value_name = "IN:OUT")]
     pub udp: Option<UdpPlaces>,
+    /// Stream of LabStreamingLayer: in Python, by pyhoid.lsl
+    #[arg(long, value_name = "NAME", hide = true)]
+    pub lsl_in: Option<String>,
+    /// Stream of LabStreamingLayer: in Python, by pyhoid.lsl
+    #[arg(long, value_name = "NAME", hide = true)]
+    pub lsl_out: Option<String>,
     /// Multiply e or u: by a factor (u=12.5) or from unit to unit (e=rad:deg). May be repeated
     #[arg(long, value_name = "e|u=FACTOR", value_parser = super::reading::parse_scale)]
     pub scale: Vec<(String, Scaling)>,

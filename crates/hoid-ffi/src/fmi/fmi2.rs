@@ -273,12 +273,6 @@ macro_rules! not_served {
 pub(super) use not_served;
 
 not_served!(
-    fmi2GetFMUstate,
-    fmi2SetFMUstate,
-    fmi2FreeFMUstate,
-    fmi2SerializedFMUstateSize,
-    fmi2SerializeFMUstate,
-    fmi2DeSerializeFMUstate,
     fmi2GetDirectionalDerivative,
     fmi2SetRealInputDerivatives,
     fmi2GetRealOutputDerivatives,

@@ -15,7 +15,7 @@ const OFF: f64 = 1e-6;
 
 /// Where an instance is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Phase {
+pub(super) enum Phase {
     /// Parameters may be set.
     Setup,
     /// Samples are taken.
@@ -25,18 +25,19 @@ enum Phase {
 
 /// An instance.
 pub(super) struct Instance {
-    settings: FmuSettings,
-    variables: Vec<FmuVariable>,
-    values: Vec<FmuStart>,
+    pub(super) token: String,
+    pub(super) settings: FmuSettings,
+    pub(super) variables: Vec<FmuVariable>,
+    pub(super) values: Vec<FmuStart>,
     /// Texts as C wants them, by value reference; empty for what is no text.
     texts: Vec<CString>,
     first_output: usize,
-    phase: Phase,
-    start_s: f64,
+    pub(super) phase: Phase,
+    pub(super) start_s: f64,
     /// The sample that is next.
-    k: u64,
-    end_s: f64,
-    model: Option<Model>,
+    pub(super) k: u64,
+    pub(super) end_s: f64,
+    pub(super) model: Option<Model>,
 }
 
 impl Instance {
@@ -64,6 +65,7 @@ impl Instance {
         let variables = settings.variables()?;
         let first_output = variables.iter().take_while(|v| v.role != Role::Output).count();
         let mut instance = Self {
+            token: token.to_owned(),
             settings,
             values: Vec::new(),
             texts: vec![CString::default(); variables.len()],
@@ -90,7 +92,7 @@ impl Instance {
         self.model = None;
     }
 
-    fn keep_text(&mut self, reference: usize) {
+    pub(super) fn keep_text(&mut self, reference: usize) {
         if let FmuStart::Text(text) = &self.values[reference] {
             self.texts[reference] = CString::new(text.replace('\0', " ")).unwrap_or_default();
         }

@@ -8,6 +8,7 @@
 //! | `instance` | an instance: its values, its phases, when a sample is due |
 //! | `model` | what takes samples: tracker and operator |
 //! | `component` | handles, statuses and messages of both interfaces |
+//! | `state` | its state, to go back to it or to go on elsewhere |
 //! | `fmi2`, `fmi3` | the functions of FMI 2.0 and 3.0 |
 
 mod component;
@@ -15,3 +16,4 @@ pub mod fmi2;
 pub mod fmi3;
 mod instance;
 mod model;
+pub mod state;

@@ -9,7 +9,11 @@ use hoid_sim::{OperatorRun, RunSeed, Simulator};
 use hoid_track::Sample;
 use serde_json::{Map, Value};
 
-use crate::{reading::number_of, session::Session};
+use crate::{
+    packed::{as_bytes, as_numbers},
+    reading::number_of,
+    session::Session,
+};
 
 /// What is done, or why not.
 pub(super) type Done<T = ()> = Result<T, String>;
@@ -79,6 +83,50 @@ impl Model {
         Ok(match settings.kind()? {
             FmuKind::Tracker => Self::Tracker(Box::new(TrackerModel::new(settings, given)?)),
             FmuKind::Operator => Self::Operator(Box::new(OperatorModel::new(settings, given, start_s)?)),
+        })
+    }
+
+    /// Numbers beside the recursion, and its bytes. It does not change.
+    pub fn saved(&mut self) -> (Vec<f64>, Vec<u8>) {
+        match self {
+            Self::Tracker(tracker) => {
+                let told = vec![tracker.innovation, f64::from(tracker.changes), tracker.change_t_s];
+                (told, tracker.session.saved())
+            }
+            Self::Operator(operator) => (Vec::new(), as_bytes(&operator.run.saved())),
+        }
+    }
+
+    /// The model of the same parameters that [`Model::saved`] was asked of.
+    pub fn restored(
+        settings: &FmuSettings,
+        given: &Given<'_>,
+        start_s: f64,
+        beside: &[f64],
+        bytes: &[u8],
+    ) -> Done<Self> {
+        let wrong = || "the state is of another model".to_owned();
+        Ok(match settings.kind()? {
+            FmuKind::Tracker => {
+                let &[innovation, changes, change_t_s] = beside else {
+                    return Err(wrong());
+                };
+                Self::Tracker(Box::new(TrackerModel {
+                    session: Session::restored(bytes).map_err(|failure| failure.text)?,
+                    with_excitation: given.is("with_excitation"),
+                    innovation,
+                    changes: changes as i32,
+                    change_t_s,
+                }))
+            }
+            FmuKind::Operator => {
+                let mut operator = OperatorModel::new(settings, given, start_s)?;
+                let numbers = as_numbers(bytes).ok_or_else(wrong)?;
+                if !operator.run.restore(&numbers) {
+                    return Err(wrong());
+                }
+                Self::Operator(Box::new(operator))
+            }
         })
     }
 

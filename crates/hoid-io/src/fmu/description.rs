@@ -58,9 +58,14 @@ pub(super) fn description(version: FmiVersion, kind: FmuKind, variables: &[FmuVa
             FmiVersion::Three => "",
         }
     );
+    let state = match version {
+        FmiVersion::Two => "FMUstate",
+        FmiVersion::Three => "FMUState",
+    };
     let _ = writeln!(
         xml,
-        "  <CoSimulation modelIdentifier=\"{MODEL}\" canHandleVariableCommunicationStepSize=\"true\"/>"
+        "  <CoSimulation modelIdentifier=\"{MODEL}\" canHandleVariableCommunicationStepSize=\"true\" \
+         canGetAndSet{state}=\"true\" canSerialize{state}=\"true\"/>"
     );
     xml.push_str("  <UnitDefinitions>\n");
     for (name, exponents) in UNITS {

@@ -1,5 +1,5 @@
-//! Samples and estimates as datagrams: lines of text as on standard input, or structs of C, least byte
-//! first and without gaps.
+//! Samples and estimates as datagrams: lines of text as on standard input (cells, or objects of JSON), or
+//! structs of C, least byte first and without gaps.
 //!
 //! ```c
 //! struct sample {             /* 40 bytes */

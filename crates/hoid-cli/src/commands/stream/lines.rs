@@ -3,6 +3,9 @@
 
 use std::io::{self, BufRead, ErrorKind};
 
+use serde::de::IgnoredAny;
+use serde_json::{Map, Value};
+
 use crate::error::CliError;
 
 /// Longest line that is looked at, bytes; of a longer one the rest is left out, so that memory
@@ -132,6 +135,9 @@ impl Columns {
         if line.trim().is_empty() && !line.contains('\t') || line.starts_with('#') {
             return Ok(Meaning::Nothing);
         }
+        if line.starts_with('{') {
+            return Ok(self.object(line));
+        }
         let separator = ['\t', ';', ','].into_iter().find(|s| line.contains(*s)).unwrap_or(',');
         let cells: Vec<&str> = line.split(separator).map(|c| c.trim().trim_matches('"')).collect();
         let places = match self.places {
@@ -155,14 +161,45 @@ impl Columns {
                 shown(line)
             )));
         }
-        let t = match places.t.map(|i| number(cells[i])) {
+        let of = |place: Option<usize>| place.map(|i| number(cells[i]));
+        Ok(self.sample(
+            of(places.t),
+            of(places.e),
+            number(cells[places.u]),
+            of(places.reference),
+        ))
+    }
+
+    /// An object of JSON, by the names of the channels: `{"t": 0.01, "e": 0.5, "u": -1.0}`.
+    fn object(&self, line: &str) -> Meaning {
+        let object: Map<String, Value> = match serde_json::from_str(line) {
+            Ok(object) => object,
+            Err(error) => return Meaning::Unreadable(format!("no object of JSON ({error}): {}", shown(line))),
+        };
+        let of = |name: &str| object.get(name).map(number_of_json);
+        let e = of(&self.input).filter(|_| self.with_input);
+        match of(&self.output) {
+            Some(u) if e.is_some() || !self.with_input => self.sample(of("t"), e, u, of("f_t")),
+            _ => Meaning::Unreadable(format!("an object without {}: {}", self.names(), shown(line))),
+        }
+    }
+
+    /// A sample of its numbers; those that are not there are `None`.
+    fn sample(
+        &self,
+        t: Option<Result<f64, Fault>>,
+        e: Option<Result<f64, Fault>>,
+        u: Result<f64, Fault>,
+        reference: Option<Result<f64, Fault>>,
+    ) -> Meaning {
+        let t = match t {
             None => None,
             Some(Ok(t)) if t.is_finite() => Some(t),
-            Some(Ok(t)) => return Ok(Meaning::Unreadable(format!("t is {t}"))),
-            Some(Err(what)) => return Ok(Meaning::Unreadable(format!("t is {what}"))),
+            Some(Ok(t)) => return Meaning::Unreadable(format!("t is {t}")),
+            Some(Err(what)) => return Meaning::Unreadable(format!("t is {what}")),
         };
         let mut faults = Vec::new();
-        let mut value = |name: &str, cell: &str| match number(cell) {
+        let mut value = |name: &str, number: Result<f64, Fault>| match number {
             Ok(v) if v.abs() <= self.largest => v,
             Ok(v) if v.is_finite() => {
                 faults.push(format!("{name} is {v:e}, beyond {}", self.largest));
@@ -177,16 +214,25 @@ impl Columns {
                 f64::NAN
             }
         };
-        let e = places.e.map_or(0.0, |i| value(&self.input, cells[i]));
-        let u = value(&self.output, cells[places.u]);
-        let reference = places.reference.and_then(|i| number(cells[i]).ok());
-        Ok(Meaning::Sample(Read {
+        let e = e.map_or(0.0, |e| value(&self.input, e));
+        let u = value(&self.output, u);
+        Meaning::Sample(Read {
             t,
             e,
             u,
-            reference: reference.filter(|r| r.abs() <= self.largest),
+            reference: reference.and_then(Result::ok).filter(|r| r.abs() <= self.largest),
             fault: (!faults.is_empty()).then(|| faults.join("; ")),
-        }))
+        })
+    }
+
+    /// Names of the channels that a sample has to have.
+    fn names(&self) -> String {
+        let input = if self.with_input {
+            format!("{} and ", self.input)
+        } else {
+            String::new()
+        };
+        format!("{input}{}", self.output)
     }
 
     fn by_header(&self, cells: &[&str]) -> Result<Places, CliError> {
@@ -201,14 +247,9 @@ impl Columns {
                 reference: place("f_t"),
             }),
             _ => Err(CliError::Stream(format!(
-                "the header has the columns {}, expected {}{}; choose by --input and --output",
+                "the header has the columns {}, expected {}; choose by --input and --output",
                 cells.join(", "),
-                if self.with_input {
-                    format!("{} and ", self.input)
-                } else {
-                    String::new()
-                },
-                self.output
+                self.names()
             ))),
         }
     }
@@ -268,6 +309,20 @@ fn number(cell: &str) -> Result<f64, Fault> {
     }
 }
 
+/// The same of a value of JSON.
+fn number_of_json(value: &Value) -> Result<f64, Fault> {
+    match value {
+        Value::Null => Err(Fault::Missing),
+        Value::String(text) => number(text),
+        other => other.as_f64().ok_or_else(|| Fault::Text(shown(&other.to_string()))),
+    }
+}
+
+/// True for one object of JSON, which may be of several lines.
+pub fn is_object(text: &str) -> bool {
+    text.trim_start().starts_with('{') && serde_json::from_str::<IgnoredAny>(text).is_ok()
+}
+
 /// A text between quotation marks, cut to a readable length.
 fn shown(text: &str) -> String {
     let cut: String = text.chars().take(SHOWN).collect();
@@ -297,6 +352,42 @@ mod tests {
 
     fn usual() -> Columns {
         Columns::new("e", "u", true, 1e6)
+    }
+
+    #[test]
+    fn objects_by_the_names_of_the_channels() {
+        let read = sample(
+            &mut usual(),
+            r#"{"t": 2, "e": 0.5, "u": -1e0, "f_t": 7, "button": [1]}"#,
+        );
+        assert_eq!(
+            (read.t, read.e, read.u, read.reference),
+            (Some(2.0), 0.5, -1.0, Some(7.0))
+        );
+        assert!(read.fault.is_none());
+        // Cells beside objects, in any order.
+        let mut columns = Columns::new("error", "stick", true, 10.0);
+        let read = sample(&mut columns, r#"{"stick": "3", "error": null}"#);
+        assert!(read.t.is_none() && read.e.is_nan() && read.u == 3.0 && !columns.are_known());
+        assert_eq!(read.fault.unwrap(), "error is missing");
+        assert_eq!(sample(&mut columns, "1,2").u, 2.0);
+        let fault = sample(&mut columns, r#"{"stick": 11, "error": {}}"#).fault.unwrap();
+        assert_eq!(fault, "error is \"{}\", no number; stick is 1.1e1, beyond 10");
+        let mut alone = Columns::new("e", "u", false, 1e6);
+        assert_eq!(sample(&mut alone, r#"{"e": 4, "u": 1}"#).e, 0.0);
+        for (line, reason) in [
+            ("{", "no object of JSON"),
+            ("{\"t\": 1}", "without e and u"),
+            ("{\"u\": 1}", "without e and u"),
+            ("{\"t\": null, \"e\": 1, \"u\": 1}", "t is missing"),
+            ("{\"e\": 1e999, \"u\": 1}", "no object of JSON"),
+        ] {
+            match usual().read(line).unwrap() {
+                Meaning::Unreadable(said) => assert!(said.contains(reason), "{line}: {said}"),
+                other => panic!("{line}: {other:?}"),
+            }
+        }
+        assert!(is_object(" {\n\"e\": 1\n}\n") && !is_object("{}\n{}") && !is_object("1"));
     }
 
     #[test]

@@ -35,6 +35,13 @@ use udp::Udp;
 const PATIENCE: Duration = Duration::from_secs(1);
 
 pub fn run(args: &StreamArgs) -> Result<(), CliError> {
+    if args.lsl_in.is_some() || args.lsl_out.is_some() {
+        return Err(CliError::Usage(
+            "--lsl-in, --lsl-out: this program does without liblsl; streams of LabStreamingLayer are tracked in Python, by \
+             pyhoid.lsl.stream(IN, OUT, pyhoid.Tracker(sample_time=0.01)) (pip install \"pyhoid[lsl]\")"
+                .to_owned(),
+        ));
+    }
     let sample_time = SampleTime::new(1.0 / args.fs)?;
     let plan = Plan::new(&args.recursion, sample_time)?;
     if plan.options().method.smooths() {

@@ -10,7 +10,7 @@ use super::{
     clock::{Arrival, Clock, LONGEST_GAP_S},
     datagram::{Datagram, EstimateDatagram},
     line::{Counts, Standing},
-    lines::{Columns, Meaning, Read},
+    lines::{Columns, Meaning, Read, is_object},
 };
 use crate::{
     args::StreamArgs,
@@ -155,7 +155,12 @@ impl Session {
                 }
             }
             Datagram::Lines(text) => {
-                for line in text.lines() {
+                let lines: Vec<&str> = if is_object(text) {
+                    vec![text.trim()]
+                } else {
+                    text.lines().collect()
+                };
+                for line in lines {
                     match self.columns.read(line) {
                         Ok(Meaning::Unreadable(reason)) => self.dropped(format!("{reason}: dropped")),
                         Err(error) => self.dropped(format!("{error}: dropped")),

@@ -1,20 +1,20 @@
-//! The generated passages of the page of the book.
+//! The generated passages of pages of the book.
 
-use std::fs;
+use std::{fs, path::Path};
 
-const PAGE: &str = "docs/src/reference/speed-peers.md";
-
-/// Puts a text between the markers of its passage, or leaves the page as it is in a dry run.
+/// Puts a text between the markers of its passage in a page of the book, or leaves the page as it is in a dry run.
 ///
 /// # Errors
 /// A page that cannot be read or written, or that has no such markers.
-pub fn write(passage: &str, text: &str, dry: bool) -> Result<(), String> {
+pub fn write(page: &str, passage: &str, text: &str, dry: bool) -> Result<(), String> {
     if dry {
         return Ok(());
     }
-    let page = fs::read_to_string(PAGE).map_err(|e| format!("{PAGE}: {e}"))?;
-    let new = replaced(&page, passage, text)?;
-    fs::write(PAGE, new).map_err(|e| format!("{PAGE}: {e}"))
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/src").join(page);
+    let said = |e: std::io::Error| format!("{}: {e}", path.display());
+    let old = fs::read_to_string(&path).map_err(said)?;
+    let new = replaced(&old, passage, text).map_err(|reason| format!("{}: {reason}", path.display()))?;
+    fs::write(&path, new).map_err(said)
 }
 
 fn replaced(page: &str, passage: &str, text: &str) -> Result<String, String> {
@@ -26,9 +26,7 @@ fn replaced(page: &str, passage: &str, text: &str) -> Result<String, String> {
         .split_once(&begin)
         .and_then(|(before, rest)| Some((before, rest.split_once(&end)?.1)));
     let Some((before, after)) = parts else {
-        return Err(format!(
-            "{PAGE}: found no {begin} ... {end}; put them where the table belongs"
-        ));
+        return Err(format!("found no {begin} ... {end}; put them where the table belongs"));
     };
     Ok(format!("{before}{begin}\n\n{}\n\n{end}{after}", text.trim()))
 }

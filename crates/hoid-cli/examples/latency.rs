@@ -1,0 +1,123 @@
+//! How long `hoid stream` takes to answer a sample, and what happens when readers stop, either side begins again,
+//! clocks jump and datagrams are hostile. The numbers of the page "In your simulator".
+//!
+//! `cargo xtask slow latency [--seconds N] [--seed N] [--program FILE] [--python FILE]`: each way and rate for 600 s, unless
+//! told otherwise. Over LabStreamingLayer where the interpreter has pyhoid and pylsl, as that of `cargo xtask places`. It
+//! fails when a sample is lost that is not counted, or one is lost though nobody stopped; never for a time.
+#![allow(clippy::unwrap_used, clippy::print_stdout)]
+
+#[path = "../tests/common/live/mod.rs"]
+mod live;
+
+use std::{
+    path::{Path, PathBuf},
+    process::{Command, ExitCode},
+    time::Duration,
+};
+
+use live::{
+    Draw,
+    paced::{Tally, over_pipes, over_udp},
+    troubles,
+};
+
+const RATES_HZ: [usize; 2] = [100, 1000];
+/// So long readers rest.
+const PAUSE: Duration = Duration::from_secs(2);
+const HOSTILE: usize = 20_000;
+
+fn main() -> ExitCode {
+    let (mut seconds, mut seed, mut program, mut python) = (600, 1, beside_this(), None);
+    let mut arguments = std::env::args().skip(1);
+    while let Some(argument) = arguments.next() {
+        let mut value = || arguments.next().unwrap();
+        match argument.as_str() {
+            "--seconds" => seconds = value().parse().unwrap(),
+            "--seed" => seed = value().parse().unwrap(),
+            "--program" => program = value().into(),
+            "--python" => python = Some(PathBuf::from(value())),
+            other => panic!("{other}: there is --seconds, --seed, --program and --python"),
+        }
+    }
+    let mut draw = Draw(seed);
+    println!("| way | rate | sent | answered | median | 99 % | 99.9 % | longest |");
+    println!("|---|---:|---:|---:|---:|---:|---:|---:|");
+    let mut lost = 0;
+    for rate_hz in RATES_HZ {
+        let n = seconds * rate_hz;
+        let udp = over_udp(&program, rate_hz, n, &mut draw);
+        let pipe = over_pipes(&program, rate_hz, n, &mut draw, Duration::ZERO);
+        for (way, tally) in [("UDP, structs", &udp), ("pipes, lines", &pipe)] {
+            println!("{}", row(way, rate_hz, tally));
+            lost += tally.lost() + tally.summary.skipped + tally.summary.dropped;
+        }
+        match over_lsl(python.clone().unwrap_or_else(interpreter), rate_hz, seconds) {
+            Ok((row, missing)) => {
+                println!("{row}");
+                lost += missing;
+            }
+            Err(reason) => println!("| LabStreamingLayer | {rate_hz} Hz | not here: {reason} | | | | | |"),
+        }
+    }
+    println!("\n| what | sent | answered | bridged | dropped |\n|---|---:|---:|---:|---:|");
+    for found in troubles::all(&program, PAUSE, HOSTILE, &mut draw) {
+        let summary = found.summary;
+        println!(
+            "| {} | {} | {} | {} | {} |",
+            found.what, found.sent, found.answered, summary.missing, summary.dropped
+        );
+    }
+    println!("\n{lost} samples lost while nobody stopped.");
+    if lost == 0 {
+        ExitCode::SUCCESS
+    } else {
+        ExitCode::FAILURE
+    }
+}
+
+fn row(way: &str, rate_hz: usize, tally: &Tally) -> String {
+    let times = [0.5, 0.99, 0.999, 1.0].map(|share| shown(tally.within(share)));
+    format!(
+        "| {way} | {rate_hz} Hz | {} | {} | {} |",
+        tally.sent,
+        tally.trips.len(),
+        times.join(" | ")
+    )
+}
+
+fn shown(time: Duration) -> String {
+    format!("{:.2} ms", 1e3 * time.as_secs_f64())
+}
+
+/// The row of LabStreamingLayer, and how many samples were lost; or why there is none.
+fn over_lsl(python: PathBuf, rate_hz: usize, seconds: usize) -> Result<(String, usize), String> {
+    let output = Command::new(python)
+        .args(["-m", "places.pace", &rate_hz.to_string(), &seconds.to_string()])
+        .current_dir(Path::new(env!("CARGO_MANIFEST_DIR")).join("../../python/tests"))
+        .output()
+        .map_err(|error| error.to_string())?;
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    let (row, missing) = text
+        .trim()
+        .rsplit_once('\n')
+        .ok_or_else(|| "there is no Python with pyhoid and pylsl".to_owned())?;
+    Ok((row.to_owned(), missing.parse().unwrap()))
+}
+
+/// Where this example was built: the folder of the profile.
+fn profile() -> PathBuf {
+    let path = std::env::current_exe().unwrap();
+    path.ancestors().nth(2).unwrap().to_owned()
+}
+
+/// The program that is built beside this example.
+fn beside_this() -> PathBuf {
+    profile().join(format!("hoid{}", std::env::consts::EXE_SUFFIX))
+}
+
+/// The interpreter that the places or the tests have left.
+fn interpreter() -> PathBuf {
+    let of = |environment: &str| profile().join("../python").join(environment).join("bin/python");
+    let found = ["venv-released", "venv"].map(of).into_iter().find(|path| path.exists());
+    found.unwrap_or_else(|| PathBuf::from("python3"))
+}

@@ -1,0 +1,92 @@
+//! `hoid stream` at work: for its tests, and for `cargo xtask slow latency`.
+//!
+//! | file | holds |
+//! |---|---|
+//! | `udp` | a stream over UDP and the socket of who asks it |
+//! | `paced` | samples at a rate, and how long their answers take |
+//! | `troubles` | readers that stop, either side begun again, clocks that jump, hostile datagrams |
+
+pub mod paced;
+pub mod troubles;
+pub mod udp;
+
+use std::{
+    io::{BufReader, Read},
+    process::{Child, ChildStderr, Command},
+};
+
+/// SplitMix64 (Steele, Lea, Flood, 2014).
+pub struct Draw(pub u64);
+
+impl Draw {
+    pub fn bits(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ (z >> 31)
+    }
+
+    pub fn below(&mut self, n: usize) -> usize {
+        (self.bits() % (n.max(1) as u64)) as usize
+    }
+
+    /// From [-1, 1).
+    pub fn share(&mut self) -> f64 {
+        (self.bits() >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
+    }
+}
+
+/// e and u at t: sinusoids, and what they have besides.
+pub fn sample(t_s: f64, draw: &mut Draw) -> (f64, f64) {
+    let waves = |at: f64| (0.9 * at).sin() + 0.5 * (2.3 * at).sin() + 0.2 * (7.1 * at).sin();
+    (waves(t_s), 0.1 * waves(t_s - 0.3) + 0.05 * draw.share())
+}
+
+/// What a stream says of itself at its end.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Summary {
+    pub samples: usize,
+    pub skipped: usize,
+    pub missing: usize,
+    pub dropped: usize,
+}
+
+impl Summary {
+    /// Of `8192 samples: 5 skipped for a fault in e or u (5 of them missing), 0 steps made shorter; 2 lines dropped.`
+    pub fn of(said: &str) -> Self {
+        let line = said
+            .lines()
+            .find(|line| line.contains(" samples: "))
+            .unwrap_or_else(|| panic!("{said}"));
+        let before = |words: &str| -> usize {
+            let (start, _) = line.split_once(words).unwrap_or_else(|| panic!("{line}"));
+            start
+                .rsplit(|c: char| !c.is_ascii_digit())
+                .next()
+                .unwrap()
+                .parse()
+                .unwrap()
+        };
+        Self {
+            samples: before(" samples:"),
+            skipped: before(" skipped"),
+            missing: before(" of them missing"),
+            dropped: before(" lines dropped"),
+        }
+    }
+}
+
+/// Sends a signal to a program of ours.
+pub fn signal(child: &Child, name: &str) {
+    let id = child.id().to_string();
+    assert!(Command::new("kill").args([name, &id]).status().unwrap().success());
+}
+
+/// What a program that ends still says; it ends well.
+pub fn last_words(child: &mut Child, said: &mut BufReader<ChildStderr>) -> String {
+    let mut words = String::new();
+    said.read_to_string(&mut words).unwrap();
+    assert_eq!(child.wait().unwrap().code(), Some(0), "{words}");
+    words
+}

@@ -1,0 +1,232 @@
+//! Readers that stop, either side begun again, clocks that jump, hostile datagrams: nothing crashes, and what was lost
+//! is counted. Each returns samples sent, answers, and what the stream says.
+
+use std::{net::UdpSocket, path::Path, time::Duration};
+
+use super::{
+    Draw, Summary,
+    paced::{over_pipes, paced},
+    sample, signal,
+    udp::{PATIENCE, Stream, as_struct},
+};
+
+/// Hz.
+const RATE: usize = 1000;
+const SLOW: usize = 100;
+
+/// What happened.
+pub struct Outcome {
+    pub what: &'static str,
+    pub sent: usize,
+    pub answered: usize,
+    pub summary: Summary,
+}
+
+fn outcome(what: &'static str, sent: usize, answered: usize, stream: Stream) -> Outcome {
+    Outcome {
+        what,
+        sent,
+        answered,
+        summary: Summary::of(&stream.end()),
+    }
+}
+
+/// All of them.
+pub fn all(program: &Path, pause: Duration, hostile: usize, draw: &mut Draw) -> Vec<Outcome> {
+    vec![
+        reader_of_pipe_stops(program, pause, draw),
+        reader_of_udp_stops(program, pause, draw),
+        stream_stops(program, pause, draw),
+        sender_begins_again(program, draw),
+        stream_begins_again(program, draw),
+        clock_jumps(program, draw),
+        hostile_datagrams(program, hostile, draw),
+    ]
+}
+
+/// Pipes hold the sender back: every sample is answered.
+pub fn reader_of_pipe_stops(program: &Path, pause: Duration, draw: &mut Draw) -> Outcome {
+    let n = (2.0 * pause.as_secs_f64() * RATE as f64) as usize + 500;
+    let tally = over_pipes(program, RATE, n, draw, pause);
+    assert_eq!((tally.lost(), tally.summary.samples), (0, n));
+    assert_eq!((tally.summary.skipped, tally.summary.dropped), (0, 0));
+    Outcome {
+        what: "the reader of the pipe stops",
+        sent: n,
+        answered: tally.trips.len(),
+        summary: tally.summary,
+    }
+}
+
+/// Sends further samples until one of them is answered; the number of samples in all, and of answers
+/// on the way.
+fn until_answered(stream: &Stream, sent: usize, mut send: impl FnMut(usize)) -> (usize, usize) {
+    let (mut sent, mut answered) = (sent, 0);
+    stream
+        .socket
+        .set_read_timeout(Some(Duration::from_millis(200)))
+        .unwrap();
+    let mut bytes = [0; 256];
+    let mut last = None;
+    loop {
+        send(sent);
+        sent += 1;
+        while let Some(length) = stream.receive(&mut bytes) {
+            assert_eq!(length, 168);
+            let sequence = u32::from_le_bytes(bytes[4..8].try_into().unwrap());
+            assert!(last.is_none_or(|last| last < sequence), "in order, and each once");
+            last = Some(sequence);
+            answered += 1;
+            if sequence as usize + 1 == sent {
+                return (sent, answered);
+            }
+        }
+    }
+}
+
+/// Answers that nobody takes are lost, samples are not.
+pub fn reader_of_udp_stops(program: &Path, pause: Duration, draw: &mut Draw) -> Outcome {
+    let stream = Stream::new(program, RATE, &[]);
+    let mut send = |k: usize| {
+        let (e, u) = sample(k as f64 / RATE as f64, draw);
+        stream.send(&as_struct(k as u32, f64::NAN, e, u));
+    };
+    let n = (pause.as_secs_f64() * RATE as f64) as usize;
+    paced(RATE, n, &mut send);
+    let (sent, answered) = until_answered(&stream, n, send);
+    let outcome = outcome("the reader of UDP stops", sent, answered, stream);
+    let summary = outcome.summary;
+    assert_eq!((summary.samples, summary.dropped), (sent, 0));
+    assert!(answered <= sent - summary.missing);
+    outcome
+}
+
+/// Samples that the system lost while the stream stood still are found by their sequence.
+pub fn stream_stops(program: &Path, pause: Duration, draw: &mut Draw) -> Outcome {
+    let stream = Stream::new(program, RATE, &[]);
+    let mut send = |k: usize| {
+        let (e, u) = sample(k as f64 / RATE as f64, draw);
+        stream.send(&as_struct(k as u32, f64::NAN, e, u));
+    };
+    send(0);
+    assert_eq!(stream.estimate().0, 0);
+    signal(&stream.child, "-STOP");
+    let n = (pause.as_secs_f64() * RATE as f64) as usize;
+    paced(RATE, n, |k| send(k + 1));
+    signal(&stream.child, "-CONT");
+    let (sent, answered) = until_answered(&stream, n + 1, send);
+    let outcome = outcome("the stream stands still", sent, answered + 1, stream);
+    let summary = outcome.summary;
+    assert_eq!((summary.samples, summary.dropped), (sent, 0));
+    assert!(outcome.answered <= sent - summary.missing);
+    outcome
+}
+
+/// A sender that comes back with its sequence at zero is believed after ten samples.
+pub fn sender_begins_again(program: &Path, draw: &mut Draw) -> Outcome {
+    let mut stream = Stream::new(program, SLOW, &[]);
+    let ask = |stream: &Stream, draw: &mut Draw| {
+        for k in 0..200 {
+            let (e, u) = sample(k as f64 / SLOW as f64, draw);
+            stream.send(&as_struct(k, f64::NAN, e, u));
+            assert_eq!(stream.estimate().0, k);
+        }
+    };
+    ask(&stream, draw);
+    let place = stream.socket.local_addr().unwrap();
+    // Its port is free before it is taken again.
+    stream.socket = UdpSocket::bind("127.0.0.1:0").unwrap();
+    stream.socket = UdpSocket::bind(place).unwrap();
+    stream.socket.connect(("127.0.0.1", stream.port)).unwrap();
+    stream.socket.set_read_timeout(Some(PATIENCE)).unwrap();
+    ask(&stream, draw);
+    let outcome = outcome("the sender begins again", 400, 400, stream);
+    assert_eq!((outcome.summary.dropped, outcome.summary.missing), (9, 9));
+    outcome
+}
+
+/// A stream that was killed and begun again answers from its first sample on; what was sent meanwhile is lost.
+pub fn stream_begins_again(program: &Path, draw: &mut Draw) -> Outcome {
+    let stream = Stream::new(program, SLOW, &[]);
+    let datagram = |k: u32, draw: &mut Draw| {
+        let (e, u) = sample(f64::from(k) / SLOW as f64, draw);
+        as_struct(k, f64::NAN, e, u)
+    };
+    for k in 0..100 {
+        stream.send(&datagram(k, draw));
+        assert_eq!(stream.estimate().0, k);
+    }
+    let (port, socket) = stream.killed();
+    let mut refused = 0;
+    for k in 100..150 {
+        // The system tells at the next call that nobody listens.
+        refused += usize::from(socket.send(&datagram(k, draw)).is_err());
+    }
+    assert!(refused > 0);
+    // What the system still has to tell of it.
+    let _ = socket.take_error();
+    let stream = Stream::at(program, SLOW, port, socket, &[]);
+    for k in 150..250 {
+        stream.send(&datagram(k, draw));
+        assert_eq!(stream.estimate().0, k);
+    }
+    let outcome = outcome("the stream is killed and begins again", 250, 200, stream);
+    assert_eq!((outcome.summary.samples, outcome.summary.skipped), (100, 0));
+    outcome
+}
+
+/// Times that jump forth are a gap, those that jump back are believed after ten samples.
+pub fn clock_jumps(program: &Path, draw: &mut Draw) -> Outcome {
+    let stream = Stream::new(program, SLOW, &[]);
+    let mut sequence = 0;
+    // By 5 s, back by 4 s, by an hour, of which 10 s are bridged.
+    for begin_s in [0.0, 6.0, 3.0, 3600.0] {
+        for k in 0..100 {
+            let (e, u) = sample(f64::from(k) / SLOW as f64, draw);
+            stream.send(&as_struct(sequence, begin_s + f64::from(k) / SLOW as f64, e, u));
+            assert_eq!(stream.estimate().0, sequence);
+            sequence += 1;
+        }
+    }
+    let outcome = outcome("the clock jumps", 400, 400, stream);
+    assert_eq!((outcome.summary.dropped, outcome.summary.missing), (9, 500 + 9 + 1000));
+    outcome
+}
+
+/// Datagrams that are no samples, between those that are.
+pub fn hostile_datagrams(program: &Path, hostile: usize, draw: &mut Draw) -> Outcome {
+    let stream = Stream::new(program, SLOW, &[]);
+    let mut sent = 0;
+    for k in 0..hostile {
+        stream.send(&no_sample(draw));
+        if k % 8 == 7 {
+            let (e, u) = sample(f64::from(sent) / SLOW as f64, draw);
+            stream.send(&as_struct(sent, f64::NAN, e, u));
+            assert_eq!(stream.estimate().0, sent);
+            sent += 1;
+        }
+    }
+    let outcome = outcome("hostile datagrams", hostile + sent as usize, sent as usize, stream);
+    assert_eq!(outcome.summary.dropped, hostile);
+    assert_eq!((outcome.summary.samples, outcome.summary.skipped), (sent as usize, 0));
+    outcome
+}
+
+fn no_sample(draw: &mut Draw) -> Vec<u8> {
+    let length = 1 + draw.below(300);
+    let any: Vec<u8> = (0..length).map(|_| draw.bits() as u8).collect();
+    let text: String = any.iter().map(|byte| char::from(b'a' + byte % 26)).collect();
+    match draw.below(6) {
+        // No text begins so.
+        0 => [&[0xff], any.as_slice()].concat(),
+        1 => {
+            let mut whole = as_struct(7, f64::NAN, 0.1, 0.1);
+            whole.truncate(4 + draw.below(36));
+            whole
+        }
+        2 => [as_struct(7, f64::NAN, 0.1, 0.1), any].concat(),
+        3 => text.into_bytes(),
+        4 => format!("{{\"t\": {length}, \"{text}\": 1").into_bytes(),
+        _ => format!("nan,{length},{text}").into_bytes(),
+    }
+}

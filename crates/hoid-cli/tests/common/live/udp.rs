@@ -1,0 +1,108 @@
+//! A stream over UDP and the socket of who asks it.
+
+use std::{
+    io::{BufRead, BufReader},
+    net::UdpSocket,
+    path::Path,
+    process::{Child, ChildStderr, Command, Stdio},
+    time::Duration,
+};
+
+use super::{last_words, signal};
+
+/// Far beyond what an answer takes.
+pub const PATIENCE: Duration = Duration::from_secs(60);
+const NUMBERS: usize = 19;
+
+/// A stream that is running.
+pub struct Stream {
+    pub child: Child,
+    said: BufReader<ChildStderr>,
+    /// The port at which it listens.
+    pub port: u16,
+    pub socket: UdpSocket,
+}
+
+impl Stream {
+    /// At a port that the system chooses.
+    pub fn new(program: &Path, rate_hz: usize, arguments: &[&str]) -> Self {
+        let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
+        Self::at(program, rate_hz, 0, socket, arguments)
+    }
+
+    /// At this port, 0 for one that the system chooses, with answers to this socket.
+    pub fn at(program: &Path, rate_hz: usize, port: u16, socket: UdpSocket, arguments: &[&str]) -> Self {
+        socket.set_read_timeout(Some(PATIENCE)).unwrap();
+        let answers = socket.local_addr().unwrap().port();
+        let mut child = Command::new(program)
+            .args(["stream", "--fs", &rate_hz.to_string()])
+            .args(["--udp", &format!("{port}:{answers}")])
+            .args(arguments)
+            .stdin(Stdio::null())
+            .stdout(Stdio::null())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let mut said = BufReader::new(child.stderr.take().unwrap());
+        // Where the system has chosen the port, it is said.
+        let port = loop {
+            let mut line = String::new();
+            assert!(said.read_line(&mut line).unwrap() > 0, "the stream has ended");
+            if let Some((_, rest)) = line.split_once("listening on 127.0.0.1:") {
+                break rest.split(',').next().unwrap().parse::<u16>().unwrap();
+            }
+        };
+        socket.connect(("127.0.0.1", port)).unwrap();
+        Self {
+            child,
+            said,
+            port,
+            socket,
+        }
+    }
+
+    pub fn send(&self, bytes: &[u8]) {
+        self.socket.send(bytes).unwrap();
+    }
+
+    pub fn answer(&self) -> Vec<u8> {
+        let mut bytes = vec![0; 1 << 16];
+        let length = self.receive(&mut bytes).unwrap();
+        bytes.truncate(length);
+        bytes
+    }
+
+    /// Answers come from the port that listens.
+    pub fn receive(&self, bytes: &mut [u8]) -> Option<usize> {
+        self.socket.recv(bytes).ok()
+    }
+
+    pub fn estimate(&self) -> (u32, [f64; NUMBERS], i32, u32) {
+        let bytes = self.answer();
+        assert_eq!((bytes.len(), &bytes[..4]), (168, b"hoid".as_slice()));
+        let word = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap());
+        let number = |i: usize| f64::from_le_bytes(bytes[8 + 8 * i..16 + 8 * i].try_into().unwrap());
+        (word(4), std::array::from_fn(number), word(160).cast_signed(), word(164))
+    }
+
+    /// Interrupts the stream; what it has said.
+    pub fn end(mut self) -> String {
+        signal(&self.child, "-INT");
+        last_words(&mut self.child, &mut self.said)
+    }
+
+    /// Ends the stream without a word; its port and the socket.
+    pub fn killed(mut self) -> (u16, UdpSocket) {
+        self.child.kill().unwrap();
+        self.child.wait().unwrap();
+        (self.port, self.socket)
+    }
+}
+
+/// A sample as a struct; t is NaN where the sequence is to tell it.
+pub fn as_struct(sequence: u32, t: f64, e: f64, u: f64) -> Vec<u8> {
+    let mut bytes = b"hoid".to_vec();
+    bytes.extend_from_slice(&sequence.to_le_bytes());
+    bytes.extend([t, e, u, f64::NAN].iter().flat_map(|n| n.to_le_bytes()));
+    bytes
+}

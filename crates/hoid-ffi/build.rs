@@ -1,0 +1,15 @@
+//! The stack in WebAssembly, which is 1 MB otherwise: a filter that begins takes most of that.
+
+#![allow(clippy::print_stdout)]
+
+use std::env;
+
+/// Bytes.
+const STACK: u32 = 4 << 20;
+
+fn main() {
+    println!("cargo:rerun-if-changed=build.rs");
+    if env::var("CARGO_CFG_TARGET_ARCH").is_ok_and(|arch| arch == "wasm32") {
+        println!("cargo:rustc-link-arg-cdylib=-zstack-size={STACK}");
+    }
+}

@@ -1,0 +1,270 @@
+//! The state of an instance, to go back to it or to go on elsewhere with the same digits (FMI 2.0.4, section
+//! 2.1.8; FMI 3.0.1, section 2.2.10).
+//!
+//! A state in the hands of an importer is what it is serialised to ([`packed`](crate::packed)). The
+//! description is the token of the unit, where the instance is in its experiment and the values of all
+//! variables; the bytes are those of the tracker, or the numbers of the operator. Numbers of 64 bits stand in
+//! the description by their bits, for JSON has no NaN.
+
+#![allow(missing_docs, non_snake_case, clippy::missing_safety_doc)]
+
+use std::ffi::{c_int, c_uchar};
+
+use hoid_io::fmu::FmuStart;
+use serde_json::{Value, json};
+
+use super::{
+    component::{Component, list, list_mut, with},
+    instance::{Instance, Phase},
+    model::{Done, Given, Model},
+};
+use crate::packed::{opened, packed};
+
+const MAGIC: [u8; 8] = *b"hoidfmu\x01";
+
+/// A state in the hands of an importer.
+pub struct State(Vec<u8>);
+
+impl Instance {
+    /// The state as bytes. It does not change.
+    fn saved(&mut self) -> Vec<u8> {
+        let phase = match self.phase {
+            Phase::Setup => "setup",
+            Phase::Running => "running",
+            Phase::Ended => "ended",
+        };
+        let values: Vec<Value> = self.values.iter().map(of_value).collect();
+        let (beside, bytes) = self.model.as_mut().map(Model::saved).unwrap_or_default();
+        let beside: Vec<u64> = beside.into_iter().map(f64::to_bits).collect();
+        let description = json!({
+            "unit": self.token,
+            "phase": phase,
+            "start": self.start_s.to_bits(),
+            "k": self.k,
+            "end": self.end_s.to_bits(),
+            "values": values,
+            "model": self.model.is_some().then_some(beside),
+        });
+        packed(MAGIC, &description, &bytes)
+    }
+
+    /// Goes to a state of this unit; one that cannot be leaves all as it is.
+    fn restore(&mut self, bytes: &[u8]) -> Done {
+        let wrong = || "the state is none of this unit, or was changed or cut since it was taken".to_owned();
+        let (description, bytes) = opened(MAGIC, bytes).map_err(|_| wrong())?;
+        if description["unit"] != json!(self.token) {
+            return Err(wrong());
+        }
+        let phase = match description["phase"].as_str() {
+            Some("setup") => Phase::Setup,
+            Some("running") => Phase::Running,
+            Some("ended") => Phase::Ended,
+            _ => return Err(wrong()),
+        };
+        let number = |value: &Value| value.as_u64().map(f64::from_bits).ok_or_else(wrong);
+        let listed = description["values"].as_array().ok_or_else(wrong)?;
+        if listed.len() != self.variables.len() {
+            return Err(wrong());
+        }
+        let typed = self.variables.iter().zip(listed);
+        let values: Vec<FmuStart> = typed
+            .map(|(variable, value)| to_value(&variable.start, value))
+            .collect::<Option<_>>()
+            .ok_or_else(wrong)?;
+        let start_s = number(&description["start"])?;
+        let end_s = number(&description["end"])?;
+        let k = description["k"].as_u64().ok_or_else(wrong)?;
+        let model = match &description["model"] {
+            Value::Null if phase != Phase::Running => None,
+            beside => {
+                let beside = beside.as_array().ok_or_else(wrong)?;
+                let beside: Vec<f64> = beside.iter().map(number).collect::<Done<_>>()?;
+                let given = Given {
+                    variables: &self.variables,
+                    values: &values,
+                };
+                Some(Model::restored(&self.settings, &given, start_s, &beside, bytes)?)
+            }
+        };
+        self.values = values;
+        (0..self.values.len()).for_each(|reference| self.keep_text(reference));
+        (self.phase, self.start_s, self.k, self.end_s, self.model) = (phase, start_s, k, end_s, model);
+        Ok(())
+    }
+}
+
+fn of_value(value: &FmuStart) -> Value {
+    match value {
+        FmuStart::Real(value) => json!(value.to_bits()),
+        FmuStart::Integer(value) => json!(value),
+        FmuStart::Boolean(value) => json!(value),
+        FmuStart::Text(text) => json!(text),
+    }
+}
+
+/// A value of the type of this one.
+fn to_value(of: &FmuStart, value: &Value) -> Option<FmuStart> {
+    Some(match of {
+        FmuStart::Real(_) => FmuStart::Real(f64::from_bits(value.as_u64()?)),
+        FmuStart::Integer(_) => FmuStart::Integer(i32::try_from(value.as_i64()?).ok()?),
+        FmuStart::Boolean(_) => FmuStart::Boolean(value.as_bool()?),
+        FmuStart::Text(_) => FmuStart::Text(value.as_str()?.to_owned()),
+    })
+}
+
+/// A place of the importer for a state.
+///
+/// # Safety
+/// `place` is null or points to null or to a state that was made here and not freed.
+unsafe fn held<'a>(place: *mut *mut State) -> Done<&'a mut *mut State> {
+    // SAFETY: by the contract of this function.
+    let place = unsafe { list_mut(place, 1) }?;
+    place
+        .first_mut()
+        .ok_or_else(|| "there is no place for the state".to_owned())
+}
+
+/// Hands a state over: into the one that is there, else as a new one.
+///
+/// # Safety
+/// As [`held`].
+unsafe fn hand_over(bytes: Vec<u8>, place: *mut *mut State) -> Done {
+    // SAFETY: by the contract of this function.
+    let place = unsafe { held(place) }?;
+    if place.is_null() {
+        *place = Box::into_raw(Box::new(State(bytes)));
+        return Ok(());
+    }
+    // SAFETY: not null: by the contract a state that was made here.
+    let there = unsafe { list_mut(*place, 1) }?;
+    there.iter_mut().for_each(|state| state.0.clone_from(&bytes));
+    Ok(())
+}
+
+/// The bytes of a state.
+///
+/// # Safety
+/// `state` is null or was made here and not freed.
+unsafe fn bytes_of<'a>(state: *const State) -> Done<&'a [u8]> {
+    // SAFETY: by the contract of this function.
+    let states = unsafe { list(state, 1) }?;
+    states
+        .first()
+        .map(|state| state.0.as_slice())
+        .ok_or_else(|| "there is no state".to_owned())
+}
+
+macro_rules! states {
+    ($get:ident, $set:ident, $free:ident, $size:ident, $serialise:ident, $deserialise:ident) => {
+        #[unsafe(no_mangle)]
+        pub unsafe extern "C" fn $get(component: *mut Component, state: *mut *mut State) -> c_int {
+            let take = |instance: &mut Instance| {
+                let bytes = instance.saved();
+                // SAFETY: by the contract of the interface.
+                unsafe { hand_over(bytes, state) }
+            };
+            // SAFETY: by the contract of the interface.
+            unsafe { with(component, take) }
+        }
+
+        #[unsafe(no_mangle)]
+        pub unsafe extern "C" fn $set(component: *mut Component, state: *mut State) -> c_int {
+            let go = |instance: &mut Instance| {
+                // SAFETY: by the contract of the interface.
+                let bytes = unsafe { bytes_of(state) }?;
+                instance.restore(bytes)
+            };
+            // SAFETY: by the contract of the interface.
+            unsafe { with(component, go) }
+        }
+
+        #[unsafe(no_mangle)]
+        pub unsafe extern "C" fn $free(component: *mut Component, state: *mut *mut State) -> c_int {
+            let free = |_: &mut Instance| {
+                // SAFETY: by the contract of the interface.
+                let place = unsafe { held(state) }?;
+                if !place.is_null() {
+                    // SAFETY: it came from `hand_over`, and is null from now on.
+                    drop(unsafe { Box::from_raw(std::mem::replace(place, std::ptr::null_mut())) });
+                }
+                Ok(())
+            };
+            // SAFETY: by the contract of the interface.
+            unsafe { with(component, free) }
+        }
+
+        #[unsafe(no_mangle)]
+        pub unsafe extern "C" fn $size(component: *mut Component, state: *mut State, size: *mut usize) -> c_int {
+            let tell = |_: &mut Instance| {
+                // SAFETY: by the contract of the interface.
+                let bytes = unsafe { bytes_of(state) }?;
+                // SAFETY: by the contract of the interface.
+                let size = unsafe { list_mut(size, 1) }?;
+                size.fill(bytes.len());
+                Ok(())
+            };
+            // SAFETY: by the contract of the interface.
+            unsafe { with(component, tell) }
+        }
+
+        #[unsafe(no_mangle)]
+        pub unsafe extern "C" fn $serialise(
+            component: *mut Component,
+            state: *mut State,
+            room: *mut c_uchar,
+            size: usize,
+        ) -> c_int {
+            let write = |_: &mut Instance| {
+                // SAFETY: by the contract of the interface.
+                let bytes = unsafe { bytes_of(state) }?;
+                if size < bytes.len() {
+                    return Err(format!(
+                        "there is room for {size} bytes, the state has {}",
+                        bytes.len()
+                    ));
+                }
+                // SAFETY: by the contract of the interface there is this room, and no more is used.
+                let room = unsafe { list_mut(room, bytes.len()) }?;
+                room.copy_from_slice(bytes);
+                Ok(())
+            };
+            // SAFETY: by the contract of the interface.
+            unsafe { with(component, write) }
+        }
+
+        #[unsafe(no_mangle)]
+        pub unsafe extern "C" fn $deserialise(
+            component: *mut Component,
+            bytes: *const c_uchar,
+            size: usize,
+            state: *mut *mut State,
+        ) -> c_int {
+            let read = |_: &mut Instance| {
+                // SAFETY: by the contract of the interface.
+                let bytes = unsafe { list(bytes, size) }?;
+                opened(MAGIC, bytes).map_err(|_| "the bytes are no state, or were changed or cut".to_owned())?;
+                // SAFETY: by the contract of the interface.
+                unsafe { hand_over(bytes.to_vec(), state) }
+            };
+            // SAFETY: by the contract of the interface.
+            unsafe { with(component, read) }
+        }
+    };
+}
+
+states!(
+    fmi2GetFMUstate,
+    fmi2SetFMUstate,
+    fmi2FreeFMUstate,
+    fmi2SerializedFMUstateSize,
+    fmi2SerializeFMUstate,
+    fmi2DeSerializeFMUstate
+);
+states!(
+    fmi3GetFMUState,
+    fmi3SetFMUState,
+    fmi3FreeFMUState,
+    fmi3SerializedFMUStateSize,
+    fmi3SerializeFMUState,
+    fmi3DeserializeFMUState
+);

@@ -1,0 +1,71 @@
+//! A description in JSON and bytes behind it, of which damage shows.
+//!
+//! | bytes | |
+//! |---|---|
+//! | 8 | what it is, and the version of its layout |
+//! | 8 | length L of the description |
+//! | L | the description |
+//! | | the bytes |
+//! | 8 | FNV-1a over all before (G. Fowler, L. C. Noll, K.-P. Vo, 1991; 64 bits) |
+//!
+//! All least byte first. The sum guards against damage, not against an adversary.
+
+use serde_json::Value;
+
+const BASIS: u64 = 0xcbf2_9ce4_8422_2325;
+const PRIME: u64 = 0x0000_0100_0000_01b3;
+
+/// Why bytes are not opened.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Closed {
+    /// They are something else, or of another version.
+    Other,
+    /// They were changed or cut.
+    Damaged,
+}
+
+pub(crate) fn sum(bytes: &[u8]) -> u64 {
+    let next = |sum: u64, byte: &u8| (sum ^ u64::from(*byte)).wrapping_mul(PRIME);
+    bytes.iter().fold(BASIS, next)
+}
+
+pub(crate) fn packed(magic: [u8; 8], description: &Value, bytes: &[u8]) -> Vec<u8> {
+    let description = description.to_string();
+    let mut all = magic.to_vec();
+    all.extend_from_slice(&(description.len() as u64).to_le_bytes());
+    all.extend_from_slice(description.as_bytes());
+    all.extend_from_slice(bytes);
+    let sum = sum(&all);
+    all.extend_from_slice(&sum.to_le_bytes());
+    all
+}
+
+/// Description and bytes.
+pub(crate) fn opened(magic: [u8; 8], all: &[u8]) -> Result<(Value, &[u8]), Closed> {
+    let rest = all.strip_prefix(&magic).ok_or(Closed::Other)?;
+    let of = || {
+        let (body, stated) = all.split_last_chunk::<8>()?;
+        if sum(body) != u64::from_le_bytes(*stated) {
+            return None;
+        }
+        let (length, rest) = rest.split_first_chunk::<8>()?;
+        let length = usize::try_from(u64::from_le_bytes(*length)).ok()?;
+        let (description, rest) = rest.split_at_checked(length)?;
+        let bytes = rest.get(..rest.len().checked_sub(8)?)?;
+        Some((serde_json::from_slice(description).ok()?, bytes))
+    };
+    of().ok_or(Closed::Damaged)
+}
+
+/// Numbers as bytes.
+pub(crate) fn as_bytes(numbers: &[f64]) -> Vec<u8> {
+    numbers.iter().flat_map(|number| number.to_le_bytes()).collect()
+}
+
+/// The numbers of bytes; none where there are some left.
+pub(crate) fn as_numbers(bytes: &[u8]) -> Option<Vec<f64>> {
+    let (numbers, []) = bytes.as_chunks::<8>() else {
+        return None;
+    };
+    Some(numbers.iter().map(|bytes| f64::from_le_bytes(*bytes)).collect())
+}

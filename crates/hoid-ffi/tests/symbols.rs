@@ -1,0 +1,55 @@
+//! What the shared library hands out is what is listed in `abi/symbols-N.txt`, N the version of the interface.
+//!
+//! A program that was linked once finds its functions in every later library of the same version: none may
+//! vanish. What is listed is what is kept, so that nothing is handed out by accident either.
+#![cfg(target_os = "linux")]
+#![allow(clippy::unwrap_used, clippy::print_stderr)]
+
+mod common;
+
+use std::{collections::BTreeSet, fs, path::Path, process::Command};
+
+use hoid_ffi::HOID_ABI_VERSION;
+
+fn listed() -> BTreeSet<String> {
+    let file = format!("{}/abi/symbols-{HOID_ABI_VERSION}.txt", env!("CARGO_MANIFEST_DIR"));
+    let text = fs::read_to_string(Path::new(&file)).unwrap();
+    let lines = text.lines().filter(|line| !line.starts_with('#'));
+    lines.map(str::to_owned).collect()
+}
+
+#[test]
+fn the_library_hands_out_what_is_listed() {
+    let library = common::shared_library();
+    let told = Command::new("nm").args(["-D", "--defined-only"]).arg(&library).output();
+    let Ok(told) = told else {
+        eprintln!("skipped: nm is not here (binutils)");
+        return;
+    };
+    let text = String::from_utf8(told.stdout).unwrap();
+    let symbols: BTreeSet<String> = text
+        .lines()
+        .filter_map(|line| line.rsplit(' ').next())
+        .map(str::to_owned)
+        .collect();
+    let listed = listed();
+    let vanished: Vec<_> = listed.difference(&symbols).collect();
+    assert!(
+        vanished.is_empty(),
+        "functions vanished, which programs were linked with: {vanished:?}; keep them, or make HOID_ABI_VERSION another"
+    );
+    let unlisted: Vec<_> = symbols.difference(&listed).collect();
+    assert!(
+        unlisted.is_empty(),
+        "not in abi/symbols-{HOID_ABI_VERSION}.txt, from where nothing is ever taken away: {unlisted:?}"
+    );
+}
+
+/// What the header declares is listed too, on every platform alike.
+#[test]
+fn the_header_declares_what_is_listed() {
+    let header = fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/include/hoid.h")).unwrap();
+    let ours = listed().into_iter().filter(|name| name.starts_with("hoid_"));
+    let missing: Vec<String> = ours.filter(|name| !header.contains(&format!("{name}("))).collect();
+    assert_eq!(missing, Vec::<String>::new());
+}

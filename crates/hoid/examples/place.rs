@@ -1,0 +1,41 @@
+//! Samples `e,u` on standard input; after each the six parameters of the operator, crossover and phase margin, each
+//! with its standard error, and the nanoseconds that the sample took: a place of `cargo xtask places`.
+#![allow(clippy::print_stdout)]
+
+use std::{
+    error::Error,
+    io::{BufRead, Write, stdin, stdout},
+    time::Instant,
+};
+
+use hoid::prelude::*;
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let sample_time = SampleTime::new(0.01)?;
+    // Begun with the usual delay, 0.2 s.
+    let options = TrackOptions {
+        controlled_element: Some("90/(s(s+6))".parse()?),
+        ..TrackOptions::usual(Method::population(), 21)
+    };
+    let mut tracker = Tracker::new(&options, None, sample_time)?;
+    let mut out = stdout().lock();
+    for line in stdin().lock().lines() {
+        let line = line?;
+        let (e, u) = line.split_once(',').ok_or("a line is not two numbers, e,u")?;
+        let (e, u) = (e.parse()?, u.parse()?);
+        let begin = Instant::now();
+        tracker.step(e, u);
+        let operator = tracker.operator().ok();
+        let found = tracker.open_loop().and_then(Result::ok);
+        let took = begin.elapsed();
+        let rows = operator.map(|operator| operator.rows().map(|(.., estimate)| Some(estimate)));
+        let of_loop = [found.map(|f| f.crossover_rad_s), found.map(|f| f.phase_margin_deg)];
+        for estimate in rows.unwrap_or([None; 6]).into_iter().chain(of_loop) {
+            let value = estimate.map_or(f64::NAN, |e| e.value);
+            let error = estimate.and_then(|e| e.standard_error).unwrap_or(f64::NAN);
+            write!(out, "{value:?},{error:?},")?;
+        }
+        writeln!(out, "{}", took.as_nanos())?;
+    }
+    Ok(())
+}

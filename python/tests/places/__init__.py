@@ -1,0 +1,27 @@
+"""The places in which hoid runs: one run through each, its estimates, and the time of a sample.
+
+A place takes e and u of 82 s of C4, a sample at a time, and tells the operator after each.
+``test_places.py`` compares all of them with `hoid track`, to the last digit; ``python -m places``
+(by ``cargo xtask places``) writes the table of the book. What a place needs and is not here makes
+it `Missing`, with the reason.
+
+| file | holds |
+|---|---|
+| ``told.py`` | what a place tells, and how it is compared |
+| ``tools.py`` | what is built and installed |
+| ``programs.py`` | programs that read lines: `hoid`, Rust, C, C++, WebAssembly, Cortex-M4 |
+| ``within.py`` | what runs within this process: Python, functional mock-up units |
+| ``sockets.py`` | UDP, LabStreamingLayer |
+| ``table.py`` | the table |
+| ``place.c``, ``place.mjs`` | what the places in C, C++ and JavaScript run |
+"""
+
+from __future__ import annotations
+
+from . import programs, sockets, within
+from .told import Missing, Place, Run, Told
+from .tools import Tools
+
+__all__ = ["PLACES", "Missing", "Place", "Run", "Told", "Tools"]
+
+PLACES: tuple[Place, ...] = (*programs.PLACES, *within.PLACES, *sockets.PLACES)

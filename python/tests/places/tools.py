@@ -1,0 +1,90 @@
+"""What is built and installed."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from .told import Missing
+
+ROOT = Path(__file__).parents[3]
+HERE = Path(__file__).parent
+
+
+@dataclass(frozen=True)
+class Tools:
+    #: The program hoid; what is built with it lies beside it.
+    binary: Path
+    #: Where work may be done.
+    folder: Path
+    #: For the table: all has just been built, and all of the run is taken under QEMU, which takes
+    #: a minute; else its first seconds.
+    whole: bool = False
+
+    def hoid(self, *arguments: Any) -> str:
+        return output([self.binary, *arguments])
+
+    def library(self) -> Path:
+        names = ("libhoid_ffi.so", "libhoid_ffi.dylib", "hoid_ffi.dll")
+        beside = self.binary.parent
+        places = [place / name for place in (beside, beside / "deps") for name in names]
+        return newest(places, "no shared library: cargo build -p hoid-ffi")
+
+    def example(self, name: str) -> Path:
+        path = self.binary.parent / "examples" / f"{name}{self.binary.suffix}"
+        return newest([path], f"no example {name}: cargo build -p hoid --example {name}")
+
+    def of_target(self, target: str, name: str) -> Path:
+        """What was built for another processor: of release, else as the tests."""
+        folder = self.binary.parents[1] / target
+        places = [folder / profile / name for profile in ("release", "debug")]
+        found = newest(places, f"not built for {target}: cargo xtask places")
+        # The chore has just built it; what lies about from another day is none of these sources.
+        if not self.whole and found.stat().st_mtime < self.binary.stat().st_mtime:
+            raise Missing(f"built for {target} before the program was: cargo xtask places")
+        return found
+
+    def shipped(self, path: Path) -> int:
+        """Bytes of a file as it is shipped."""
+        return stripped(path, self.folder).stat().st_size
+
+
+def stripped(path: Path, folder: Path) -> Path:
+    """A program or library without its symbols, where `strip` is here."""
+    strip = shutil.which("strip")
+    if strip is None:
+        return path
+    small = folder / f"stripped-{path.name}"
+    subprocess.run([strip, "-o", small, path], check=True)
+    return small
+
+
+def newest(places: list[Path], reason: str) -> Path:
+    there = [path for path in places if path.exists()]
+    if not there:
+        raise Missing(reason)
+    return max(there, key=lambda path: path.stat().st_mtime)
+
+
+def program(*names: str) -> str:
+    """The first of these programs that is here."""
+    for name in names:
+        if (found := shutil.which(name)) is not None:
+            return found
+    raise Missing(f"there is no {' or '.join(names)}")
+
+
+def output(command: list[Any], **options: Any) -> str:
+    """What a program prints; what it says where it fails."""
+    words = [str(word) for word in command]
+    done = subprocess.run(words, capture_output=True, text=True, check=False, **options)
+    assert done.returncode == 0, f"{words}: {done.stderr}"
+    return done.stdout
+
+
+def binary() -> Path:
+    return Path(os.environ["HOID_BINARY"]).absolute()

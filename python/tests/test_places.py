@@ -1,0 +1,43 @@
+"""One run of 82 s through every place that is here: the digits of `hoid track`, every one."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from places import PLACES, Missing, Place, Run, Tools
+from places.told import expected
+
+
+@pytest.fixture(scope="module")
+def tools(cli: Any, tmp_path_factory: pytest.TempPathFactory) -> Tools:
+    return Tools(Path(cli.binary).absolute(), tmp_path_factory.mktemp("places"))
+
+
+@pytest.fixture(scope="module")
+def run(tools: Tools) -> Run:
+    return Run.made(tools, tools.folder)
+
+
+@pytest.fixture(scope="module")
+def traces(tools: Tools, run: Run) -> dict[tuple[str, ...], dict[str, list[float]]]:
+    return {
+        options: expected(tools, run, tools.folder, options)
+        for options in {place.options for place in PLACES}
+    }
+
+
+@pytest.mark.parametrize("place", PLACES, ids=lambda place: place.name)
+def test_the_digits_are_those_of_track(place: Place, tools: Tools, run: Run, traces: Any) -> None:
+    try:
+        told = place.run(run, tools)
+    except Missing as reason:
+        pytest.skip(str(reason))
+    off = told.compared(traces[place.options]).off
+    assert set(off) <= set(place.other_functions) and all(by <= place.off for by in off.values())
+    # A row each sample, and not only what is not known yet.
+    assert len(told.rows) == len(run.e) or told.at is not None
+    assert len(told.rows) >= 3 and not np.isnan(told.rows[-1]).any()
