@@ -34,7 +34,7 @@ AT_HAND = ("actions/checkout", "dtolnay/rust-toolchain", "Swatinem/rust-cache", 
 #: Commands that publish, and what is run in their place.
 DRY = {"cargo publish ": "cargo package --allow-dirty --no-verify ", "gh release create": "echo gh release create"}
 #: The same, built faster.
-DEV = {"--release": "--profile dev", "/release/": "/debug/", "packages.py --install": "packages.py --profile dev --install"}
+DEV = {"--profile shipped": "--profile dev", "/shipped/": "/debug/", "packages.py --install": "packages.py --profile dev --install"}
 #: What may become of a step.
 OUTCOMES = ("passed", "failed", "not here")
 
