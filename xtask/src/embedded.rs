@@ -9,10 +9,7 @@ use std::{
     process::{Command, Stdio},
 };
 
-use crate::{
-    places::installed_targets,
-    process::{cargo, output, target_directory},
-};
+use crate::process::{cargo, installed_targets, output, target_directory};
 
 /// The processor that is run, and the one that is built for.
 pub const CORTEX: &str = "thumbv7em-none-eabihf";

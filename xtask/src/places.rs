@@ -9,7 +9,7 @@ use std::{env, process::Command};
 use crate::{
     embedded::CORTEX,
     page,
-    process::{cargo, output, target_directory},
+    process::{cargo, installed_targets, output, target_directory},
     python::{self, Wheel},
 };
 
@@ -72,9 +72,4 @@ pub fn wasm(profile: &str) -> Result<(), String> {
         ],
         &[],
     )
-}
-
-pub fn installed_targets() -> Vec<String> {
-    let told = output(Command::new("rustup").args(["target", "list", "--installed"])).unwrap_or_default();
-    told.lines().map(str::to_owned).collect()
 }

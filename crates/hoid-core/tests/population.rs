@@ -26,7 +26,7 @@ fn prior(threshold: f64) -> PopulationPrior {
             newborn: [0.1, 0.5],
             odds: 0.01,
             life: 2.0,
-            steady: 15.0,
+            steady: 9.0,
             freedom: 5.0,
             limit: 3.5,
             forgotten: [TS / 60.0, TS / 5.0],

@@ -5,9 +5,9 @@
 //!   is not known at the beginning and in every drift.
 //! - **Drifts.** Of each form one filter says that the gains hardly move, others that they walk at
 //!   random. A filter whose weight has fallen below `LEAST` takes over the state of the best. Who begins
-//!   with nothing does not walk at first: an error near one frequency is explained by gains that follow
-//!   its phase as well as by the right poles and delay, and better than by poles and delay that are not
-//!   found yet, so that they never would be.
+//!   with nothing does not walk for some seconds from when what is held is corrected: an error near one
+//!   frequency is explained by gains that follow its phase as well as by the right poles and delay, and
+//!   better than by poles and delay that are not found yet, so that they never would be.
 //! - **Newborns.** Others say that the gains have just changed: they begin as the first, with a
 //!   variance added, and walk at random. After their life they are born again; one that foretells
 //!   better than the first then takes its place. So a change is followed at once, and what comes
@@ -49,7 +49,7 @@ pub struct GainPrior {
     pub odds: f64,
     /// Their life, s.
     pub life: f64,
-    /// Time from the beginning in which the gains do not walk, s.
+    /// Time in which the gains do not walk once what is held is corrected, s.
     pub steady: f64,
     /// Degrees of freedom of the Student distribution.
     pub freedom: f64,
@@ -103,11 +103,13 @@ pub struct Gains {
     filters: [[Kalman; FILTERS]; FORMS],
     log_weights: [f64; FORMS],
     samples: u64,
-    /// Samples up to which the gains do not walk.
+    /// Samples for which the gains do not walk once what is held is corrected, and those up to which
+    /// they do not.
     steady: u64,
+    still: u64,
 }
 
-crate::state!([] Gains { filters, log_weights, samples, steady });
+crate::state!([] Gains { filters, log_weights, samples, steady, still });
 
 impl Gains {
     /// With gains of zero and nothing known of them. The basis gives the scale of the gains. `None`
@@ -125,6 +127,7 @@ impl Gains {
             log_weights: [-libm::log(FORMS as f64); FORMS],
             samples: 0,
             steady: libm::round(prior.steady / prior.sample_time) as u64,
+            still: 0,
         };
         gains.weigh_anew();
         prior.is_sound().then_some(gains)
@@ -167,7 +170,7 @@ impl Gains {
         self.weigh_anew();
     }
 
-    /// Lets the gains walk from now on.
+    /// Lets the gains walk at any time.
     pub(super) fn walk_at_once(&mut self) {
         self.steady = 0;
     }
@@ -186,6 +189,7 @@ impl Gains {
         for (filters, shape) in self.filters.iter_mut().zip(&self.shapes) {
             filters.iter_mut().for_each(|f| f.reopen(shape, gain, level, held));
         }
+        self.still = self.samples + self.steady;
     }
 
     /// Lets the gains be anything within this standard deviation more than they were.
@@ -270,7 +274,7 @@ impl Gains {
         let jump = self.prior.newborn[1] * unit;
         let odds = libm::log(self.prior.odds);
         for (filters, shape) in self.filters.iter_mut().zip(&self.shapes) {
-            if self.samples < self.steady {
+            if self.samples < self.still {
                 let steady = filters[0];
                 filters[1..DRIFTS].fill(Kalman {
                     log_weight: AGAIN,

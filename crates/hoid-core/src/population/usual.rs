@@ -40,8 +40,6 @@ const SHARES: [f64; DRIFTS] = [0.9, 0.05, 0.05];
 const NEWBORN: [f64; 2] = [0.1, 0.5];
 const ODDS: f64 = 0.01;
 const LIFE_S: f64 = 2.0;
-/// Time from the beginning in which the gains do not walk, s.
-const STEADY_S: f64 = 15.0;
 /// Degrees of freedom of the innovations.
 const FREEDOM: f64 = 5.0;
 /// Time constants with which the weights of forms and of drifts are forgotten, s.
@@ -56,6 +54,8 @@ const LEVEL_MEMORY_S: [f64; 2] = [5.0, 10.0];
 const OFFSET_DRIFT: [f64; 2] = [0.005, 0.01];
 /// Time after which neuromuscular system and delay are corrected, s.
 const REOPEN_S: f64 = 6.0;
+/// Time in which the gains do not walk once these are corrected, s.
+const STEADY_S: f64 = 9.0;
 /// Where else somebody may begin: delay, s more than that of nk; natural frequency, rad/s; damping.
 /// Corrections find from one of them to what lies between. The first is the usual person.
 const ELSEWHERE: [[f64; 3]; RIVALS] = [

@@ -195,7 +195,7 @@ fn newborns_follow_a_jump_that_the_steady_would_take_long_for() {
 
 /// A gain that walks is followed by those that walk, but for the time in which none does.
 #[test]
-fn who_begins_with_nothing_does_not_walk_at_first() {
+fn gains_do_not_walk_while_poles_and_delay_are_found() {
     let errors = |steady: f64| {
         let prior = GainPrior {
             drifts: [0.0, 0.5, 0.5],
@@ -205,6 +205,7 @@ fn who_begins_with_nothing_does_not_walk_at_first() {
         };
         let mut gains = Gains::new(prior, &basis()).unwrap();
         gains.begin(2.0, 0.5);
+        gains.reopen(2.0, 0.5, basis().point());
         let mut sums = [0.0; 2];
         for t in 0..2000 {
             let (y, regressors) = sample(t);
