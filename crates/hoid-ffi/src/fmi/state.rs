@@ -1,7 +1,7 @@
 //! The state of an instance, to go back to it or to go on elsewhere with the same digits (FMI 2.0.4, section
 //! 2.1.8; FMI 3.0.1, section 2.2.10).
 //!
-//! A state in the hands of an importer is what it is serialised to ([`packed`](crate::packed)). The
+//! A state in the hands of an importer is what it is serialised to (`packed`). The
 //! description is the token of the unit, where the instance is in its experiment and the values of all
 //! variables; the bytes are those of the tracker, or the numbers of the operator. Numbers of 64 bits stand in
 //! the description by their bits, for JSON has no NaN.
