@@ -30,7 +30,7 @@ def library(cli: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The shared library of the same sources; `cargo xtask test` builds it beside the program."""
     folder = tmp_path_factory.mktemp("library")
     try:
-        return stripped(Tools(Path(cli.binary), folder).library(), folder)
+        return stripped(Tools(Path(cli.binary), folder).shared_library(), folder)
     except Missing as reason:
         pytest.skip(str(reason))
 

@@ -71,7 +71,7 @@ def rust(run: Run, tools: Tools) -> Told:
 
 
 def compiled(compiler: list[str], run: Run, tools: Tools) -> Told:
-    library = tools.library()
+    library = tools.shared_library()
     path = tools.folder / "place"
     source = ["-I", ROOT / "crates/hoid-ffi/include", HERE / "place.c", "-x", "none", library]
     where = f"-Wl,-rpath,{library.parent}"

@@ -28,7 +28,7 @@ class Tools:
     def hoid(self, *arguments: Any) -> str:
         return output([self.binary, *arguments])
 
-    def library(self) -> Path:
+    def shared_library(self) -> Path:
         names = ("libhoid_ffi.so", "libhoid_ffi.dylib", "hoid_ffi.dll")
         beside = self.binary.parent
         places = [place / name for place in (beside, beside / "deps") for name in names]

@@ -51,7 +51,7 @@ def unit(version: int, run: Run, tools: Tools) -> Told:
     except ImportError as error:
         raise Missing(f"there is no FMPy: {error}") from None
     path = tools.folder / f"tracker{version}.fmu"
-    library = stripped(tools.library(), tools.folder)
+    library = stripped(tools.shared_library(), tools.folder)
     options = ("--fmi", version, "--controlled-element", ELEMENT)
     tools.hoid("fmu", "--out", path, "--library", library, *options)
     about = fmpy.read_model_description(path)
