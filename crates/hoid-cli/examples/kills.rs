@@ -8,6 +8,9 @@
 //! the seed; what the program was doing at an instant depends on the machine.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
+#[path = "../tests/common/draw.rs"]
+mod draw;
+
 use std::{
     collections::BTreeMap,
     fs,
@@ -16,6 +19,8 @@ use std::{
     thread,
     time::{Duration, Instant},
 };
+
+use draw::Draw;
 
 /// Kills of one run before it is let to its end.
 const IN_A_ROW: usize = 5;
@@ -74,27 +79,6 @@ const WORKS: [Work; 3] = [
         has_parts: false,
     },
 ];
-
-/// SplitMix64 (Steele, Lea, Flood, 2014).
-struct Draw(u64);
-
-impl Draw {
-    fn bits(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    }
-
-    fn below(&mut self, n: usize) -> usize {
-        (self.bits() % (n.max(1) as u64)) as usize
-    }
-
-    fn share(&mut self) -> f64 {
-        (self.bits() >> 11) as f64 / (1_u64 << 53) as f64
-    }
-}
 
 fn main() -> ExitCode {
     let (mut kills, mut damaged, mut seed, mut program, mut only) = (200, 50, 1, beside_this(), None);

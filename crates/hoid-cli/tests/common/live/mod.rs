@@ -6,6 +6,8 @@
 //! | `paced` | samples at a rate, and how long their answers take |
 //! | `troubles` | readers that stop, either side begun again, clocks that jump, hostile datagrams |
 
+#[path = "../draw.rs"]
+mod draw;
 pub mod paced;
 pub mod troubles;
 pub mod udp;
@@ -15,32 +17,12 @@ use std::{
     process::{Child, ChildStderr, Command},
 };
 
-/// SplitMix64 (Steele, Lea, Flood, 2014).
-pub struct Draw(pub u64);
-
-impl Draw {
-    pub fn bits(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    }
-
-    pub fn below(&mut self, n: usize) -> usize {
-        (self.bits() % (n.max(1) as u64)) as usize
-    }
-
-    /// From [-1, 1).
-    pub fn share(&mut self) -> f64 {
-        (self.bits() >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
-    }
-}
+pub use draw::Draw;
 
 /// e and u at t: sinusoids, and what they have besides.
 pub fn sample(t_s: f64, draw: &mut Draw) -> (f64, f64) {
     let waves = |at: f64| (0.9 * at).sin() + 0.5 * (2.3 * at).sin() + 0.2 * (7.1 * at).sin();
-    (waves(t_s), 0.1 * waves(t_s - 0.3) + 0.05 * draw.share())
+    (waves(t_s), 0.1 * waves(t_s - 0.3) + 0.05 * (2.0 * draw.share() - 1.0))
 }
 
 /// What a stream says of itself at its end.
