@@ -46,7 +46,7 @@ fn prior(threshold: f64) -> PopulationPrior {
             recent: 10,
             least: 16,
             most: 80,
-            thresholds: [threshold, threshold + 4.0],
+            threshold,
             held: [3.3, 0.125, 0.05],
             persistence: 2,
             refractory: 16,
@@ -280,7 +280,7 @@ fn a_change_of_the_delay_is_found_and_told_from_one_of_the_gains() {
     let later = Point { tau: 0.21, ..usual() };
     let mut found = 0;
     for seed in 600..604 {
-        let (mut person, mut filter) = (Person::new(seed), filter(27.0));
+        let (mut person, mut filter) = (Person::new(seed), filter(13.5));
         let mut other = basis(later);
         let mut past = vec![0.0; other.delay() + 3];
         for k in 0..3000 {
@@ -308,7 +308,7 @@ fn a_change_of_the_delay_is_found_and_told_from_one_of_the_gains() {
 fn a_change_is_found_and_followed_and_a_louder_remnant_is_no_change() {
     let mut found = 0;
     for seed in 0..4 {
-        let (mut person, mut filter) = (Person::new(100 + seed), filter(27.0));
+        let (mut person, mut filter) = (Person::new(100 + seed), filter(13.5));
         let after = GAINS_OF_A_PERSON.map(|g| 0.5 * g);
         for k in 0..3000 {
             let gains = if k < 1500 { GAINS_OF_A_PERSON } else { after };
@@ -326,7 +326,7 @@ fn a_change_is_found_and_followed_and_a_louder_remnant_is_no_change() {
 
     let mut alarms = 0;
     for seed in 0..4 {
-        let (mut person, mut filter) = (Person::new(200 + seed), filter(27.0));
+        let (mut person, mut filter) = (Person::new(200 + seed), filter(13.5));
         for k in 0..3000 {
             let [e, u] = person.sample(GAINS_OF_A_PERSON, if k < 1500 { 0.03 } else { 0.06 });
             filter.step(e, u);
@@ -337,29 +337,54 @@ fn a_change_is_found_and_followed_and_a_louder_remnant_is_no_change() {
 }
 
 #[test]
+fn what_stands_still_is_no_change_and_one_behind_it_is_found() {
+    let (mut alarms, mut found) = (0, 0);
+    for seed in 0..4 {
+        let (mut person, mut filter) = (Person::new(300 + seed), filter(9.5));
+        for k in 0..4500 {
+            let gains = if k < 2500 {
+                GAINS_OF_A_PERSON
+            } else {
+                GAINS_OF_A_PERSON.map(|g| 0.5 * g)
+            };
+            let [e, u] = person.sample(gains, 0.03);
+            // The recording holds zeros for three seconds, then once more while they change.
+            let stands = (1500..1650).contains(&k) || (2400..2550).contains(&k);
+            let [e, u] = if stands { [0.0; 2] } else { [e, u] };
+            filter.step(e, u);
+            let declared = u32::from(filter.detector().declared());
+            alarms += if k < 2550 { declared } else { 0 };
+            found += if (2550..2950).contains(&k) { declared } else { 0 };
+        }
+    }
+    assert_eq!(alarms, 0);
+    assert!(found >= 3, "{found} of 4");
+}
+
+#[test]
 fn a_copy_goes_on_with_the_same_digits() {
-    let (mut person, mut first) = (Person::new(5), filter(27.0));
+    let (mut person, mut first) = (Person::new(5), filter(13.5));
     for _ in 0..1234 {
         let [e, u] = person.sample(GAINS_OF_A_PERSON, 0.05);
         first.step(e, u);
     }
     let mut numbers = Vec::new();
     first.visit(&mut |number| numbers.push(*number));
-    let mut second = filter(27.0);
+    let mut second = filter(13.5);
     let mut left = numbers.iter();
     second.visit(&mut |number| *number = *left.next().expect("as many numbers"));
     assert!(left.next().is_none());
     for k in 0..1000 {
         let [e, u] = person.sample(GAINS_OF_A_PERSON, 0.05);
         assert_eq!(first.step(e, u), second.step(e, u), "{k}");
-        assert_eq!(first.detector().statistics(), second.detector().statistics());
+        assert_eq!(first.detector().against_chance(), second.detector().against_chance());
     }
     assert_eq!(estimate(&first, 2.0), estimate(&second, 2.0));
 }
 
 #[test]
 fn what_says_nothing_does_no_harm() {
-    let mut silent = filter(27.0);
+    let mut silent = filter(13.5);
     for _ in 0..500 {
         assert_eq!(silent.step(0.0, 0.0).innovation, 0.0);
     }
@@ -371,7 +396,7 @@ fn what_says_nothing_does_no_harm() {
     }
     assert!(!silent.began());
 
-    let (mut person, mut filter) = (Person::new(9), filter(27.0));
+    let (mut person, mut filter) = (Person::new(9), filter(13.5));
     let [e, u] = person.sample(GAINS_OF_A_PERSON, 0.05);
     assert!(filter.step(e, u).innovation.is_finite() && !filter.began());
     for k in 0..2000 {
@@ -395,7 +420,7 @@ fn what_says_nothing_does_no_harm() {
 
 #[test]
 fn an_outlier_hardly_moves_the_estimate() {
-    let (mut person, mut filter) = (Person::new(11), filter(27.0));
+    let (mut person, mut filter) = (Person::new(11), filter(13.5));
     for _ in 0..1500 {
         let [e, u] = person.sample(GAINS_OF_A_PERSON, 0.05);
         filter.step(e, u);
@@ -412,10 +437,10 @@ fn an_outlier_hardly_moves_the_estimate() {
 #[test]
 fn what_makes_no_sense_is_refused() {
     let errors = || vec![0.0; errors_needed(TS)];
-    assert!(PopulationFilter::new(basis(usual()), prior(27.0), vec![0.0; 3]).is_none());
+    assert!(PopulationFilter::new(basis(usual()), prior(13.5), vec![0.0; 3]).is_none());
     let late = Point { tau: 1.0, ..usual() };
-    assert!(PopulationFilter::new(basis(late), prior(27.0), errors()).is_none());
-    let sound = prior(27.0);
+    assert!(PopulationFilter::new(basis(late), prior(13.5), errors()).is_none());
+    let sound = prior(13.5);
     for wrong in [
         PopulationPrior { order: 1, ..sound },
         PopulationPrior { hold: 0.0, ..sound },

@@ -6,19 +6,29 @@
 //! `T = d' C^-1 d`:
 //!
 //! - of Y at one frequency, what is held known: with the responses `h = [Re, Im]` of the basis at
-//!   [`Detection::frequency`], `d = h (s_1 - s_0)`, chi-square with two degrees of freedom where
+//!   [`Detection::frequency`], `d = h (s_1 - s_0)`, chi-square with `nu = 2` degrees of freedom where
 //!   nothing changes and the basis is right;
-//! - of natural frequency, damping and delay, gains not known: three degrees of freedom.
+//! - of gains, natural frequency, damping and delay together, the level not: `nu = 6`.
+//!
+//! The first finds people, whose response changes where they control; the second what turns elsewhere, or
+//! what one of them does that another undoes at that frequency.
 //!
 //! People vary, and no basis is right: T is divided by the level c at which it has been so far, from
-//! the mean of log T, whose expectation for a chi-square with nu degrees of freedom is
-//! `ln 2 + psi(nu/2)`: .116 and .730. A change is declared where one of T/c is above its threshold in
-//! some blocks one after another. When it was, and what changed, is told by the block that leaves least
-//! where gains and what is held are free before it and behind it (R. E. Quandt, *J. American Statistical
-//! Association* 53 (1958) 873-880).
+//! the mean of log T, whose expectation for a chi-square is `ln 2 + psi(nu/2)`: .116 and 1.616. Both are
+//! then told as what they have against chance, in nats: for even nu and `x = T/2c`
+//!
+//! `-ln P(chi^2 > T/c) = x - ln (1 + x + .. + x^(nu/2-1)/(nu/2-1)!)`.
+//!
+//! A change is declared where one of them is above the threshold in some blocks one after another. When it
+//! was, and what changed, is told by the block that leaves least where gains and what is held are free
+//! before it and behind it (R. E. Quandt, *J. American Statistical Association* 53 (1958) 873-880).
+//!
+//! Where samples are not taken for longer than a quarter of a second, or nothing moves, what is beside that
+//! gap is not looked at: the samples before it may have been part of the same fault, and behind it the
+//! filters swing in. From two seconds behind it on, what is behind it is held against what was before.
 //!
 //! Sources: G. C. Chow, *Econometrica* 28 (1960) 591-605; B. L. Welch, *Biometrika* 34 (1947) 28-35;
-//! the mean of the logarithm: M. Abramowitz and I. A. Stegun, 1964, eq. 6.3.3 and 6.3.4.
+//! the mean of the logarithm and the tail: M. Abramowitz and I. A. Stegun, 1964, eq. 6.3.3, 6.3.4, 26.4.5.
 
 use super::{
     basis::Complex,
@@ -32,8 +42,17 @@ use super::{
 pub const BLOCKS: usize = 90;
 /// Length of a block, s.
 pub const BLOCK_S: f64 = 0.5;
-/// Expectations of the logarithm of a chi-square with two and with three degrees of freedom.
-const MEAN_LOG: [f64; 2] = [0.115_931_515_658_412_45, 0.729_637_157_455_4];
+/// What both statistics have degrees of freedom of, in pairs, and the expectations of the logarithm of
+/// these chi-squares.
+const PAIRS: [u32; 2] = [1, 3];
+const MEAN_LOG: [f64; 2] = [0.115_931_515_658_412_45, 1.615_931_515_658_412_5];
+/// What both look at together: gains and what is held.
+const OPERATOR: usize = GAINS + HELD;
+/// Time from which samples that are not taken are a gap, and time that is not looked at behind one, s.
+const GAP_S: f64 = 0.25;
+const BEHIND_S: f64 = 1.0;
+/// Blocks behind a gap from which they are held against those before it.
+const FEWEST: usize = 4;
 /// Blocks that the supposed level of T counts for, and the logarithm of that level.
 const SUPPOSED: f64 = 5.0;
 const USUAL: f64 = 0.5;
@@ -53,8 +72,8 @@ pub struct Detection {
     pub least: usize,
     /// Largest number of blocks before.
     pub most: usize,
-    /// T/c from which there is a change: of Y, and of what is held.
-    pub thresholds: [f64; 2],
+    /// What one of the two must have against chance, nats.
+    pub threshold: f64,
     /// Standard deviations that are supposed of what is held, in its units.
     pub held: [f64; HELD],
     /// Blocks in which it must be above.
@@ -66,22 +85,24 @@ pub struct Detection {
 /// A statistic in units of what it has been.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Statistic {
+    pairs: u32,
     mean_log: f64,
     level: f64,
     levels: f64,
-    value: f64,
+    against_chance: f64,
     above: u64,
 }
 
-crate::state!([] Statistic { level, levels, value, above });
+crate::state!([] Statistic { level, levels, against_chance, above });
 
 impl Statistic {
-    fn new(mean_log: f64) -> Self {
+    fn new(pairs: u32, mean_log: f64) -> Self {
         Self {
+            pairs,
             mean_log,
             level: mean_log + USUAL,
             levels: SUPPOSED,
-            value: 0.0,
+            against_chance: 0.0,
             above: 0,
         }
     }
@@ -93,13 +114,28 @@ impl Statistic {
 
     /// Takes T; true where it has been above the threshold for long enough.
     fn take(&mut self, t: f64, threshold: f64, persistence: u64) -> bool {
-        self.value = t / self.usual();
+        self.against_chance = against_chance(t / self.usual(), self.pairs);
         self.levels = (self.levels + 1.0).min(SUPPOSED + LONGEST);
         let log = libm::log(t.max(0.05)).min(self.level + MOST);
         self.level += (log - self.level) / self.levels;
-        self.above = if self.value > threshold { self.above + 1 } else { 0 };
+        self.above = if self.against_chance > threshold {
+            self.above + 1
+        } else {
+            0
+        };
         self.above >= persistence
     }
+}
+
+/// `-ln P(chi^2 > x)` for a chi-square with so many pairs of degrees of freedom.
+fn against_chance(x: f64, pairs: u32) -> f64 {
+    let half = 0.5 * x;
+    let (mut term, mut sum) = (1.0, 1.0);
+    for k in 1..pairs {
+        term *= half / f64::from(k);
+        sum += term;
+    }
+    half - libm::log(sum)
 }
 
 /// The blocks and what they say.
@@ -112,6 +148,11 @@ pub struct Detector {
     blocks: [Block; BLOCKS],
     count: usize,
     statistics: [Statistic; 2],
+    /// Samples that were not taken, one after another, and those that are not looked at from now on.
+    gap: u64,
+    behind: u64,
+    /// Blocks since the last gap.
+    fresh: usize,
     since: u64,
     spans: [Span; 2],
     whole: [WholeSpan; 2],
@@ -121,7 +162,7 @@ pub struct Detector {
 }
 
 crate::state!([] Detector {
-    response, block, blocks, count, statistics, since, spans, whole, declared, difference, ago,
+    response, block, blocks, count, statistics, gap, behind, fresh, since, spans, whole, declared, difference, ago,
 });
 
 impl Detector {
@@ -137,7 +178,10 @@ impl Detector {
             block: EMPTY,
             blocks: [EMPTY; BLOCKS],
             count: 0,
-            statistics: MEAN_LOG.map(Statistic::new),
+            statistics: core::array::from_fn(|i| Statistic::new(PAIRS[i], MEAN_LOG[i])),
+            gap: 0,
+            behind: 0,
+            fresh: BLOCKS,
             since: u64::MAX >> 12,
             spans: [Span::default(); 2],
             whole: [WholeSpan::default(); 2],
@@ -147,10 +191,18 @@ impl Detector {
         })
     }
 
-    /// Takes a sample. True where a change is declared.
+    /// Takes a sample. True where a change is declared. It is part of a gap where it is the one before again.
     #[inline]
-    pub(super) fn update(&mut self, row: &Row) -> bool {
-        self.declared = false;
+    pub(super) fn update(&mut self, row: &Row, moved: bool) -> bool {
+        if !moved {
+            self.skip();
+        } else {
+            (self.declared, self.gap) = (false, 0);
+        }
+        if self.behind > 0 {
+            self.behind -= 1;
+            return false;
+        }
         self.block.add(row);
         if self.block.samples >= self.samples_of_block as f64 {
             self.close(row.p);
@@ -168,9 +220,11 @@ impl Detector {
         self.count += 1;
         self.block = EMPTY;
         self.since += 1;
-        self.statistics.iter_mut().for_each(|s| s.value = 0.0);
-        let before = self.count.saturating_sub(self.what.recent);
-        if before < self.what.least {
+        self.fresh = (self.fresh + 1).min(BLOCKS);
+        self.statistics.iter_mut().for_each(|s| s.against_chance = 0.0);
+        let recent = self.what.recent.min(self.fresh);
+        let before = self.count.saturating_sub(recent);
+        if before < self.what.least || recent < FEWEST {
             self.statistics.iter_mut().for_each(|s| s.above = 0);
             return;
         }
@@ -188,19 +242,17 @@ impl Detector {
         }
         let Some(t) = self.of_response() else { return };
         let Detection {
-            thresholds,
-            persistence,
-            ..
+            threshold, persistence, ..
         } = self.what;
-        let of_response = self.statistics[0].take(t, thresholds[0], persistence);
-        let of_held = self
-            .of_held()
-            .is_some_and(|t| self.statistics[1].take(t, thresholds[1], persistence));
-        if (of_response || of_held) && self.since > self.what.refractory {
+        let of_response = self.statistics[0].take(t, threshold, persistence);
+        let of_all = self
+            .of_all()
+            .is_some_and(|t| self.statistics[1].take(t, threshold, persistence));
+        if (of_response || of_all) && self.since > self.what.refractory {
             self.declared = true;
             self.since = 0;
             self.statistics.iter_mut().for_each(|s| s.above = 0);
-            self.split(held);
+            self.split(held, recent);
             // What was before is no measure of what comes.
             self.blocks.copy_within(self.count - self.ago..self.count, 0);
             self.count = self.ago;
@@ -208,10 +260,10 @@ impl Detector {
     }
 
     /// The spans before and after the block that leave least when the change is supposed to be there.
-    fn split(&mut self, held: [f64; HELD]) {
+    fn split(&mut self, held: [f64; HELD], recent: usize) {
         let mut least = f64::MAX;
-        self.ago = self.what.recent;
-        for after in 1..=self.what.recent {
+        self.ago = recent;
+        for after in 1..=recent {
             let sums = [
                 Block::of(&self.blocks[..self.count - after]),
                 Block::of(&self.blocks[self.count - after..self.count]),
@@ -263,21 +315,23 @@ impl Detector {
         distance(c, d)
     }
 
-    /// T of what is held.
-    fn of_held(&self) -> Option<f64> {
+    /// T of gains and what is held.
+    fn of_all(&self) -> Option<f64> {
         let [past, present] = &self.whole;
-        let d = core::array::from_fn(|i| present.state[LINEAR + i] - past.state[LINEAR + i]);
-        let of = |span: &WholeSpan, i: usize, j: usize| span.covariance[LINEAR + i][LINEAR + j];
+        let place = |i: usize| if i < GAINS { i } else { i + LINEAR - GAINS };
+        let d = core::array::from_fn(|i| present.state[place(i)] - past.state[place(i)]);
+        let of = |span: &WholeSpan, i: usize, j: usize| span.covariance[place(i)][place(j)];
         let c = core::array::from_fn(|i| core::array::from_fn(|j| of(past, i, j) + of(present, i, j)));
-        distance::<HELD>(c, d)
+        distance::<OPERATOR>(c, d)
     }
 
-    /// T/c of the last block, of Y and of what is held; zero while there is too little to compare.
-    pub fn statistics(&self) -> [f64; 2] {
-        self.statistics.map(|s| s.value)
+    /// What the last block has against chance, nats: of Y and of all; zero while there is too little to
+    /// compare.
+    pub fn against_chance(&self) -> [f64; 2] {
+        self.statistics.map(|s| s.against_chance)
     }
 
-    /// How many times larger than a chi-square T of Y and T of what is held have been without a change.
+    /// How many times larger than a chi-square T of Y and T of all have been without a change.
     pub fn usual_levels(&self) -> [f64; 2] {
         self.statistics.map(|s| s.usual())
     }
@@ -306,14 +360,27 @@ impl Detector {
     pub fn forget(&mut self) {
         (self.block, self.count) = (EMPTY, 0);
         for statistic in &mut self.statistics {
-            (statistic.value, statistic.above) = (0.0, 0);
+            (statistic.against_chance, statistic.above) = (0.0, 0);
         }
         self.declared = false;
     }
 
-    /// No change is declared at a sample that is not taken.
+    /// A sample is not taken: no change is declared at it, and behind many of them nothing is looked at.
     pub fn skip(&mut self) {
         self.declared = false;
+        self.gap += 1;
+        let samples = |seconds: f64| (seconds / BLOCK_S * self.samples_of_block as f64) as u64;
+        let (long, behind) = (samples(GAP_S).max(1), samples(BEHIND_S));
+        if self.gap == long {
+            // The block that is open, and the one before it.
+            self.block = EMPTY;
+            self.count = self.count.saturating_sub(1);
+            self.fresh = 0;
+            self.statistics.iter_mut().for_each(|s| s.above = 0);
+        }
+        if self.gap >= long {
+            self.behind = behind;
+        }
     }
 }
 
@@ -326,4 +393,24 @@ fn distance<const N: usize>(mut c: [[f64; N]; N], d: [f64; N]) -> Option<f64> {
     cholesky::solve(&c, N, &mut solved);
     let t: f64 = solved.iter().zip(d).map(|(s, d)| s * d).sum();
     t.is_finite().then_some(t)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn chance_is_that_of_the_tables() {
+        // Abramowitz and Stegun, table 26.8: percentage points of the chi-square for Q = .05 and .001.
+        for (pairs, [five, one]) in [
+            (1, [5.99147, 13.8155]),
+            (2, [9.48773, 18.4668]),
+            (3, [12.5916, 22.4577]),
+        ] {
+            for (x, q) in [(five, 0.05_f64), (one, 0.001)] {
+                assert!((against_chance(x, pairs) + libm::log(q)).abs() < 1e-4, "{pairs} {q}");
+            }
+        }
+        assert_eq!(against_chance(0.0, 3), 0.0);
+    }
 }

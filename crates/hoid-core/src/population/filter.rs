@@ -121,7 +121,7 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> PopulationFilter<E> {
             (self.left, self.age) = (self.age, 0);
             self.detector.forget();
         } else {
-            if self.look_for_changes(&learnt) {
+            if self.look_for_changes(&learnt, u) {
                 let past = Past {
                     errors: self.errors.as_ref(),
                     newest: self.newest,
@@ -200,8 +200,14 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> PopulationFilter<E> {
 
     /// What the detector says of a sample, with the responses where the corrections point.
     #[inline(always)]
-    fn look_for_changes(&mut self, learnt: &Learnt) -> bool {
+    fn look_for_changes(&mut self, learnt: &Learnt, u: f64) -> bool {
         let Some(state) = learnt.state else { return false };
+        let past = Past {
+            errors: self.errors.as_ref(),
+            newest: self.newest,
+            u: &self.u,
+        };
+        let moved = past.error(0) != past.error(1) || u != self.u[0];
         let (p, believed) = (&self.prior, &mut self.believed);
         let Learnt {
             white, innovation: eps, ..
@@ -226,18 +232,21 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> PopulationFilter<E> {
         r[GAINS] = white.level;
         let Point { omega, zeta, tau, .. } = believed.place.basis().point();
         let at = self.origin;
-        let changed = self.detector.update(&Row {
-            r,
-            q,
-            p: [
-                omega - at.omega + state[LINEAR],
-                zeta - at.zeta + state[LINEAR + 1],
-                tau - at.tau + state[LINEAR + 2],
-            ],
-            y: limited,
-            innovation: *eps,
-            variance: believed.variance[1],
-        });
+        let changed = self.detector.update(
+            &Row {
+                r,
+                q,
+                p: [
+                    omega - at.omega + state[LINEAR],
+                    zeta - at.zeta + state[LINEAR + 1],
+                    tau - at.tau + state[LINEAR + 2],
+                ],
+                y: limited,
+                innovation: *eps,
+                variance: believed.variance[1],
+            },
+            moved,
+        );
         if changed {
             believed.gains.open(p.jump * believed.unit);
             let [_, system, delay] = self.detector.difference().changed;

@@ -28,8 +28,8 @@
 //!   and the gain are those of a Student distribution, so that an outlier says little.
 //! - **Rivals** (`contest`). Others begin at other delays and poles, at the start and after each
 //!   change; the one that foretells best is believed.
-//! - **Changes** ([`detector`]). Declared from the difference of Y at one frequency, or of what is
-//!   held, between the last seconds and the time before ([`blocks`]), each fitted by least squares with
+//! - **Changes** ([`detector`]). Declared from the difference of Y at one frequency, or of gains
+//!   and what is held, between the last seconds and the time before ([`blocks`]), each fitted by least squares with
 //!   a variance of its own (G. C. Chow, Econometrica 28 (1960) 591-605; unequal variances: B. L. Welch,
 //!   Biometrika 34 (1947) 28-35), in units of how much the same person varies without a change. What
 //!   changed is told by [`difference`].

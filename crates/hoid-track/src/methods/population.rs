@@ -227,7 +227,7 @@ impl PopulationRecursion {
         let (at, hold) = (self.model.origin(), 0.5 * self.reported.sample_time_s());
         let beginning = [at.omega, at.zeta, at.tau - hold];
         // The spans are compared in units of how much this person varies without a change.
-        let [of_response, of_held] = detector.usual_levels();
+        let [of_response, of_all] = detector.usual_levels();
         let gain = |i: usize, state: &[f64], of: &dyn Fn(usize, usize) -> f64| {
             let value = map[i].iter().zip(state).map(|(m, s)| m * s).sum();
             let pairs = (0..GAINS).flat_map(|a| (0..GAINS).map(move |b| (a, b)));
@@ -239,7 +239,7 @@ impl PopulationRecursion {
             0 | 1 => gain(i, &span.state, &|a, b| of_response * span.covariance[a][b]),
             _ => {
                 let k = LINEAR + i - 2;
-                Estimate::with_variance(beginning[i - 2] + whole.state[k], of_held * whole.covariance[k][k])
+                Estimate::with_variance(beginning[i - 2] + whole.state[k], of_all * whole.covariance[k][k])
             }
         };
         let difference = |i: usize| match i {
@@ -332,8 +332,8 @@ impl Recursion for PopulationRecursion {
     }
 
     fn change_odds(&self) -> Option<f64> {
-        let [of_response, of_held] = self.model.detector().statistics();
-        Some(0.5 * of_response.max(of_held / usual::OF_HELD))
+        let [of_response, of_all] = self.model.detector().against_chance();
+        Some(of_response.max(of_all))
     }
 
     fn change(&self) -> Option<Change> {
@@ -356,9 +356,9 @@ impl Recursion for PopulationRecursion {
             },
         };
         let pair = |i: usize| [old[i], new(i)];
-        let [of_response, of_held] = detector.usual_levels();
+        let [of_response, of_all] = detector.usual_levels();
         let log_variance = 2.0 / before.samples + 2.0 / after.samples;
-        let level = (after.variance / before.variance).ln() / (log_variance * of_response.max(of_held)).sqrt();
+        let level = (after.variance / before.variance).ln() / (log_variance * of_response.max(of_all)).sqrt();
         Some(Change {
             seconds_ago: detector.ago_s(),
             odds: self.change_odds()?,
