@@ -12,7 +12,7 @@
 //! | `cargo xtask ffi [--dev] [--out DIR]` | the libraries for C with header, pkg-config file, CMake package and examples, into `target/ffi/`; `--header` makes the header anew, `--check` builds the examples by them (module `ffi`) |
 //! | `cargo xtask places [--dry or --dev]` | one run through every place in which hoid runs, as the table of the page "In your simulator" (module `places`) |
 //! | `cargo xtask bench [OPTION...]` | the tasks of the page "Speed beside others" beside the peers that are installed, or how cost grows (module `bench`) |
-//! | `cargo xtask slow NAME [ARGUMENT...]` | a study that takes too long for a test: `people-coverage`, `faults`, `faults-clean`, `tracker-faults`, `mutations`, `kills`, `latency`, `lab`, `challenge`, `challenge-people` |
+//! | `cargo xtask slow NAME [ARGUMENT...]` | a study that takes too long for a test: `people-coverage`, `faults`, `faults-clean`, `tracker-faults`, `mutations`, `kills`, `latency`, `lab`, `lab-hour`, `lab-real`, `challenge`, `challenge-people` |
 //!
 //! Little but the standard library: a chore must start at once on a fresh machine.
 #![allow(clippy::print_stdout, clippy::print_stderr)]
@@ -133,10 +133,18 @@ const SLOW: [Slow; 10] = [
 
 /// Runs one of them, with further arguments of its own.
 fn slow(arguments: &[String]) -> Result<(), String> {
-    let names = || SLOW.map(|slow| slow.name).join(", ");
+    let names = || {
+        let all = SLOW.iter().map(|slow| slow.name);
+        all.chain(lab::STUDIES.map(|(name, _)| name))
+            .collect::<Vec<_>>()
+            .join(", ")
+    };
     let (name, rest) = arguments
         .split_first()
         .ok_or_else(|| format!("which study: {}", names()))?;
+    if let Some((_, script)) = lab::STUDIES.iter().find(|(study, _)| study == name) {
+        return lab::study(script, rest);
+    }
     let slow = (SLOW.iter())
         .find(|slow| slow.name == name)
         .ok_or_else(|| format!("no study is called {name}; there is {}", names()))?;

@@ -5,6 +5,7 @@
 //! order whose variance is a tenth of that of u. The operator sees e at each tick; the record has every
 //! tenth, which estimators take for held: their delay is half a sample shorter. Told: bias of each
 //! parameter in percent with its standard error, and the part of the intervals of 95 % that hold the
+//! truth. Besides, in how many runs the live estimate tells a lag, its form unknown, and how far from the
 //! truth.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
@@ -17,6 +18,7 @@ use data_encoding::BASE64;
 use hoid_ident::family::{FamilyEstimator, OperatorPrior};
 use hoid_lab::{
     config::{Condition, Signal},
+    lag::Lag,
     plant::{InputMap, Plant},
     task::{TICK_S, Task},
 };
@@ -146,11 +148,15 @@ fn main() -> ExitCode {
         let remnant = (SHARE * variance(&quiet[10_000..])).sqrt();
         let kinds = person.form.coordinates(person.neuromuscular);
         let mut found: Vec<Vec<(f64, f64)>> = vec![Vec::new(); kinds.len()];
+        let mut lags = Vec::new();
         for seed in 1..=u64::from(seeds) {
             let (task, u, e) = tracked(&mut engine, &person, seed, remnant);
             let every = |signal: &[f64]| signal[task.run_in..].iter().copied().step_by(10).collect::<Vec<f64>>();
             let channel = |name: &str, signal: &[f64]| Channel::new(name, "", every(signal));
             let record = Record::new(SampleTime::HUNDREDTH, channel("e", &e), channel("u", &u)).unwrap();
+            if let Lag::Known(lag) = Lag::of(record.clone()) {
+                lags.push((lag.value, lag.standard_error.unwrap_or(f64::NAN)));
+            }
             let estimator = FamilyEstimator {
                 forms: vec![person.form],
                 neuromuscular: person.neuromuscular,
@@ -196,6 +202,15 @@ fn main() -> ExitCode {
             );
             wrong |= all.len() < seeds as usize;
         }
+        let truth = kinds.iter().position(|kind| *kind == Coordinate::LagRate);
+        let truth = truth.map(|place| 1.0 / person.coordinates[place]);
+        let holds = |(value, error): &&(f64, f64)| truth.is_some_and(|t| (value - t).abs() <= 1.96 * error);
+        println!(
+            "{}\ta lag is told in {} of {seeds} runs, {} of them within 1.96 standard errors of the truth",
+            person.name,
+            lags.len(),
+            lags.iter().filter(holds).count()
+        );
     }
     if wrong { ExitCode::FAILURE } else { ExitCode::SUCCESS }
 }

@@ -14,7 +14,7 @@
 //! | [`session`] | the folder: what is appended, what is written at once, how a session goes on |
 //! | [`verify`] | [`check`](verify::check): verified, or unverified and why |
 //! | [`record`] | a run as a record for all commands of hoid |
-//! | [`live`] | the estimate while the run goes on |
+//! | [`live`], [`lag`] | the estimate while the run goes on, the lag of the person besides |
 //! | [`wire`] | what page and server say to each other |
 //! | [`lab`] | [`Lab`]: the experiment as its pages see it |
 //! | [`server`] | [`Server`]: HTTP and sockets on 127.0.0.1 |
@@ -28,6 +28,7 @@ mod error;
 mod experiment;
 mod export;
 pub mod lab;
+pub mod lag;
 pub mod live;
 pub mod order;
 pub mod plant;

@@ -25,6 +25,7 @@ use serde::Serialize;
 use crate::{
     LabError,
     course::Course,
+    lag::{Lag, LagFits},
     session::Stem,
     task::{TICK_S, TICKS_PER_SAMPLE},
 };
@@ -50,6 +51,10 @@ pub struct LiveLine {
     pub gain: Told,
     /// Lead T_L, s.
     pub lead_s: Told,
+    /// Lag T_I, s, where the data determine it.
+    pub lag_s: Told,
+    /// Why no lag is told.
+    pub lag_waiting: Option<&'static str>,
     /// Natural frequency of the neuromuscular system, rad/s.
     pub omega_nm_rad_s: Told,
     /// Delay, s.
@@ -71,6 +76,7 @@ pub type Samples = Vec<Sample>;
 pub struct LiveRun {
     live: Live,
     plan: TrackPlan,
+    lags: LagFits,
     course: Course,
     t_s: f64,
     ts: SampleTime,
@@ -90,6 +96,7 @@ impl LiveRun {
         Ok(Self {
             live: Live::new(plan.options(), (WARM_UP_S / ts.s()).round() as usize, ts)?,
             plan,
+            lags: LagFits::new(ts),
             t_s: -course.times_s().0,
             course,
             ts,
@@ -105,7 +112,13 @@ impl LiveRun {
             if let Live::Tracking(tracker) = &self.live
                 && let Some(change) = tracker.change()
             {
-                changed_s = Some(self.t_s - change.seconds_ago);
+                let at_s = self.t_s - change.seconds_ago;
+                changed_s = Some(at_s);
+                self.lags.changed(at_s);
+            }
+            // The run-in is not the person: the target is faded in.
+            if self.t_s > -self.ts.s() / 2.0 {
+                self.lags.take(*sample);
             }
             self.t_s += self.ts.s();
         }
@@ -114,6 +127,11 @@ impl LiveRun {
             changed_s,
             ..LiveLine::default()
         };
+        match self.lags.lag() {
+            Lag::Waiting => line.lag_waiting = Some("after 40 s"),
+            Lag::NotDetermined => line.lag_waiting = Some("not determined"),
+            Lag::Known(lag) => line.lag_s = told(lag),
+        }
         let tracker = match &self.live {
             Live::Tracking(tracker) => tracker,
             Live::Collecting(warm_up) => {
@@ -232,7 +250,7 @@ pub fn start(mut run: LiveRun, stem: &Stem, tell: impl Fn(&LiveLine) + Send + 's
 }
 
 const HEADER: &str = "t,K_e,K_e_se,T_L,T_L_se,omega_nm,omega_nm_se,tau_e,tau_e_se,crossover_rad_s,\
-crossover_rad_s_se,phase_margin_deg,phase_margin_deg_se,changed_s\n";
+crossover_rad_s_se,phase_margin_deg,phase_margin_deg_se,changed_s,T_I,T_I_se\n";
 
 fn row(line: &LiveLine) -> String {
     let cell = |v: Option<f64>| v.map_or(String::new(), |v| v.to_string());
@@ -248,7 +266,8 @@ fn row(line: &LiveLine) -> String {
     for (value, error) in pairs {
         text.push_str(&format!(",{},{}", cell(value), cell(error)));
     }
-    text.push_str(&format!(",{}\n", cell(line.changed_s)));
+    let (lag, error) = line.lag_s;
+    text.push_str(&format!(",{},{},{}\n", cell(line.changed_s), cell(lag), cell(error)));
     text
 }
 

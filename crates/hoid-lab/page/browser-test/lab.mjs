@@ -23,6 +23,7 @@ export async function lab(program, ...args) {
   const ended = new Promise((resolve) => child.on("exit", resolve));
   return {
     address,
+    pid: child.pid,
     async end(signal = "SIGTERM") {
       child.kill(signal);
       await ended;

@@ -269,8 +269,8 @@ async function estimate(number: number): Promise<void> {
   const lines = linesOf(found?.live ?? []);
   const last = lines[lines.length - 1];
   if (!place || !last) return;
-  const cell = (name: string, told: [number | null, number | null], unit: string) =>
-    h("div", {}, name, h("b", {}, told[0] === null ? "–" : `${digits(told[0])} ${unit}`), told[1] === null ? "" : `± ${digits(told[1])}`);
+  const cell = (name: string, told: [number | null, number | null], unit: string, none = "–") =>
+    h("div", {}, name, h("b", {}, told[0] === null ? none : `${digits(told[0])} ${unit}`), told[1] === null ? "" : `± ${digits(told[1])}`);
   place.replaceChildren(
     h("h2", {}, "You, as the program sees you"),
     h(
@@ -278,6 +278,7 @@ async function estimate(number: number): Promise<void> {
       { class: "numbers" },
       cell("Gain", last.gain, ""),
       cell("Lead", last.lead_s, "s"),
+      cell("Lag", last.lag_s, "s", "not determined"),
       cell("Delay", last.delay_s, "s"),
       cell("Crossover", last.crossover_rad_s, "rad/s"),
       cell("Phase margin", last.phase_margin_deg, "deg"),

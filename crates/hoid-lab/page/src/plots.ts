@@ -6,6 +6,8 @@ import type { LiveLine, Told } from "./wire";
 interface Panel {
   title: string;
   of: (line: LiveLine) => Told;
+  /** What stands in place of a number that is not there. */
+  waiting?: (line: LiveLine) => string | null;
   /** The span that is shown at least. */
   least: [number, number];
 }
@@ -13,6 +15,7 @@ interface Panel {
 const PANELS: Panel[] = [
   { title: "Gain K", of: (l) => l.gain, least: [0, 1] },
   { title: "Lead, s", of: (l) => l.lead_s, least: [0, 0.5] },
+  { title: "Lag, s", of: (l) => l.lag_s, waiting: (l) => l.lag_waiting, least: [0, 2] },
   { title: "Delay, s", of: (l) => l.delay_s, least: [0, 0.4] },
   { title: "Crossover, rad/s", of: (l) => l.crossover_rad_s, least: [0, 5] },
   { title: "Phase margin, deg", of: (l) => l.phase_margin_deg, least: [0, 60] },
@@ -24,6 +27,8 @@ export function linesOf(rows: (number | null)[][]): LiveLine[] {
     t: r[0] ?? 0,
     gain: [r[1], r[2]],
     lead_s: [r[3], r[4]],
+    lag_s: [r[14] ?? null, r[15] ?? null],
+    lag_waiting: (r[14] ?? null) === null ? "not determined" : null,
     omega_nm_rad_s: [r[5], r[6]],
     delay_s: [r[7], r[8]],
     crossover_rad_s: [r[9], r[10]],
@@ -87,9 +92,12 @@ export class Plots {
       const y = (v: number) => bottom - ((Math.max(low, Math.min(high, v)) - low) / (high - low)) * (bottom - top);
       c.fillStyle = ink;
       c.globalAlpha = 1;
+      const seen = this.lines.filter((l) => l.t <= now);
+      const newest = seen[seen.length - 1];
+      const words = newest ? panel.waiting?.(newest) : null;
       const last = known[known.length - 1];
       const [value, error] = last ? panel.of(last) : [null, null];
-      const told = value === null ? "" : `  ${value.toFixed(2)}${error === null ? "" : ` ± ${error.toFixed(2)}`}`;
+      const told = words ? `: ${words}` : value === null ? "" : `  ${value.toFixed(2)}${error === null ? "" : ` ± ${error.toFixed(2)}`}`;
       c.fillText(panel.title + told, left, top - 8);
       c.globalAlpha = 0.7;
       c.fillText(high.toPrecision(2), 4, top + 10);

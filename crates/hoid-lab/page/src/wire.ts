@@ -71,6 +71,8 @@ export interface LiveLine {
   t: number;
   gain: Told;
   lead_s: Told;
+  lag_s: Told;
+  lag_waiting: string | null;
   omega_nm_rad_s: Told;
   delay_s: Told;
   crossover_rad_s: Told;

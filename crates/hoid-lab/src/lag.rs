@@ -1,0 +1,252 @@
+//! The lag of the person while the run goes on.
+//!
+//! The tracker acts in a basis whose lag stays where it began: nothing of it says what T_I is. So the
+//! samples of the measurement since the last declared change are fitted as `hoid identify` does, each
+//! 10 s, on a thread of its own: all forms of the operator, the one that held-out data choose,
+//! and its T_I where the data determine it ([`hoid_ident::family`]). Of a form without a lag, or one
+//! whose interval reaches a pure integration, T_I is not determined, and no number is told.
+//!
+//! A form with a lag is chosen now and then for who has none, a short lag beside a longer lead: for 13 of
+//! 60 runs of C1 and 2 of 20 of C2, 30 and 80 s long, with T_I up to 6.3 standard errors from zero. A lag
+//! of 1 s that is there is 25 of them from zero and more. So a lag counts from ten on.
+
+use std::{
+    sync::mpsc::{Receiver, Sender, channel},
+    thread,
+};
+
+use hoid_ident::family::FamilyEstimator;
+use hoid_model::{Channel, Record, SampleTime, uncertainty::Estimate};
+use hoid_track::Sample;
+
+/// Shortest span of a fit, and the time between two, s.
+const SHORTEST_S: f64 = 40.0;
+const EVERY_S: f64 = 10.0;
+/// A lag is told that is so many standard errors from none.
+const CLEAR: f64 = 10.0;
+
+/// The lag as far as it is known.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub enum Lag {
+    /// There was no fit yet.
+    #[default]
+    Waiting,
+    /// The data do not determine it.
+    NotDetermined,
+    /// T_I, s.
+    Known(Estimate),
+}
+
+impl Lag {
+    /// Of a record of one person who does not change.
+    pub fn of(record: Record) -> Self {
+        let fit = FamilyEstimator::default().fit(&[record]);
+        let parameter = fit.ok().and_then(|fit| {
+            let all = &fit.operator(0).parameters;
+            all.iter().find(|p| p.name == "T_I" && p.determined).cloned()
+        });
+        match parameter.map(|p| (p.value, p.standard_error)) {
+            Some((value, Some(error))) if value.is_finite() && value > CLEAR * error => Self::Known(Estimate {
+                value,
+                standard_error: Some(error),
+            }),
+            _ => Self::NotDetermined,
+        }
+    }
+}
+
+/// Samples that are to be fitted, and the time of the first, s.
+struct Span {
+    from_s: f64,
+    record: Record,
+}
+
+/// The fits of one run.
+pub struct LagFits {
+    spans: Sender<Span>,
+    found: Receiver<(f64, Lag)>,
+    e: Vec<f64>,
+    u: Vec<f64>,
+    ts: SampleTime,
+    /// Time of the first sample, s.
+    from_s: f64,
+    /// Samples at the last fit.
+    fitted: usize,
+    /// A fit goes on.
+    busy: bool,
+    last: Lag,
+}
+
+impl LagFits {
+    /// Starts their thread, which ends with them.
+    pub fn new(ts: SampleTime) -> Self {
+        let (spans, waiting) = channel::<Span>();
+        let (tell, found) = channel();
+        thread::spawn(move || {
+            while let Ok(span) = waiting.recv() {
+                if tell.send((span.from_s, Lag::of(span.record))).is_err() {
+                    break;
+                }
+            }
+        });
+        Self {
+            spans,
+            found,
+            e: Vec::new(),
+            u: Vec::new(),
+            ts,
+            from_s: 0.0,
+            fitted: 0,
+            busy: false,
+            last: Lag::Waiting,
+        }
+    }
+
+    /// Takes a sample of the measurement.
+    pub fn take(&mut self, sample: Sample) {
+        self.e.push(sample.e);
+        self.u.push(sample.u);
+    }
+
+    /// Forgets what was before a change of the person, s.
+    pub fn changed(&mut self, at_s: f64) {
+        let past = ((at_s - self.from_s) / self.ts.s())
+            .ceil()
+            .clamp(0.0, self.e.len() as f64) as usize;
+        self.e.drain(..past);
+        self.u.drain(..past);
+        self.from_s += past as f64 * self.ts.s();
+        (self.fitted, self.last) = (0, Lag::Waiting);
+    }
+
+    /// The lag by the last fit that is done; begins the next one where it is due.
+    pub fn lag(&mut self) -> Lag {
+        while let Ok((from_s, lag)) = self.found.try_recv() {
+            self.busy = false;
+            // One that began before a change is of nobody.
+            if from_s == self.from_s {
+                self.last = lag;
+            }
+        }
+        let samples = |seconds: f64| (seconds / self.ts.s()).round() as usize;
+        let due = samples(SHORTEST_S).max(self.fitted + samples(EVERY_S));
+        if !self.busy
+            && self.e.len() >= due
+            && let Ok(record) = Record::new(
+                self.ts,
+                Channel::new("e", "", self.e.clone()),
+                Channel::new("u", "", self.u.clone()),
+            )
+        {
+            self.fitted = self.e.len();
+            let from_s = self.from_s;
+            self.busy = self.spans.send(Span { from_s, record }).is_ok();
+        }
+        self.last
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use hoid_model::{
+        FamilyOperator, Form,
+        forcing::ForcingFunction,
+        held_system::HeldSystem,
+        scenario::{Condition, Scenario},
+    };
+    use hoid_sim::{RunSeed, Simulator};
+
+    use super::*;
+
+    const TS: SampleTime = SampleTime::HUNDREDTH;
+    const LAG_S: f64 = 1.0;
+
+    fn noise(samples: usize, seed: u64) -> Vec<f64> {
+        let seed = RunSeed {
+            seed,
+            ..RunSeed::default()
+        };
+        seed.white_noise(samples)
+    }
+
+    /// e and u of a gain of .4 with a lag before 4/s, with a remnant of first order.
+    fn with_lag(seconds: f64, seed: u64) -> Vec<Sample> {
+        let n = (seconds / TS.s()) as usize;
+        let operator = FamilyOperator::new(Form::Lag, false, &[0.4 / LAG_S, 1.0 / LAG_S, 0.18]).unwrap();
+        let transfer = operator.transfer_function().unwrap();
+        let held = HeldSystem::new(transfer.num(), transfer.den(), 0.0, TS).unwrap();
+        let (a, b, c) = (held.transition()[0], held.input()[0], held.output_row()[0]);
+        let target = ForcingFunction::reference().samples(0.0, TS, n);
+        let (mut x, mut y, mut v) = (0.0, 0.0, 0.0);
+        let mut answers = vec![0.0; 18];
+        let decay = (-TS.s() / 0.06).exp();
+        (target.iter().zip(noise(n, seed)))
+            .map(|(f, white)| {
+                let e = f - y;
+                answers.push(c * x);
+                x = a * x + b * e;
+                v = decay * v + 0.02 * white;
+                let u = answers[answers.len() - 19] + v;
+                y += 4.0 * TS.s() * u;
+                Sample { e, u, reference: None }
+            })
+            .collect()
+    }
+
+    fn record(samples: &[Sample]) -> Record {
+        let all = |of: fn(&Sample) -> f64| samples.iter().map(of).collect::<Vec<f64>>();
+        Record::new(
+            TS,
+            Channel::new("e", "", all(|s| s.e)),
+            Channel::new("u", "", all(|s| s.u)),
+        )
+        .unwrap()
+    }
+
+    #[test]
+    fn a_lag_that_the_data_show_is_found() {
+        let Lag::Known(found) = Lag::of(record(&with_lag(60.0, 1))) else {
+            panic!("60 s of a lag of {LAG_S} s say nothing of it");
+        };
+        let error = found.standard_error.unwrap();
+        assert!((found.value - LAG_S).abs() < 3.0 * error && error < 0.3, "{found}");
+    }
+
+    #[test]
+    fn who_has_no_lag_is_given_none() {
+        let simulator = Simulator::new(&Scenario::condition(Condition::C1)).unwrap();
+        // Without the limit of `CLEAR` the last three are given one.
+        for (seed, n) in [(1, 3000), (21, 3000), (31, 3000), (2, 8000)] {
+            let signals = simulator.signals(&noise(simulator.samples(), seed)).unwrap();
+            let samples: Vec<Sample> = (signals.e.iter().zip(&signals.u))
+                .map(|(e, u)| Sample {
+                    e: *e,
+                    u: *u,
+                    reference: None,
+                })
+                .collect();
+            assert_eq!(Lag::of(record(&samples[..n])), Lag::NotDetermined, "seed {seed}");
+        }
+    }
+
+    #[test]
+    fn fits_follow_the_run_and_forget_who_changed() {
+        let mut fits = LagFits::new(TS);
+        let samples = with_lag(60.0, 2);
+        let (first, rest) = samples.split_at(3999);
+        first.iter().for_each(|sample| fits.take(*sample));
+        assert_eq!(fits.lag(), Lag::Waiting);
+        assert!(!fits.busy, "a fit of less than {SHORTEST_S} s");
+        rest.iter().for_each(|sample| fits.take(*sample));
+        assert_eq!(fits.lag(), Lag::Waiting);
+        assert!(fits.busy);
+        // What is being fitted is of somebody else now.
+        fits.changed(50.0);
+        assert_eq!((fits.e.len(), fits.from_s), (1000, 50.0));
+        let answer = fits.found.recv().unwrap();
+        assert_eq!(answer.0, 0.0);
+        assert!(matches!(answer.1, Lag::Known(_)), "{answer:?}");
+        assert_eq!(fits.last, Lag::Waiting);
+    }
+}
