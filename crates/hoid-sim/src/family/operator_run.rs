@@ -45,10 +45,10 @@ impl FamilyOperatorRun {
         }
         let after_run_in = (start_s / ts_s).round() as isize;
         let k = simulator.scenario.run_in_samples().saturating_add_signed(after_run_in);
-        let mut remnant = RemnantRun::new(&simulator, run);
+        let mut remnant = RemnantRun::new(&simulator.scenario, &simulator.remnants, run);
         Ok(Self {
             operator: OperatorState::at_rest(simulator.held(0), simulator.longest_delay()),
-            n: remnant.next(&simulator, k),
+            n: remnant.next(&simulator.scenario, &simulator.remnants, k),
             remnant,
             k,
             simulator,
@@ -74,9 +74,10 @@ impl FamilyOperatorRun {
         let held = self.simulator.held(self.k);
         let answer = held.answer(&self.operator);
         held.respond(&mut self.operator, answer, e);
-        self.remnant.follow(&self.simulator, self.k, answer.known + self.n);
+        let (scenario, remnants) = (&self.simulator.scenario, &self.simulator.remnants);
+        self.remnant.follow(scenario, remnants, self.k, answer.known + self.n);
         self.k += 1;
-        self.n = self.remnant.next(&self.simulator, self.k);
+        self.n = self.remnant.next(scenario, remnants, self.k);
     }
 
     /// Where it stands, as numbers.

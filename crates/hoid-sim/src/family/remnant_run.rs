@@ -4,15 +4,42 @@
 //! [`noise`](super::noise), scaled by what it follows where it depends on the signal. All of it is known before the
 //! control of the sample is.
 
-use hoid_model::family_scenario::Followed;
+use hoid_model::family_scenario::{Followed, ResolvedFamilyScenario};
 
 use super::{
-    FamilySimulator,
-    noise::{Shaped, driving},
+    calibration::Calibration,
+    noise::{Shaped, Shaping, driving},
 };
 use crate::RunSeed;
 
 const WALK: u64 = u64::from_le_bytes(*b"stick\0\0\0");
+
+/// The remnant of a scenario made ready: the filter of each part, and its strength before and after the change.
+#[derive(Debug, Clone)]
+pub(super) struct Remnants {
+    pub shapings: Vec<Shaping>,
+    pub calibrations: [Calibration; 2],
+    /// Whether anything changes in the scenario.
+    pub changes: bool,
+}
+
+impl Remnants {
+    /// A number of the calibration at sample `k`, on its way from the initial to the last one; behind the end of the
+    /// scenario it is that of the last sample.
+    #[inline]
+    fn calibrated(&self, scenario: &ResolvedFamilyScenario, k: usize, of: impl Fn(&Calibration) -> f64) -> f64 {
+        let [initial, last] = &self.calibrations;
+        if !self.changes {
+            return of(initial);
+        }
+        let t_s = scenario.time_s(k.min(samples_of(scenario) - 1));
+        scenario.scenario().schedule.value(of(initial), of(last), t_s)
+    }
+}
+
+fn samples_of(scenario: &ResolvedFamilyScenario) -> usize {
+    scenario.run_in_samples() + scenario.measurement_samples()
+}
 
 /// The remnant of a run, and where it stands.
 #[derive(Debug, Clone)]
@@ -32,8 +59,8 @@ pub(super) struct RemnantRun {
 }
 
 impl RemnantRun {
-    pub fn new(of: &FamilySimulator, run: RunSeed) -> Self {
-        let scenario = of.scenario.scenario();
+    pub fn new(resolved: &ResolvedFamilyScenario, of: &Remnants, run: RunSeed) -> Self {
+        let scenario = resolved.scenario();
         let ts_s = scenario.sample_time.s();
         let forgets = (scenario.remnant.iter()).map(|part| {
             part.signal_dependence
@@ -49,16 +76,16 @@ impl RemnantRun {
             walk: scenario.stick.bias,
             before: 0.0,
         };
-        new.draw(of, of.samples());
+        new.draw(resolved, samples_of(resolved));
         new
     }
 
     /// Draws the random numbers of so many samples where there are fewer; the first ones are the same for any number.
-    fn draw(&mut self, of: &FamilySimulator, samples: usize) {
+    fn draw(&mut self, scenario: &ResolvedFamilyScenario, samples: usize) {
         if samples <= self.steps.len() {
             return;
         }
-        let scenario = of.scenario.scenario();
+        let scenario = scenario.scenario();
         let ts_s = scenario.sample_time.s();
         self.driven = (0..)
             .zip(&scenario.remnant)
@@ -73,38 +100,41 @@ impl RemnantRun {
 
     /// The remnant of sample `k`, which comes after that of `k - 1`.
     #[inline]
-    pub fn next(&mut self, of: &FamilySimulator, k: usize) -> f64 {
+    pub fn next(&mut self, scenario: &ResolvedFamilyScenario, of: &Remnants, k: usize) -> f64 {
         // Behind the end of the scenario it goes on.
         if k >= self.steps.len() {
-            self.draw(of, 2 * k + 1);
+            self.draw(scenario, 2 * k + 1);
         }
         let mut n = self.walk;
-        for (i, part) in of.scenario.scenario().remnant.iter().enumerate() {
+        for (i, part) in scenario.scenario().remnant.iter().enumerate() {
             let mut w = self.driven[i][k];
             if let Some(own) = part.signal_dependence {
                 w *= (1.0 - own.part + own.part * self.followed[i]).sqrt();
             }
-            n += of.calibrated(k, |c| c.gains[i]) * self.shaped[i].step(&of.shapings[i], w);
+            n += of.calibrated(scenario, k, |c| c.gains[i]) * self.shaped[i].step(&of.shapings[i], w);
         }
         n
     }
 
     /// Takes the control of sample `k`, after its remnant.
     #[inline]
-    pub fn follow(&mut self, of: &FamilySimulator, k: usize, u: f64) {
+    pub fn follow(&mut self, scenario: &ResolvedFamilyScenario, of: &Remnants, k: usize, u: f64) {
         // Of a run that was restored here nothing has been drawn yet.
-        self.draw(of, k + 1);
-        let scenario = of.scenario.scenario();
-        for (i, part) in scenario.remnant.iter().enumerate() {
+        self.draw(scenario, k + 1);
+        for (i, part) in scenario.scenario().remnant.iter().enumerate() {
             if let Some(own) = part.signal_dependence {
                 let (square, mean) = match own.follows {
-                    Followed::Control => (u * u, of.calibrated(k, |c| c.mean_squares[0])),
-                    Followed::Rate => ((u - self.before).powi(2), of.calibrated(k, |c| c.mean_squares[1])),
+                    Followed::Control => (u * u, of.calibrated(scenario, k, |c| c.mean_squares[0])),
+                    Followed::Rate => (
+                        (u - self.before).powi(2),
+                        of.calibrated(scenario, k, |c| c.mean_squares[1]),
+                    ),
                 };
                 self.followed[i] += self.forgets[i] * (square / mean - self.followed[i]);
             }
         }
         self.before = u;
+        let scenario = scenario.scenario();
         self.walk += scenario.stick.walk_per_root_s * scenario.sample_time.s().sqrt() * self.steps[k];
     }
 

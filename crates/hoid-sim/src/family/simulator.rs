@@ -18,7 +18,7 @@ use super::{
     calibration::Calibration,
     held_loop::{HeldLoop, Inputs, LoopState},
     noise::Shaping,
-    remnant_run::RemnantRun,
+    remnant_run::{RemnantRun, Remnants},
 };
 use crate::{RunSeed, SimError};
 
@@ -30,8 +30,7 @@ pub struct FamilySimulator {
     loops: Vec<(FamilyState, HeldLoop)>,
     /// Place in `loops` of each sample; empty where there is one for all.
     places: Vec<usize>,
-    pub(super) shapings: Vec<Shaping>,
-    calibrations: [Calibration; 2],
+    pub(super) remnants: Remnants,
 }
 
 /// The signals of one run, run-in included.
@@ -95,8 +94,11 @@ impl FamilySimulator {
             scenario: resolved,
             loops,
             places,
-            shapings,
-            calibrations: [initial, last],
+            remnants: Remnants {
+                shapings,
+                calibrations: [initial, last],
+                changes,
+            },
         })
     }
 
@@ -135,31 +137,20 @@ impl FamilySimulator {
         self.loops.iter().map(|(_, held)| held.delay()).max().unwrap_or(0)
     }
 
-    /// A number of the calibration at sample `k`, on its way from the initial to the last one.
-    #[inline]
-    pub(super) fn calibrated(&self, k: usize, of: impl Fn(&Calibration) -> f64) -> f64 {
-        let [initial, last] = &self.calibrations;
-        if self.places.is_empty() {
-            return of(initial);
-        }
-        let t_s = self.scenario.time_s(k.min(self.places.len() - 1));
-        self.scenario.scenario().schedule.value(of(initial), of(last), t_s)
-    }
-
     /// Gains K of the parts of the remnant, before and after the change.
     pub fn remnant_gains(&self) -> [&[f64]; 2] {
-        let [initial, last] = &self.calibrations;
+        let [initial, last] = &self.remnants.calibrations;
         [&initial.gains, &last.gains]
     }
 
     /// Variance of u in a long run, without bias and walk of the stick, before and after the change.
     pub fn control_variance(&self) -> [f64; 2] {
-        [0, 1].map(|i| self.calibrations[i].mean_squares[0])
+        [0, 1].map(|i| self.remnants.calibrations[i].mean_squares[0])
     }
 
     /// Variance of e, likewise.
     pub fn error_variance(&self) -> [f64; 2] {
-        [0, 1].map(|i| self.calibrations[i].mean_squares[2])
+        [0, 1].map(|i| self.remnants.calibrations[i].mean_squares[2])
     }
 
     /// The signals of a run.
@@ -175,17 +166,17 @@ impl FamilySimulator {
             d: phased(&scenario.disturbance, run, DISTURBANCE_PHASES)?.samples(start_s, ts, samples),
             ..FamilySignals::default()
         };
-        let mut remnant = RemnantRun::new(self, run);
+        let mut remnant = RemnantRun::new(&self.scenario, &self.remnants, run);
         let mut state = LoopState::at_rest(self.held(0), self.longest_delay());
         for k in 0..samples {
-            let n = remnant.next(self, k);
+            let n = remnant.next(&self.scenario, &self.remnants, k);
             let inputs = Inputs {
                 target: signals.f[k],
                 disturbance: signals.d[k],
                 remnant: n,
             };
             let now = self.held(k).step(&mut state, inputs);
-            remnant.follow(self, k, now.u);
+            remnant.follow(&self.scenario, &self.remnants, k, now.u);
             signals.e.push(now.e + scenario.stick.offset_e);
             signals.u.push(now.u + scenario.stick.offset_u);
             signals.y.push(now.y);
