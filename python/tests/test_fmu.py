@@ -24,6 +24,36 @@ from fmpy.validation import validate_fmu  # noqa: E402
 
 STEP = 0.01
 
+#: A person of the family whose gain and delay change, with a remnant that follows the control.
+PERSON = """
+form = "lead2-lag"
+sampling_rate_hz = 100
+measurement_s = 20
+[initial]
+K = 2
+T_L_s = 0.5
+T_I_s = 3
+omega_nm_rad_s = 11
+zeta_nm = 0.25
+tau_e_s = 0.18
+controlled_element = "2/(s(s+3))"
+[last]
+K = 1.5
+tau_e_s = 0.22
+[schedule]
+rate_per_s = 1
+midpoint_s = 8
+[disturbance]
+rms = 1
+[[remnant]]
+shape = "lag"
+T_n_s = 0.1
+share = 0.1
+follows = "control"
+[stick]
+walk_per_root_s = 0.02
+"""
+
 
 @pytest.fixture(scope="module")
 def library(cli: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
@@ -134,13 +164,21 @@ def test_a_simulator_takes_the_tracker(
 
 
 @pytest.mark.parametrize("fmi", [2, 3])
+@pytest.mark.parametrize("of", ["C4", "person.toml"])
 def test_the_operator_gives_the_digits_of_simulate(
-    cli: Any, library: Path, empty_folder: Path, tmp_path: Path, fmi: int
+    cli: Any, library: Path, empty_folder: Path, tmp_path: Path, of: str, fmi: int
 ) -> None:
     run, unit = tmp_path / "run.csv", tmp_path / "person.fmu"
-    cli.run("simulate", "--condition", "C4", "--seed", 3, "--keep-run-in", "--out", run)
+    if of == "C4":
+        whom, operator = ("--condition", "C4"), "C4"
+    else:
+        operator = str(tmp_path / of)
+        Path(operator).write_text(PERSON, encoding="utf-8")
+        whom = ("--scenario", operator)
+    cli.run("simulate", *whom, "--seed", 3, "--keep-run-in", "--out", run)
+    seed = ("--seed", 3)
     cli.run(
-        "fmu", "--out", unit, "--library", library, "--operator", "C4", "--seed", 3, "--fmi", fmi
+        *("fmu", "--out", unit, "--library", library, "--operator", operator, *seed, "--fmi", fmi)
     )
     assert validate_fmu(str(unit)) == []
     record = columns(run)
@@ -160,12 +198,15 @@ def test_the_operator_gives_the_digits_of_simulate(
 
 
 @pytest.mark.parametrize("fmi", [2, 3])
-@pytest.mark.parametrize("kind", ["tracker", "operator"])
+@pytest.mark.parametrize("kind", ["tracker", "operator", "person"])
 def test_a_unit_goes_back_and_goes_on_elsewhere(
     cli: Any, library: Path, run: Path, empty_folder: Path, tmp_path: Path, kind: str, fmi: int
 ) -> None:
     path = tmp_path / "unit.fmu"
-    operator = ("--operator", "C4", "--seed", 3) if kind == "operator" else ()
+    person = tmp_path / "person.toml"
+    person.write_text(PERSON, encoding="utf-8")
+    of = {"tracker": (), "operator": ("--operator", "C4"), "person": ("--operator", person)}
+    operator = (*of[kind], "--seed", 3) if of[kind] else ()
     cli.run("fmu", "--out", path, "--library", library, "--fmi", fmi, *operator)
     assert validate_fmu(str(path)) == []
     record = columns(run)

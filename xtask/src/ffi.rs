@@ -16,7 +16,7 @@ use std::{
     process::{Command, Stdio},
 };
 
-use crate::process::{cargo, output, run};
+use crate::process::{SHIPPED, cargo, output, run};
 
 /// What a program that links the static library links besides.
 const SYSTEM_LIBRARIES: &str = if cfg!(target_os = "linux") {
@@ -42,9 +42,9 @@ pub fn ffi(arguments: &[String]) -> Result<(), String> {
     let words: Vec<&str> = arguments.iter().map(String::as_str).collect();
     let target = target_directory();
     match words.as_slice() {
-        [] => build("release", &target.join("ffi")),
+        [] => build(SHIPPED, &target.join("ffi")),
         ["--dev"] => build("dev", &target.join("ffi")),
-        ["--out", out] => build("release", Path::new(out)),
+        ["--out", out] => build(SHIPPED, Path::new(out)),
         ["--dev", "--out", out] => build("dev", Path::new(out)),
         ["--header"] => header(),
         ["--check"] => {

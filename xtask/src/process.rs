@@ -49,6 +49,9 @@ pub fn output(command: &mut Command) -> Result<String, String> {
     }
 }
 
+/// The profile of what is shipped: programs, libraries, wheels.
+pub const SHIPPED: &str = "shipped";
+
 /// Where cargo builds.
 pub fn target_directory() -> PathBuf {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");

@@ -12,7 +12,8 @@ use std::{
 
 use crate::{
     counts::Counts,
-    process::{cargo, each_line, run, target_directory},
+    process::{SHIPPED, cargo, each_line, run, target_directory},
+    processors::{BUILT, other_processors},
 };
 
 /// Oldest Python that the package supports.
@@ -27,6 +28,7 @@ pub fn test(arguments: &[String]) -> Result<Counts, String> {
         &["build", "--quiet", "--workspace", "--bins", "--tests", "--examples"],
         &[],
     )?;
+    other_processors("dev")?;
     let python = environment(Wheel::OfTests)?;
     let mut counts = Counts::default();
     let mut command = Command::new(&python);
@@ -35,6 +37,7 @@ pub fn test(arguments: &[String]) -> Result<Counts, String> {
         .args(arguments)
         .current_dir(package()?)
         .env("MPLBACKEND", "Agg")
+        .env(BUILT, "1")
         .env(
             "HOID_BINARY",
             target.join("debug").join(format!("hoid{}", env::consts::EXE_SUFFIX)),
@@ -52,8 +55,8 @@ pub fn test(arguments: &[String]) -> Result<Counts, String> {
 pub enum Wheel {
     /// As the tests have compiled it, with what they require.
     OfTests,
-    /// As it is released, with what the places need.
-    Released,
+    /// As it is shipped, with what the places need.
+    Shipped,
 }
 
 /// A fresh environment with the package in it; its interpreter. For that of the tests the workspace is built before.
@@ -67,7 +70,7 @@ pub fn environment(wheel: Wheel) -> Result<PathBuf, String> {
             &[][..],
             &["--profile", "dev", "--features", "as-in-workspace"][..],
         ),
-        Wheel::Released => ("venv-released", "lsl", &["fmpy"][..], &["--release"][..]),
+        Wheel::Shipped => ("venv-shipped", "lsl", &["fmpy"][..], &["--profile", SHIPPED][..]),
     };
     let python = fresh_environment(&work.join(place))?;
     let wheels = work.join("wheels");

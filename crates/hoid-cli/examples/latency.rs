@@ -118,6 +118,6 @@ fn beside_this() -> PathBuf {
 /// The interpreter that the places or the tests have left.
 fn interpreter() -> PathBuf {
     let of = |environment: &str| profile().join("../python").join(environment).join("bin/python");
-    let found = ["venv-released", "venv"].map(of).into_iter().find(|path| path.exists());
+    let found = ["venv-shipped", "venv"].map(of).into_iter().find(|path| path.exists());
     found.unwrap_or_else(|| PathBuf::from("python3"))
 }

@@ -22,6 +22,20 @@ pub enum SimError {
         /// Name of the scenario.
         scenario: String,
     },
+    /// An operator whose control hangs on the error of the same sample.
+    #[error(
+        "the operator of {scenario} answers an error within its sample: its delay is {tau_e_s} s, it has no neuromuscular part and \
+         its response is not strictly proper; expected a delay of at least half a sample ({half_a_sample_s} s): make tau_e longer \
+         or the sample time shorter, or give omega_nm and zeta_nm"
+    )]
+    AnswersAtOnce {
+        /// Name of the scenario.
+        scenario: String,
+        /// Delay of the operator, s.
+        tau_e_s: f64,
+        /// Half the sample time, s.
+        half_a_sample_s: f64,
+    },
     /// Ranges in which no person is found.
     #[error(
         "no loop is taken in {draws} draws of the form {form} on the element {plant}: widen the ranges of the population, or take smaller spreads"

@@ -27,7 +27,7 @@
 //! | `run_seed` | [`RunSeed`]: what names the random numbers of one run |
 //! | `normal_deviates` | standard normal deviates by the ziggurat |
 //! | `cascade` | exact zero-order hold of the remnant filter |
-//! | [`family`] | the loop of any operator of the family: [`FamilySimulator`] |
+//! | [`family`] | the loop of any operator of the family: [`FamilySimulator`], and that operator alone |
 //! | [`people`] | virtual people drawn over the family |
 //! | `error` | [`SimError`]: why a simulation gives no record |
 
@@ -41,7 +41,7 @@ mod run_seed;
 mod simulator;
 
 pub use error::SimError;
-pub use family::{FamilySignals, FamilySimulator};
+pub use family::{FamilyOperatorRun, FamilySignals, FamilySimulator};
 pub use operator_run::OperatorRun;
 pub use run_seed::RunSeed;
 pub use simulator::{Signals, Simulator};

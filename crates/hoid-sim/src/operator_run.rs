@@ -8,7 +8,7 @@
 use crate::{RunSeed, Simulator, cascade::MOST};
 
 /// Most samples of an operator that goes on.
-const MOST_SAMPLES: f64 = 1e9;
+pub(crate) const MOST_SAMPLES: f64 = 1e9;
 
 /// An operator that is at work.
 #[derive(Debug, Clone)]

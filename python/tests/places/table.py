@@ -39,8 +39,8 @@ def tables(tools: Tools) -> str:
     day = datetime.datetime.now(datetime.timezone.utc).strftime("%-d %B %Y")
     of = tools.binary.parent.name
     profile = (
-        "built as it is released"
-        if of == "release"
+        "built as it is shipped"
+        if of == "shipped"
         else "built as for the tests, with their checks"
     )
     where = f"{version}, {day}, {profile}, on {machine()}."

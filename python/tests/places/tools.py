@@ -21,9 +21,11 @@ class Tools:
     binary: Path
     #: Where work may be done.
     folder: Path
-    #: For the table: all has just been built, and all of the run is taken under QEMU, which takes
-    #: a minute; else its first seconds.
+    #: For the table: all of the run is taken under QEMU, which takes a minute; else its first
+    #: seconds.
     whole: bool = False
+    #: Whether the chore that runs this has just built all of it.
+    built: bool = os.environ.get("HOID_PLACES_BUILT") is not None
 
     def hoid(self, *arguments: Any) -> str:
         return output([self.binary, *arguments])
@@ -39,13 +41,14 @@ class Tools:
         return newest([path], f"no example {name}: cargo build -p hoid --example {name}")
 
     def of_target(self, target: str, name: str) -> Path:
-        """What was built for another processor: of release, else as the tests."""
+        """What was built for another processor: as this program, or of release."""
         folder = self.binary.parents[1] / target
-        places = [folder / profile / name for profile in ("release", "debug")]
-        found = newest(places, f"not built for {target}: cargo xtask places")
-        # The chore has just built it; what lies about from another day is none of these sources.
-        if not self.whole and found.stat().st_mtime < self.binary.stat().st_mtime:
-            raise Missing(f"built for {target} before the program was: cargo xtask places")
+        profiles = (self.binary.parent.name, "release")
+        places = [folder / profile / name for profile in profiles]
+        found = newest(places, f"not built for {target}: cargo xtask python")
+        # What lies about from another day is none of these sources.
+        if not self.built and found.stat().st_mtime < self.binary.stat().st_mtime:
+            raise Missing(f"built for {target} before the program was: cargo xtask python")
         return found
 
     def shipped(self, path: Path) -> int:

@@ -11,6 +11,7 @@ use hoid_io::{
     is_fit_file, parse_any_scenario, parse_fit, read_text,
 };
 use hoid_model::SampleTime;
+use hoid_sim::{FamilyOperatorRun, FamilySimulator, RunSeed, Simulator};
 use hoid_track::Method;
 
 use super::places;
@@ -91,12 +92,15 @@ fn of_operator(operator: &OperatorChoice, seed: i32) -> Result<Unit, CliError> {
         ),
         OperatorChoice::File(file) => (read_text(file)?, file.display().to_string(), vec![file.clone()]),
     };
+    // What could not begin is said here, not in a simulator.
     let step_s = match parse_any_scenario(&text, &source, &source)? {
-        AnyScenario::Reference(scenario) => scenario.sample_time.s(),
-        AnyScenario::Family(_) => {
-            return Err(CliError::Usage(format!(
-                "--operator {source}: a scenario with a form cannot be a unit yet; give one of a gain with a lead"
-            )));
+        AnyScenario::Reference(scenario) => {
+            Simulator::new(&scenario)?;
+            scenario.sample_time.s()
+        }
+        AnyScenario::Family(scenario) => {
+            FamilyOperatorRun::new(FamilySimulator::new(&scenario)?, RunSeed::default(), 0.0)?;
+            scenario.sample_time.s()
         }
     };
     let settings = FmuSettings::new(FmuKind::Operator)

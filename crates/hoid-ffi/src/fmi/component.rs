@@ -7,7 +7,7 @@ use std::{
     slice,
 };
 
-use super::{instance::Instance, model::Done};
+use super::{given::Done, instance::Instance};
 use crate::status::said;
 
 /// Statuses, of both interfaces.

@@ -8,7 +8,10 @@ use std::{ffi::CString, fs, path::Path};
 
 use hoid_io::fmu::{FMU_SETTINGS, FmuKind, FmuSettings, FmuStart, FmuVariable, Role};
 
-use super::model::{Done, Given, Model};
+use super::{
+    given::{Done, Given},
+    model::Model,
+};
 
 /// Share of the sample time by which a time may be off.
 const OFF: f64 = 1e-6;

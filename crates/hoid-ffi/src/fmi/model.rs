@@ -1,60 +1,18 @@
 //! What takes the samples of a unit.
 
-use hoid_io::{
-    AnyScenario,
-    fmu::{DETERMINED, FmuKind, FmuSettings, FmuStart, FmuVariable},
-    parse_any_scenario,
-};
-use hoid_sim::{OperatorRun, RunSeed, Simulator};
+use hoid_io::fmu::{DETERMINED, FmuKind, FmuSettings, FmuStart};
 use hoid_track::Sample;
 use serde_json::{Map, Value};
 
+use super::{
+    given::{Done, Given},
+    operator::OperatorModel,
+};
 use crate::{
     packed::{as_bytes, as_numbers},
     reading::number_of,
     session::Session,
 };
-
-/// What is done, or why not.
-pub(super) type Done<T = ()> = Result<T, String>;
-
-/// Values by the names of their variables.
-pub(super) struct Given<'a> {
-    pub variables: &'a [FmuVariable],
-    pub values: &'a [FmuStart],
-}
-
-impl Given<'_> {
-    fn value(&self, name: &str) -> Option<&FmuStart> {
-        let place = self.variables.iter().position(|variable| variable.name == name)?;
-        self.values.get(place)
-    }
-
-    fn real(&self, name: &str) -> f64 {
-        match self.value(name) {
-            Some(FmuStart::Real(value)) => *value,
-            _ => f64::NAN,
-        }
-    }
-
-    fn text(&self, name: &str) -> &str {
-        match self.value(name) {
-            Some(FmuStart::Text(text)) => text.trim(),
-            _ => "",
-        }
-    }
-
-    fn is(&self, name: &str) -> bool {
-        matches!(self.value(name), Some(FmuStart::Boolean(true)))
-    }
-
-    fn count(&self, name: &str) -> u64 {
-        match self.value(name) {
-            Some(FmuStart::Integer(value)) => u64::from(value.cast_unsigned()),
-            _ => 0,
-        }
-    }
-}
 
 /// What a unit is made of.
 pub(super) enum Model {
@@ -69,12 +27,6 @@ pub(super) struct TrackerModel {
     innovation: f64,
     changes: i32,
     change_t_s: f64,
-}
-
-/// An operator.
-pub(super) struct OperatorModel {
-    run: OperatorRun,
-    sample_time_s: f64,
 }
 
 impl Model {
@@ -93,7 +45,7 @@ impl Model {
                 let told = vec![tracker.innovation, f64::from(tracker.changes), tracker.change_t_s];
                 (told, tracker.session.saved())
             }
-            Self::Operator(operator) => (Vec::new(), as_bytes(&operator.run.saved())),
+            Self::Operator(operator) => (Vec::new(), as_bytes(&operator.saved())),
         }
     }
 
@@ -122,7 +74,7 @@ impl Model {
             FmuKind::Operator => {
                 let mut operator = OperatorModel::new(settings, given, start_s)?;
                 let numbers = as_numbers(bytes).ok_or_else(wrong)?;
-                if !operator.run.restore(&numbers) {
+                if !operator.restore(&numbers) {
                     return Err(wrong());
                 }
                 Self::Operator(Box::new(operator))
@@ -133,7 +85,7 @@ impl Model {
     pub fn sample_time_s(&self) -> f64 {
         match self {
             Self::Tracker(tracker) => tracker.session.sample_time_s(),
-            Self::Operator(operator) => operator.sample_time_s,
+            Self::Operator(operator) => operator.sample_time_s(),
         }
     }
 
@@ -146,7 +98,7 @@ impl Model {
     pub fn take(&mut self, given: &Given<'_>, t_s: f64) {
         match self {
             Self::Tracker(tracker) => tracker.take(given, t_s),
-            Self::Operator(operator) => operator.run.take(given.real("e")),
+            Self::Operator(operator) => operator.take(given.real("e")),
         }
     }
 
@@ -155,8 +107,8 @@ impl Model {
         match self {
             Self::Tracker(tracker) => tracker.named(),
             Self::Operator(operator) => vec![
-                ("u", FmuStart::Real(operator.run.control())),
-                ("n", FmuStart::Real(operator.run.remnant())),
+                ("u", FmuStart::Real(operator.control())),
+                ("n", FmuStart::Real(operator.remnant())),
             ],
         }
     }
@@ -261,30 +213,5 @@ impl TrackerModel {
             ("restarts", count(counts.restarts)),
         ]);
         all
-    }
-}
-
-impl OperatorModel {
-    fn new(settings: &FmuSettings, given: &Given<'_>, start_s: f64) -> Done<Self> {
-        let text = settings.scenario.as_deref();
-        let text = text.ok_or("the unit has no scenario; make it by hoid fmu --operator SCENARIO")?;
-        let scenario = match parse_any_scenario(text, "the scenario of the unit", "scenario")
-            .map_err(|error| error.to_string())?
-        {
-            AnyScenario::Reference(scenario) => scenario,
-            AnyScenario::Family(_) => {
-                return Err("a scenario with a form cannot be a unit yet; give one of a gain with a lead".to_owned());
-            }
-        };
-        let simulator = Simulator::new(&scenario).map_err(|error| error.to_string())?;
-        let seed = RunSeed {
-            seed: given.count("seed"),
-            replication: given.count("replication"),
-            ..RunSeed::default()
-        };
-        Ok(Self {
-            sample_time_s: scenario.sample_time.s(),
-            run: OperatorRun::new(simulator, seed, start_s),
-        })
     }
 }

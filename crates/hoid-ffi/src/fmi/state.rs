@@ -15,8 +15,9 @@ use serde_json::{Value, json};
 
 use super::{
     component::{Component, list, list_mut, with},
+    given::{Done, Given},
     instance::{Instance, Phase},
-    model::{Done, Given, Model},
+    model::Model,
 };
 use crate::packed::{opened, packed};
 

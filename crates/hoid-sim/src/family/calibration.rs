@@ -111,7 +111,7 @@ fn energy(held: &HeldLoop, shaping: &Shaping) -> Result<MeanSquares, ModelError>
     loop {
         let mut block = [0.0; 3];
         while done < horizon {
-            let remnant = shaped.step(w);
+            let remnant = shaped.step(shaping, w);
             w = 0.0;
             let inputs = Inputs {
                 remnant,

@@ -52,14 +52,32 @@ pub(super) struct Outputs {
 
 /// Where the loop stands between two samples.
 pub(super) struct LoopState {
-    operator: Vec<f64>,
+    operator: OperatorState,
     element: Vec<f64>,
+    next: Vec<f64>,
+}
+
+/// Where the operator stands between two samples.
+#[derive(Debug, Clone)]
+pub(super) struct OperatorState {
+    state: Vec<f64>,
     next: Vec<f64>,
     /// e(k-1), e(k-2).
     errors: [f64; 2],
     /// Responses, that of sample k in place k of a ring.
     ring: Vec<f64>,
     k: usize,
+}
+
+/// What the operator says of a sample before its error is known.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Answer {
+    /// The response without the error of the sample, before the delay of whole samples.
+    past: f64,
+    /// The same behind the delay: what u has of it.
+    pub known: f64,
+    /// What u has of the error of the sample besides.
+    tap: f64,
 }
 
 impl HeldLoop {
@@ -120,32 +138,51 @@ impl HeldLoop {
         1.0 + self.element_direct() * if self.delay == 0 { self.taps[0] } else { 0.0 }
     }
 
-    /// One sample on.
+    /// True where u has something of the error of the same sample.
+    pub fn answers_at_once(&self) -> bool {
+        self.delay == 0 && self.taps[0] != 0.0
+    }
+
+    /// What the operator says of the sample that is next.
     #[inline]
-    pub fn step(&self, state: &mut LoopState, inputs: Inputs) -> Outputs {
-        let mask = state.ring.len() - 1;
+    pub fn answer(&self, state: &OperatorState) -> Answer {
         let [e1, e2] = state.errors;
-        let past = self.operator.output(&state.operator) + self.taps[1] * e1 + self.taps[2] * e2;
+        let past = self.operator.output(&state.state) + self.taps[1] * e1 + self.taps[2] * e2;
         let (known, tap) = if self.delay == 0 {
             (past, self.taps[0])
         } else {
+            let mask = state.ring.len() - 1;
             (state.ring[state.k.wrapping_sub(self.delay) & mask], 0.0)
         };
+        Answer { past, known, tap }
+    }
+
+    /// Takes the error of the sample that was answered: the operator is one sample on.
+    #[inline]
+    pub fn respond(&self, state: &mut OperatorState, answer: Answer, e: f64) {
+        let mask = state.ring.len() - 1;
+        state.ring[state.k & mask] = answer.past + self.taps[0] * e;
+        state.k += 1;
+        let [e1, _] = state.errors;
+        self.operator.step(&state.state, e, e1, &mut state.next);
+        std::mem::swap(&mut state.state, &mut state.next);
+        state.errors = [e, e1];
+    }
+
+    /// One sample on.
+    #[inline]
+    pub fn step(&self, state: &mut LoopState, inputs: Inputs) -> Outputs {
+        let answer = self.answer(&state.operator);
+        let Answer { known, tap, .. } = answer;
         let direct = self.element_direct();
         let of_state = self.element_output * self.element.output(&state.element);
         let rest = inputs.target - of_state - direct * (known + inputs.remnant + inputs.disturbance);
         let e = if tap == 0.0 { rest } else { rest / (1.0 + direct * tap) };
         let u = known + tap * e + inputs.remnant;
-        state.ring[state.k & mask] = past + self.taps[0] * e;
-        state.k += 1;
-        self.operator
-            .step(&state.operator, e, e1, &mut state.next[..self.operator.order()]);
-        state.operator.copy_from_slice(&state.next[..self.operator.order()]);
+        self.respond(&mut state.operator, answer, e);
         let driven = self.element_input * (u + inputs.disturbance);
-        self.element
-            .step(&state.element, driven, 0.0, &mut state.next[..self.element.order()]);
-        state.element.copy_from_slice(&state.next[..self.element.order()]);
-        state.errors = [e, e1];
+        self.element.step(&state.element, driven, 0.0, &mut state.next);
+        std::mem::swap(&mut state.element, &mut state.next);
         Outputs {
             e,
             u,
@@ -168,14 +205,32 @@ impl HeldLoop {
 
 impl LoopState {
     pub fn at_rest(held: &HeldLoop, longest_delay: usize) -> Self {
-        let (operator, element) = (held.operator.order(), held.element.order());
+        let element = held.element.order();
         Self {
-            operator: vec![0.0; operator],
+            operator: OperatorState::at_rest(held, longest_delay),
             element: vec![0.0; element],
-            next: vec![0.0; operator.max(element)],
+            next: vec![0.0; element],
+        }
+    }
+}
+
+impl OperatorState {
+    pub fn at_rest(held: &HeldLoop, longest_delay: usize) -> Self {
+        let order = held.operator.order();
+        Self {
+            state: vec![0.0; order],
+            next: vec![0.0; order],
             errors: [0.0; 2],
             ring: vec![0.0; (longest_delay + 1).next_power_of_two()],
             k: 0,
         }
+    }
+
+    /// What it stands at, as numbers; the ring from the sample that is next.
+    pub fn numbers(&mut self) -> impl Iterator<Item = &mut f64> {
+        let oldest = self.k & (self.ring.len() - 1);
+        self.ring.rotate_left(oldest);
+        self.k = 0;
+        self.state.iter_mut().chain(&mut self.errors).chain(&mut self.ring)
     }
 }

@@ -38,31 +38,30 @@ impl Shaping {
     }
 }
 
-/// A filter and where it stands.
-pub(super) struct Shaped<'a> {
-    shaping: &'a Shaping,
+/// Where a filter stands.
+#[derive(Debug, Clone)]
+pub(super) struct Shaped {
     state: Vec<f64>,
     next: Vec<f64>,
 }
 
-impl<'a> Shaped<'a> {
-    pub fn at_rest(shaping: &'a Shaping) -> Self {
+impl Shaped {
+    pub fn at_rest(shaping: &Shaping) -> Self {
         let order = match shaping {
             Shaping::White => 0,
             Shaping::Held(system) => system.order(),
             Shaping::Ar(coefficients) => coefficients.len(),
         };
         Self {
-            shaping,
             state: vec![0.0; order],
             next: vec![0.0; order],
         }
     }
 
-    /// The output of this sample; `w` is its input, which a held filter feels from the next on.
+    /// The output of its filter in this sample; `w` is the input, which a held filter feels from the next on.
     #[inline]
-    pub fn step(&mut self, w: f64) -> f64 {
-        match self.shaping {
+    pub fn step(&mut self, shaping: &Shaping, w: f64) -> f64 {
+        match shaping {
             Shaping::White => w,
             Shaping::Held(system) => {
                 let output = system.output(&self.state);
@@ -80,6 +79,11 @@ impl<'a> Shaped<'a> {
                 output
             }
         }
+    }
+
+    /// What it stands at, as numbers.
+    pub fn numbers(&mut self) -> impl Iterator<Item = &mut f64> {
+        self.state.iter_mut()
     }
 }
 

@@ -10,27 +10,27 @@ use std::f64::consts::TAU;
 
 use hoid_model::{
     Channel, Record,
-    family_scenario::{Excitation, FamilyScenario, FamilyState, Followed, ResolvedFamilyScenario, Stick},
+    family_scenario::{Excitation, FamilyScenario, FamilyState, ResolvedFamilyScenario, Stick},
     forcing::{ForcingFunction, Sinusoid},
 };
 
 use super::{
     calibration::Calibration,
     held_loop::{HeldLoop, Inputs, LoopState},
-    noise::{Shaped, Shaping, driving},
+    noise::Shaping,
+    remnant_run::{RemnantRun, Remnants},
 };
 use crate::{RunSeed, SimError};
 
 /// A scenario made ready: held models of all samples, gains of the remnant.
 #[derive(Debug, Clone)]
 pub struct FamilySimulator {
-    scenario: ResolvedFamilyScenario,
+    pub(super) scenario: ResolvedFamilyScenario,
     /// Each with the state that it is of.
     loops: Vec<(FamilyState, HeldLoop)>,
     /// Place in `loops` of each sample; empty where there is one for all.
     places: Vec<usize>,
-    shapings: Vec<Shaping>,
-    calibrations: [Calibration; 2],
+    pub(super) remnants: Remnants,
 }
 
 /// The signals of one run, run-in included.
@@ -52,7 +52,6 @@ pub struct FamilySignals {
 
 const TARGET_PHASES: u64 = u64::from_le_bytes(*b"target\0\0");
 const DISTURBANCE_PHASES: u64 = u64::from_le_bytes(*b"disturb\0");
-const WALK: u64 = u64::from_le_bytes(*b"stick\0\0\0");
 
 impl FamilySimulator {
     /// Prepares a scenario. Runs share what is computed here.
@@ -95,8 +94,11 @@ impl FamilySimulator {
             scenario: resolved,
             loops,
             places,
-            shapings,
-            calibrations: [initial, last],
+            remnants: Remnants {
+                shapings,
+                calibrations: [initial, last],
+                changes,
+            },
         })
     }
 
@@ -123,20 +125,32 @@ impl FamilySimulator {
         self.scenario.run_in_samples() + self.scenario.measurement_samples()
     }
 
+    /// The loop at sample `k`; behind the end of the scenario it is that of the last one.
+    #[inline]
+    pub(super) fn held(&self, k: usize) -> &HeldLoop {
+        let place = self.places.get(k).or(self.places.last()).copied().unwrap_or(0);
+        &self.loops[place].1
+    }
+
+    /// The longest delay in whole samples.
+    pub(super) fn longest_delay(&self) -> usize {
+        self.loops.iter().map(|(_, held)| held.delay()).max().unwrap_or(0)
+    }
+
     /// Gains K of the parts of the remnant, before and after the change.
     pub fn remnant_gains(&self) -> [&[f64]; 2] {
-        let [initial, last] = &self.calibrations;
+        let [initial, last] = &self.remnants.calibrations;
         [&initial.gains, &last.gains]
     }
 
     /// Variance of u in a long run, without bias and walk of the stick, before and after the change.
     pub fn control_variance(&self) -> [f64; 2] {
-        [0, 1].map(|i| self.calibrations[i].mean_squares[0])
+        [0, 1].map(|i| self.remnants.calibrations[i].mean_squares[0])
     }
 
     /// Variance of e, likewise.
     pub fn error_variance(&self) -> [f64; 2] {
-        [0, 1].map(|i| self.calibrations[i].mean_squares[2])
+        [0, 1].map(|i| self.remnants.calibrations[i].mean_squares[2])
     }
 
     /// The signals of a run.
@@ -152,63 +166,17 @@ impl FamilySimulator {
             d: phased(&scenario.disturbance, run, DISTURBANCE_PHASES)?.samples(start_s, ts, samples),
             ..FamilySignals::default()
         };
-        let driven: Vec<Vec<f64>> = (0..)
-            .zip(&scenario.remnant)
-            .map(|(i, part)| driving(part, run, i, ts.s(), samples))
-            .collect();
-        let steps = if scenario.stick.walk_per_root_s == 0.0 {
-            vec![0.0; samples]
-        } else {
-            run.white_noise_of(WALK, samples)
-        };
-        let mut shaped: Vec<Shaped> = self.shapings.iter().map(Shaped::at_rest).collect();
-        // Each running mean square in units of its mean over the run.
-        let mut followed = vec![1.0; shaped.len()];
-        let forgets: Vec<f64> = (scenario.remnant.iter())
-            .map(|part| {
-                part.signal_dependence
-                    .map_or(1.0, |s| 1.0 - (-ts.s() / s.memory_s).exp())
-            })
-            .collect();
-        let longest = self.loops.iter().map(|(_, held)| held.delay()).max().unwrap_or(0);
-        let mut state = LoopState::at_rest(&self.loops[0].1, longest);
-        let (mut walk, mut before) = (scenario.stick.bias, 0.0);
+        let mut remnant = RemnantRun::new(&self.scenario, &self.remnants, run);
+        let mut state = LoopState::at_rest(self.held(0), self.longest_delay());
         for k in 0..samples {
-            let place = self.places.get(k).copied().unwrap_or(0);
-            let t_s = start_s + k as f64 * ts.s();
-            let between = |of: fn(&Calibration, usize) -> f64, i: usize| {
-                let [a, b] = &self.calibrations;
-                if self.places.is_empty() {
-                    of(a, i)
-                } else {
-                    scenario.schedule.value(of(a, i), of(b, i), t_s)
-                }
-            };
-            let mut n = walk;
-            for (i, part) in scenario.remnant.iter().enumerate() {
-                let mut w = driven[i][k];
-                if let Some(own) = part.signal_dependence {
-                    w *= (1.0 - own.part + own.part * followed[i]).sqrt();
-                }
-                n += between(|c, i| c.gains[i], i) * shaped[i].step(w);
-            }
+            let n = remnant.next(&self.scenario, &self.remnants, k);
             let inputs = Inputs {
                 target: signals.f[k],
                 disturbance: signals.d[k],
                 remnant: n,
             };
-            let now = self.loops[place].1.step(&mut state, inputs);
-            for (i, part) in scenario.remnant.iter().enumerate() {
-                if let Some(own) = part.signal_dependence {
-                    let (square, mean) = match own.follows {
-                        Followed::Control => (now.u * now.u, between(|c, _| c.mean_squares[0], 0)),
-                        Followed::Rate => ((now.u - before).powi(2), between(|c, _| c.mean_squares[1], 0)),
-                    };
-                    followed[i] += forgets[i] * (square / mean - followed[i]);
-                }
-            }
-            before = now.u;
-            walk += scenario.stick.walk_per_root_s * ts.s().sqrt() * steps[k];
+            let now = self.held(k).step(&mut state, inputs);
+            remnant.follow(&self.scenario, &self.remnants, k, now.u);
             signals.e.push(now.e + scenario.stick.offset_e);
             signals.u.push(now.u + scenario.stick.offset_u);
             signals.y.push(now.y);

@@ -7,6 +7,10 @@ use super::{
     oracle::CERTAIN,
 };
 
+/// Methods beside each other in a table that fits a page 1200 pixels wide: of numbers, and of words.
+const BESIDE: usize = 7;
+const WORDS_BESIDE: usize = 5;
+
 /// The tables of lines: error of H, its course after a change, alarms, changes found, coverage,
 /// parameters, findings.
 pub fn tables(lines: &[Line]) -> String {
@@ -16,15 +20,11 @@ pub fn tables(lines: &[Line]) -> String {
     text += &overview(lines, &methods, &cases);
 
     text += "\n### Error of H\n\nMean of |dH|/|H| over the lines, from 8 s after a change on or where nobody changes; median over the runs.\n\n";
-    head(&mut text, "case", &methods);
-    for case in &cases {
-        let cell = |method: &&str| {
-            let of = own(lines, case, method).flat_map(|line| &line.moments);
-            let settled = of.filter(|m| is_settled(&m.label)).map(|m| m.error);
-            median(settled.collect()).map_or("–".to_owned(), |e| format!("{e:.2}"))
-        };
-        row(&mut text, case, methods.iter().map(cell));
-    }
+    by_case(&mut text, &cases, &methods, BESIDE, |case, method| {
+        let of = own(lines, case, method).flat_map(|line| &line.moments);
+        let settled = of.filter(|m| is_settled(&m.label)).map(|m| m.error);
+        median(settled.collect()).map_or("–".to_owned(), |e| format!("{e:.2}"))
+    });
 
     text += "\n### Course of the error of H\n\nMedian over all runs in which somebody changes at once.\n\n";
     let labels: Vec<String> = ["before".to_owned()]
@@ -113,17 +113,13 @@ pub fn tables(lines: &[Line]) -> String {
     }
 
     text += "\n### Coverage\n\nBands of 1.96 standard errors of real and imaginary part of H that hold the truth, in percent; from 8 s after a change on or where nobody changes.\n\n";
-    head(&mut text, "case", &methods);
-    for case in &cases {
-        let cell = |method: &&str| {
-            let of = own(lines, case, method)
-                .flat_map(|line| &line.moments)
-                .filter(|m| is_settled(&m.label));
-            let [inside, all] = of.fold([0, 0], |sum, m| [sum[0] + m.covered[0], sum[1] + m.covered[1]]);
-            share(inside, all)
-        };
-        row(&mut text, case, methods.iter().map(cell));
-    }
+    by_case(&mut text, &cases, &methods, BESIDE, |case, method| {
+        let of = own(lines, case, method)
+            .flat_map(|line| &line.moments)
+            .filter(|m| is_settled(&m.label));
+        let [inside, all] = of.fold([0, 0], |sum, m| [sum[0] + m.covered[0], sum[1] + m.covered[1]]);
+        share(inside, all)
+    });
 
     text += "\n### Parameters\n\nMedian relative error in percent and coverage, in runs whose operator is that of the reference text; from 8 s after a change on or where nobody changes.\n\n";
     let names = ["K_e", "K_e_dot", "omega_nm", "zeta_nm", "tau_e"];
@@ -155,11 +151,9 @@ pub fn tables(lines: &[Line]) -> String {
         .collect();
     if !judged.is_empty() {
         text += "\n### What their verdicts say\n\nThe two findings that a verdict has most often, with the runs that have them.\n\n";
-        head(&mut text, "case", &judged);
-        for case in &cases {
-            let cells = judged.iter().map(|method| commonest(own(lines, case, method)));
-            row(&mut text, case, cells);
-        }
+        by_case(&mut text, &cases, &judged, WORDS_BESIDE, |case, method| {
+            commonest(own(lines, case, method))
+        });
     }
 
     text += &failures(lines);
@@ -300,6 +294,21 @@ fn in_order<'a>(names: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
         }
     }
     all
+}
+
+/// A row for each case and a column for each method, in as many tables, one below the other, as a page needs that has
+/// room for so many methods beside each other.
+fn by_case(text: &mut String, cases: &[&str], methods: &[&str], beside: usize, cell: impl Fn(&str, &str) -> String) {
+    let each = methods.len().div_ceil(methods.len().div_ceil(beside).max(1)).max(1);
+    for (i, some) in methods.chunks(each).enumerate() {
+        if i > 0 {
+            text.push('\n');
+        }
+        head(text, "case", some);
+        for case in cases {
+            row(text, case, some.iter().map(|method| cell(case, method)));
+        }
+    }
 }
 
 fn head(text: &mut String, first: &str, others: &[&str]) {

@@ -1,0 +1,88 @@
+//! The operator of a scenario, of the reference text or of the family, as a unit has it.
+
+use hoid_io::{AnyScenario, fmu::FmuSettings, parse_any_scenario};
+use hoid_sim::{FamilyOperatorRun, FamilySimulator, OperatorRun, RunSeed, Simulator};
+
+use super::given::{Done, Given};
+
+/// An operator that is at work.
+pub(super) struct OperatorModel {
+    run: Run,
+    sample_time_s: f64,
+}
+
+enum Run {
+    Reference(Box<OperatorRun>),
+    Family(Box<FamilyOperatorRun>),
+}
+
+impl OperatorModel {
+    pub fn new(settings: &FmuSettings, given: &Given<'_>, start_s: f64) -> Done<Self> {
+        let text = settings.scenario.as_deref();
+        let text = text.ok_or("the unit has no scenario; make it by hoid fmu --operator SCENARIO")?;
+        let seed = RunSeed {
+            seed: given.count("seed"),
+            replication: given.count("replication"),
+            ..RunSeed::default()
+        };
+        let said = |error: hoid_sim::SimError| error.to_string();
+        let scenario = parse_any_scenario(text, "the scenario of the unit", "scenario");
+        Ok(match scenario.map_err(|error| error.to_string())? {
+            AnyScenario::Reference(scenario) => {
+                let simulator = Simulator::new(&scenario).map_err(said)?;
+                Self {
+                    run: Run::Reference(Box::new(OperatorRun::new(simulator, seed, start_s))),
+                    sample_time_s: scenario.sample_time.s(),
+                }
+            }
+            AnyScenario::Family(scenario) => {
+                let simulator = FamilySimulator::new(&scenario).map_err(said)?;
+                let run = FamilyOperatorRun::new(simulator, seed, start_s).map_err(said)?;
+                Self {
+                    run: Run::Family(Box::new(run)),
+                    sample_time_s: scenario.sample_time.s(),
+                }
+            }
+        })
+    }
+
+    pub fn sample_time_s(&self) -> f64 {
+        self.sample_time_s
+    }
+
+    pub fn control(&self) -> f64 {
+        match &self.run {
+            Run::Reference(run) => run.control(),
+            Run::Family(run) => run.control(),
+        }
+    }
+
+    pub fn remnant(&self) -> f64 {
+        match &self.run {
+            Run::Reference(run) => run.remnant(),
+            Run::Family(run) => run.remnant(),
+        }
+    }
+
+    pub fn take(&mut self, e: f64) {
+        match &mut self.run {
+            Run::Reference(run) => run.take(e),
+            Run::Family(run) => run.take(e),
+        }
+    }
+
+    pub fn saved(&mut self) -> Vec<f64> {
+        match &mut self.run {
+            Run::Reference(run) => run.saved(),
+            Run::Family(run) => run.saved(),
+        }
+    }
+
+    /// False where the numbers are of another operator.
+    pub fn restore(&mut self, saved: &[f64]) -> bool {
+        match &mut self.run {
+            Run::Reference(run) => run.restore(saved),
+            Run::Family(run) => run.restore(saved),
+        }
+    }
+}

@@ -1,0 +1,275 @@
+//! The operator of a scenario of the family alone, a sample at a time: for a loop that is closed elsewhere.
+//!
+//! What [`FamilySimulator`] does of `u = r(k - l) + n`, with the same random numbers and the strength of remnant that
+//! the loop of the scenario gives: a loop that answers u as its controlled element does gives the same run to the last
+//! bit. What the recorder adds to e and u (`offset_e`, `offset_u`) is not the operator's. The control of a sample must
+//! not hang on the error of the same sample.
+
+use super::{
+    FamilySimulator,
+    held_loop::{HeldLoop, OperatorState},
+    remnant_run::RemnantRun,
+};
+use crate::{RunSeed, SimError, operator_run::MOST_SAMPLES};
+
+/// An operator of the family that is at work.
+#[derive(Debug, Clone)]
+pub struct FamilyOperatorRun {
+    simulator: FamilySimulator,
+    operator: OperatorState,
+    remnant: RemnantRun,
+    /// The sample that is next, and its remnant.
+    k: usize,
+    n: f64,
+}
+
+impl FamilyOperatorRun {
+    /// An operator at rest before the sample at `start_s`, in s from the start of the measurement.
+    /// What the run-in would have been before it is left out; its random numbers are passed over.
+    ///
+    /// # Errors
+    /// [`SimError::AnswersAtOnce`].
+    pub fn new(simulator: FamilySimulator, run: RunSeed, start_s: f64) -> Result<Self, SimError> {
+        let scenario = simulator.scenario.scenario();
+        let ts_s = scenario.sample_time.s();
+        if (0..simulator.samples()).any(|k| simulator.held(k).answers_at_once()) {
+            return Err(SimError::AnswersAtOnce {
+                scenario: scenario.name.clone(),
+                tau_e_s: scenario
+                    .initial
+                    .operator
+                    .tau_e_s()
+                    .min(scenario.last.operator.tau_e_s()),
+                half_a_sample_s: 0.5 * ts_s,
+            });
+        }
+        let after_run_in = (start_s / ts_s).round() as isize;
+        let k = simulator.scenario.run_in_samples().saturating_add_signed(after_run_in);
+        let mut remnant = RemnantRun::new(&simulator.scenario, &simulator.remnants, run);
+        Ok(Self {
+            operator: OperatorState::at_rest(simulator.held(0), simulator.longest_delay()),
+            n: remnant.next(&simulator.scenario, &simulator.remnants, k),
+            remnant,
+            k,
+            simulator,
+        })
+    }
+
+    fn held(&self) -> &HeldLoop {
+        self.simulator.held(self.k)
+    }
+
+    /// The control u of the sample that is next, deg.
+    pub fn control(&self) -> f64 {
+        self.held().answer(&self.operator).known + self.n
+    }
+
+    /// The remnant n of the sample that is next, deg, with bias and walk of the stick.
+    pub fn remnant(&self) -> f64 {
+        self.n
+    }
+
+    /// Takes the error e of the sample, deg: the next one is one sample later.
+    pub fn take(&mut self, e: f64) {
+        let held = self.simulator.held(self.k);
+        let answer = held.answer(&self.operator);
+        held.respond(&mut self.operator, answer, e);
+        let (scenario, remnants) = (&self.simulator.scenario, &self.simulator.remnants);
+        self.remnant.follow(scenario, remnants, self.k, answer.known + self.n);
+        self.k += 1;
+        self.n = self.remnant.next(scenario, remnants, self.k);
+    }
+
+    /// Where it stands, as numbers.
+    pub fn saved(&mut self) -> Vec<f64> {
+        let beside = [self.k as f64, self.n];
+        beside.into_iter().chain(self.numbers().map(|number| *number)).collect()
+    }
+
+    /// Goes on from where an operator of the same scenario and run stood ([`FamilyOperatorRun::saved`]), with the same
+    /// digits. False where the numbers are of another; then nothing has changed.
+    pub fn restore(&mut self, saved: &[f64]) -> bool {
+        let Some((&[k, n], rest)) = saved.split_first_chunk::<2>() else {
+            return false;
+        };
+        let is_ours = rest.len() == self.numbers().count();
+        if !is_ours || !(0.0..=MOST_SAMPLES).contains(&k) || k.fract() != 0.0 {
+            return false;
+        }
+        (self.k, self.n) = (k as usize, n);
+        self.numbers().zip(rest).for_each(|(number, saved)| *number = *saved);
+        true
+    }
+
+    fn numbers(&mut self) -> impl Iterator<Item = &mut f64> {
+        self.operator.numbers().chain(self.remnant.numbers())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use hoid_model::{
+        ContinuousTransferFunction, FamilyOperator, FamilyScenario, FamilyState, Form, SampleTime,
+        family_scenario::{
+            Followed, Intermittence, MultiSine, Pulses, RemnantPart, RemnantShape, SignalDependence, Stick,
+        },
+        schedule::Schedule,
+    };
+
+    use super::*;
+
+    const SEED: RunSeed = RunSeed {
+        seed: 5,
+        cell: 0,
+        replication: 2,
+    };
+
+    fn state(form: Form, neuromuscular: bool, coordinates: &[f64], element: [&[f64]; 2]) -> FamilyState {
+        FamilyState {
+            operator: FamilyOperator::new(form, neuromuscular, coordinates).unwrap(),
+            controlled_element: ContinuousTransferFunction::new(element[0], element[1]).unwrap(),
+        }
+    }
+
+    fn task(state: FamilyState) -> FamilyScenario {
+        let mut scenario = FamilyScenario::new(state, SampleTime::new(0.01).unwrap());
+        scenario.disturbance = MultiSine::default().excitation().unwrap();
+        scenario.measurement_s = 10.0;
+        scenario.run_in_s = 2.0;
+        scenario
+    }
+
+    /// An operator whose delay and element change, with every kind of remnant and a stick that walks.
+    fn busy() -> FamilyScenario {
+        let person = |k: f64, tau_e_s: f64| [k, 0.5, 3.0, 11.0_f64.ln(), 0.25_f64.ln(), tau_e_s];
+        let of = |k, tau_e_s| state(Form::LeadLag, true, &person(k, tau_e_s), [&[1.0], &[1.0, 0.0]]);
+        let mut scenario = task(of(4.0, 0.18));
+        scenario.last = of(3.0, 0.22);
+        scenario.schedule = Schedule::Sigmoid {
+            rate_per_s: 2.0,
+            midpoint_s: 4.0,
+        };
+        let lag = RemnantShape::Lag {
+            time_constant_s: 0.1,
+            order: 2,
+        };
+        let following = |follows| SignalDependence {
+            follows,
+            part: 0.7,
+            memory_s: 0.5,
+        };
+        scenario.remnant = vec![
+            RemnantPart {
+                signal_dependence: Some(following(Followed::Control)),
+                ..RemnantPart::new(lag, 0.1)
+            },
+            RemnantPart {
+                signal_dependence: Some(following(Followed::Rate)),
+                ..RemnantPart::new(RemnantShape::White, 0.02)
+            },
+            RemnantPart {
+                pulses: Some(Pulses {
+                    part: 0.4,
+                    rate_per_s: 3.0,
+                }),
+                ..RemnantPart::new(
+                    RemnantShape::Ar {
+                        coefficients: vec![-0.8, 0.1],
+                    },
+                    0.05,
+                )
+            },
+            RemnantPart {
+                intermittence: Some(Intermittence { on_s: 1.5, off_s: 1.0 }),
+                ..RemnantPart::new(
+                    RemnantShape::Resonance {
+                        omega_rad_s: 11.0,
+                        zeta: 0.2,
+                    },
+                    0.03,
+                )
+            },
+        ];
+        scenario.stick = Stick {
+            bias: 0.1,
+            walk_per_root_s: 0.02,
+            ..Stick::default()
+        };
+        scenario
+    }
+
+    /// A gain whose delay has this part of a sample and no whole one.
+    fn quick(samples: f64) -> FamilyScenario {
+        let mut scenario = task(state(Form::Gain, false, &[1.5, 0.01 * samples], [&[1.0], &[1.0, 0.0]]));
+        scenario.remnant = vec![RemnantPart::new(RemnantShape::White, 0.1)];
+        scenario
+    }
+
+    /// Given the error of a run from its run-in on, the operator gives its control to the last bit.
+    #[test]
+    fn the_operator_of_a_run_gives_its_control() {
+        let integrating = state(Form::Lag, false, &[1.5, 0.0, 0.1437], [&[1.0], &[1.0]]);
+        for scenario in [busy(), quick(0.7), quick(1.0), quick(5.3), task(integrating)] {
+            let simulator = FamilySimulator::new(&scenario).unwrap();
+            let record = simulator.run(SEED, true).unwrap();
+            let mut operator = FamilyOperatorRun::new(simulator, SEED, record.time_s(0)).unwrap();
+            let remnant = record.channel("n").unwrap();
+            for (k, e) in record.input().iter().enumerate() {
+                assert_eq!(operator.control().to_bits(), record.output()[k].to_bits(), "{k}");
+                assert_eq!(operator.remnant().to_bits(), remnant[k].to_bits(), "{k}");
+                operator.take(*e);
+            }
+        }
+    }
+
+    /// An operator goes on in another, behind the end of its scenario too.
+    #[test]
+    fn a_saved_operator_goes_on_with_the_same_digits() {
+        let new = || FamilyOperatorRun::new(FamilySimulator::new(&busy()).unwrap(), SEED, 0.0).unwrap();
+        let mut first = new();
+        let e = |k: usize| (0.1 * k as f64).sin();
+        (0..1300).for_each(|k| first.take(e(k)));
+        let saved = first.saved();
+        let mut second = new();
+        assert!(second.restore(&saved));
+        for k in 1300..1500 {
+            assert_eq!(first.control().to_bits(), second.control().to_bits(), "{k}");
+            first.take(e(k));
+            second.take(e(k));
+        }
+        let before = second.saved();
+        let mut other = saved.clone();
+        for k in [-1.0, 0.5, f64::NAN, 1e300] {
+            other[0] = k;
+            assert!(!second.restore(&other));
+        }
+        for length in [0, 1, 2, saved.len() - 1] {
+            assert!(!second.restore(&saved[..length]));
+        }
+        assert_eq!(second.saved(), before);
+    }
+
+    #[test]
+    fn behind_its_end_a_scenario_goes_on() {
+        let mut scenario = quick(5.3);
+        let long = FamilySimulator::new(&scenario).unwrap();
+        scenario.measurement_s = 1.0;
+        let short = FamilySimulator::new(&scenario).unwrap();
+        let samples = short.samples() + 500;
+        let mut of = [long, short].map(|simulator| FamilyOperatorRun::new(simulator, SEED, -2.0).unwrap());
+        for k in 0..samples {
+            assert_eq!(of[0].control().to_bits(), of[1].control().to_bits(), "{k}");
+            of.iter_mut().for_each(|operator| operator.take((0.1 * k as f64).sin()));
+        }
+    }
+
+    #[test]
+    fn an_operator_that_answers_within_a_sample_is_refused() {
+        let of = |samples: f64| FamilyOperatorRun::new(FamilySimulator::new(&quick(samples)).unwrap(), SEED, 0.0);
+        let refused = of(0.3).unwrap_err();
+        assert!(matches!(refused, SimError::AnswersAtOnce { .. }), "{refused}");
+        assert!(refused.to_string().contains("0.003 s") && refused.to_string().contains("0.005 s"));
+        assert!(of(0.5).is_ok());
+    }
+}

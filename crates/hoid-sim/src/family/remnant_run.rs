@@ -1,0 +1,149 @@
+//! What u holds beside the response, sample by sample: the parts of the remnant, and the walk of the stick.
+//!
+//! `n(k) = walk(k) + sum of K_i(k) G_i(q) w_i(k)`, with K_i of [`calibration`](super::calibration) and w_i of
+//! [`noise`](super::noise), scaled by what it follows where it depends on the signal. All of it is known before the
+//! control of the sample is.
+
+use hoid_model::family_scenario::{Followed, ResolvedFamilyScenario};
+
+use super::{
+    calibration::Calibration,
+    noise::{Shaped, Shaping, driving},
+};
+use crate::RunSeed;
+
+const WALK: u64 = u64::from_le_bytes(*b"stick\0\0\0");
+
+/// The remnant of a scenario made ready: the filter of each part, and its strength before and after the change.
+#[derive(Debug, Clone)]
+pub(super) struct Remnants {
+    pub shapings: Vec<Shaping>,
+    pub calibrations: [Calibration; 2],
+    /// Whether anything changes in the scenario.
+    pub changes: bool,
+}
+
+impl Remnants {
+    /// A number of the calibration at sample `k`, on its way from the initial to the last one; behind the end of the
+    /// scenario it is that of the last sample.
+    #[inline]
+    fn calibrated(&self, scenario: &ResolvedFamilyScenario, k: usize, of: impl Fn(&Calibration) -> f64) -> f64 {
+        let [initial, last] = &self.calibrations;
+        if !self.changes {
+            return of(initial);
+        }
+        let t_s = scenario.time_s(k.min(samples_of(scenario) - 1));
+        scenario.scenario().schedule.value(of(initial), of(last), t_s)
+    }
+}
+
+fn samples_of(scenario: &ResolvedFamilyScenario) -> usize {
+    scenario.run_in_samples() + scenario.measurement_samples()
+}
+
+/// The remnant of a run, and where it stands.
+#[derive(Debug, Clone)]
+pub(super) struct RemnantRun {
+    run: RunSeed,
+    /// The input of each part, from the first sample of the run-in on, as far as it has been drawn.
+    driven: Vec<Vec<f64>>,
+    /// Steps of the stick, likewise.
+    steps: Vec<f64>,
+    shaped: Vec<Shaped>,
+    /// Each running mean square in units of its mean over the run.
+    followed: Vec<f64>,
+    forgets: Vec<f64>,
+    walk: f64,
+    /// The control of the last sample.
+    before: f64,
+}
+
+impl RemnantRun {
+    pub fn new(resolved: &ResolvedFamilyScenario, of: &Remnants, run: RunSeed) -> Self {
+        let scenario = resolved.scenario();
+        let ts_s = scenario.sample_time.s();
+        let forgets = (scenario.remnant.iter()).map(|part| {
+            part.signal_dependence
+                .map_or(1.0, |own| 1.0 - (-ts_s / own.memory_s).exp())
+        });
+        let mut new = Self {
+            run,
+            driven: Vec::new(),
+            steps: Vec::new(),
+            shaped: of.shapings.iter().map(Shaped::at_rest).collect(),
+            followed: vec![1.0; of.shapings.len()],
+            forgets: forgets.collect(),
+            walk: scenario.stick.bias,
+            before: 0.0,
+        };
+        new.draw(resolved, samples_of(resolved));
+        new
+    }
+
+    /// Draws the random numbers of so many samples where there are fewer; the first ones are the same for any number.
+    fn draw(&mut self, scenario: &ResolvedFamilyScenario, samples: usize) {
+        if samples <= self.steps.len() {
+            return;
+        }
+        let scenario = scenario.scenario();
+        let ts_s = scenario.sample_time.s();
+        self.driven = (0..)
+            .zip(&scenario.remnant)
+            .map(|(i, part)| driving(part, self.run, i, ts_s, samples))
+            .collect();
+        self.steps = if scenario.stick.walk_per_root_s == 0.0 {
+            vec![0.0; samples]
+        } else {
+            self.run.white_noise_of(WALK, samples)
+        };
+    }
+
+    /// The remnant of sample `k`, which comes after that of `k - 1`.
+    #[inline]
+    pub fn next(&mut self, scenario: &ResolvedFamilyScenario, of: &Remnants, k: usize) -> f64 {
+        // Behind the end of the scenario it goes on.
+        if k >= self.steps.len() {
+            self.draw(scenario, 2 * k + 1);
+        }
+        let mut n = self.walk;
+        for (i, part) in scenario.scenario().remnant.iter().enumerate() {
+            let mut w = self.driven[i][k];
+            if let Some(own) = part.signal_dependence {
+                w *= (1.0 - own.part + own.part * self.followed[i]).sqrt();
+            }
+            n += of.calibrated(scenario, k, |c| c.gains[i]) * self.shaped[i].step(&of.shapings[i], w);
+        }
+        n
+    }
+
+    /// Takes the control of sample `k`, after its remnant.
+    #[inline]
+    pub fn follow(&mut self, scenario: &ResolvedFamilyScenario, of: &Remnants, k: usize, u: f64) {
+        // Of a run that was restored here nothing has been drawn yet.
+        self.draw(scenario, k + 1);
+        for (i, part) in scenario.scenario().remnant.iter().enumerate() {
+            if let Some(own) = part.signal_dependence {
+                let (square, mean) = match own.follows {
+                    Followed::Control => (u * u, of.calibrated(scenario, k, |c| c.mean_squares[0])),
+                    Followed::Rate => (
+                        (u - self.before).powi(2),
+                        of.calibrated(scenario, k, |c| c.mean_squares[1]),
+                    ),
+                };
+                self.followed[i] += self.forgets[i] * (square / mean - self.followed[i]);
+            }
+        }
+        self.before = u;
+        let scenario = scenario.scenario();
+        self.walk += scenario.stick.walk_per_root_s * scenario.sample_time.s().sqrt() * self.steps[k];
+    }
+
+    /// What it stands at, as numbers.
+    pub fn numbers(&mut self) -> impl Iterator<Item = &mut f64> {
+        let shaped = self.shaped.iter_mut().flat_map(Shaped::numbers);
+        [&mut self.walk, &mut self.before]
+            .into_iter()
+            .chain(&mut self.followed)
+            .chain(shaped)
+    }
+}
