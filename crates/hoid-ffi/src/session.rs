@@ -285,6 +285,7 @@ mod tests {
                 t_l_s: [1.0; 2],
                 innovation_variance: [1.0; 2],
                 z: [0.0; 6],
+                of_operator: false,
             };
             change.z[i] = 5.0;
             assert_eq!(change.changed(), [name.to_str().unwrap()]);

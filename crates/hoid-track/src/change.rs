@@ -33,12 +33,16 @@ pub struct Change {
     /// Change of K_e, K_e_dot, omega_nm, zeta_nm, the logarithm of the innovation variance and
     /// tau_e, each over its standard error.
     pub z: [f64; 6],
+    /// True where the operator was held against before as a whole: their response has changed then, even where
+    /// no single quantity has by two standard errors.
+    pub of_operator: bool,
 }
 
 /// Change over its standard error from which a quantity is said to have changed.
 const CHANGED: f64 = 2.0;
 /// What [`Change::z`] is of.
-const QUANTITIES: [&str; 6] = ["K_e", "K_e_dot", "omega_nm", "zeta_nm", "remnant", "tau_e"];
+const QUANTITIES: [&str; 6] = ["K_e", "K_e_dot", "omega_nm", "zeta_nm", REMNANT, "tau_e"];
+const REMNANT: &str = "remnant";
 
 impl Change {
     pub(crate) fn new(change: &kernel_change::Change, tau_e_s: [Estimate; 2], sample_time: SampleTime) -> Self {
@@ -67,6 +71,7 @@ impl Change {
             t_l_s: [lead(before), lead(now)],
             innovation_variance: [before.innovation_variance, now.innovation_variance],
             z: change.z,
+            of_operator: false,
         }
     }
 
@@ -76,10 +81,13 @@ impl Change {
     }
 
     /// Names of what changed by more than two standard errors: `K_e`, `K_e_dot`, `omega_nm`,
-    /// `zeta_nm`, `remnant`, `tau_e`.
+    /// `zeta_nm`, `remnant`, `tau_e`. Where the operator as a whole was found to have changed, and no single
+    /// quantity of theirs did by so much, `response` stands for them.
     pub fn changed(&self) -> Vec<&'static str> {
-        let each = QUANTITIES.into_iter().zip(self.z);
-        each.filter(|(_, z)| z.abs() > CHANGED).map(|(name, _)| name).collect()
+        let each = || QUANTITIES.into_iter().zip(self.z).filter(|(_, z)| z.abs() > CHANGED);
+        let is_named = each().any(|(name, _)| name != REMNANT);
+        let whole = (self.of_operator && !is_named).then_some("response");
+        whole.into_iter().chain(each().map(|(name, _)| name)).collect()
     }
 }
 
@@ -149,5 +157,31 @@ mod tests {
         assert!((baseline.step(4.0) - expected).abs() < 1e-12);
         assert!(ErrorThreshold::new(&[0.0, 1.0], ts).is_none());
         assert!(ErrorThreshold::new(&[0.0, f64::NAN, 1.0], ts).is_none());
+    }
+
+    #[test]
+    fn where_the_operator_changed_and_no_single_quantity_the_response_is_named() {
+        let estimate = Estimate::with_variance(1.0, 0.01);
+        let of = |of_operator, z| Change {
+            seconds_ago: 1.0,
+            odds: 10.0,
+            k_e: [estimate; 2],
+            k_e_dot: [estimate; 2],
+            omega_nm_rad_s: [estimate; 2],
+            zeta_nm: [estimate; 2],
+            tau_e_s: [estimate; 2],
+            t_l_s: [1.0; 2],
+            innovation_variance: [1.0; 2],
+            z,
+            of_operator,
+        };
+        let louder = [0.5, -1.7, 0.0, 0.0, 6.0, 0.0];
+        assert_eq!(of(true, louder).changed(), ["response", "remnant"]);
+        assert_eq!(of(false, louder).changed(), ["remnant"]);
+        assert_eq!(
+            of(true, [0.0, 2.5, 1.9, 0.0, 0.0, -3.0]).changed(),
+            ["K_e_dot", "tau_e"]
+        );
+        assert_eq!(of(true, [0.0; 6]).changed(), ["response"]);
     }
 }

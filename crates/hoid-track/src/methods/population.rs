@@ -370,6 +370,7 @@ impl Recursion for PopulationRecursion {
             t_l_s: [old[1].value / old[0].value, new(1).value / new(0).value],
             innovation_variance: [before.variance, after.variance],
             z: [z(0), z(1), z(2), z(3), level, z(4)],
+            of_operator: true,
         })
     }
 
