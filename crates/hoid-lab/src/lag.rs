@@ -149,15 +149,11 @@ impl LagFits {
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
-    use hoid_model::{
-        FamilyOperator, Form,
-        forcing::ForcingFunction,
-        held_system::HeldSystem,
-        scenario::{Condition, Scenario},
-    };
-    use hoid_sim::{RunSeed, Simulator};
+    use hoid_model::{FamilyOperator, Form, forcing::ForcingFunction, held_system::HeldSystem};
+    use hoid_sim::RunSeed;
 
     use super::*;
+    use crate::live::tests::samples_of_c1;
 
     const TS: SampleTime = SampleTime::HUNDREDTH;
     const LAG_S: f64 = 1.0;
@@ -215,18 +211,13 @@ mod tests {
 
     #[test]
     fn who_has_no_lag_is_given_none() {
-        let simulator = Simulator::new(&Scenario::condition(Condition::C1)).unwrap();
         // Without the limit of `CLEAR` the last three are given one.
         for (seed, n) in [(1, 3000), (21, 3000), (31, 3000), (2, 8000)] {
-            let signals = simulator.signals(&noise(simulator.samples(), seed)).unwrap();
-            let samples: Vec<Sample> = (signals.e.iter().zip(&signals.u))
-                .map(|(e, u)| Sample {
-                    e: *e,
-                    u: *u,
-                    reference: None,
-                })
-                .collect();
-            assert_eq!(Lag::of(record(&samples[..n])), Lag::NotDetermined, "seed {seed}");
+            assert_eq!(
+                Lag::of(record(&samples_of_c1(seed)[..n])),
+                Lag::NotDetermined,
+                "seed {seed}"
+            );
         }
     }
 

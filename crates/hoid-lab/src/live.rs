@@ -272,13 +272,30 @@ fn row(line: &LiveLine) -> String {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     #![allow(clippy::unwrap_used)]
     use hoid_model::scenario::{Condition as Reference, Scenario};
     use hoid_sim::{RunSeed, Simulator};
 
     use super::*;
     use crate::config::Condition;
+
+    /// e and u of the person of C1, of a seed.
+    pub(crate) fn samples_of_c1(seed: u64) -> Vec<Sample> {
+        let simulator = Simulator::new(&Scenario::condition(Reference::C1)).unwrap();
+        let seed = RunSeed {
+            seed,
+            ..RunSeed::default()
+        };
+        let signals = simulator.signals(&seed.white_noise(simulator.samples())).unwrap();
+        (signals.e.iter().zip(&signals.u))
+            .map(|(e, u)| Sample {
+                e: *e,
+                u: *u,
+                reference: None,
+            })
+            .collect()
+    }
 
     #[test]
     fn a_simulated_person_is_found_while_they_track() {
@@ -288,22 +305,8 @@ mod tests {
             ..Condition::default()
         };
         let mut run = LiveRun::new("population", condition.course().unwrap()).unwrap();
-        let simulator = Simulator::new(&Scenario::condition(Reference::C1)).unwrap();
-        let noise = RunSeed {
-            seed: 3,
-            ..RunSeed::default()
-        }
-        .white_noise(simulator.samples());
-        let signals = simulator.signals(&noise).unwrap();
-        let samples: Vec<Sample> = (signals.e.iter().zip(&signals.u))
-            .map(|(e, u)| Sample {
-                e: *e,
-                u: *u,
-                reference: None,
-            })
-            .collect();
         let mut last = LiveLine::default();
-        for five in samples.chunks(5) {
+        for five in samples_of_c1(3).chunks(5) {
             last = run.take(five);
         }
         assert!((last.t - 81.92).abs() < 1e-6, "{}", last.t);

@@ -8,7 +8,12 @@
 use crate::{RunSeed, Simulator, cascade::MOST};
 
 /// Most samples of an operator that goes on.
-pub(crate) const MOST_SAMPLES: f64 = 1e9;
+const MOST_SAMPLES: f64 = 1e9;
+
+/// The number of a sample as it was saved; `None` where it is no such number.
+pub(crate) fn saved_sample(k: f64) -> Option<usize> {
+    ((0.0..=MOST_SAMPLES).contains(&k) && k.fract() == 0.0).then_some(k as usize)
+}
 
 /// An operator that is at work.
 #[derive(Debug, Clone)]
@@ -92,10 +97,10 @@ impl OperatorRun {
         let Some((remnant, memory)) = rest.split_first_chunk::<MOST>() else {
             return false;
         };
-        if memory.len() != self.memory.len() || !(0.0..=MOST_SAMPLES).contains(k) || k.fract() != 0.0 {
+        let Some(k) = saved_sample(*k).filter(|_| memory.len() == self.memory.len()) else {
             return false;
-        }
-        (self.k, self.operator, self.remnant) = (*k as usize, *operator, *remnant);
+        };
+        (self.k, self.operator, self.remnant) = (k, *operator, *remnant);
         self.memory.copy_from_slice(memory);
         true
     }

@@ -25,7 +25,7 @@
 //!
 //! Where samples are not taken for longer than a quarter of a second, or nothing moves, what is beside that
 //! gap is not looked at: the samples before it may have been part of the same fault, and behind it the
-//! filters swing in. From two seconds behind it on, what is behind it is held against what was before.
+//! filters swing in. From three seconds behind it on, what is behind it is held against what was before.
 //!
 //! Sources: G. C. Chow, *Econometrica* 28 (1960) 591-605; B. L. Welch, *Biometrika* 34 (1947) 28-35;
 //! the mean of the logarithm and the tail: M. Abramowitz and I. A. Stegun, 1964, eq. 6.3.3, 6.3.4, 26.4.5.
@@ -42,10 +42,10 @@ use super::{
 pub const BLOCKS: usize = 90;
 /// Length of a block, s.
 pub const BLOCK_S: f64 = 0.5;
-/// What both statistics have degrees of freedom of, in pairs, and the expectations of the logarithm of
-/// these chi-squares.
+/// Degrees of freedom of both statistics, in pairs.
 const PAIRS: [u32; 2] = [1, 3];
-const MEAN_LOG: [f64; 2] = [0.115_931_515_658_412_45, 1.615_931_515_658_412_5];
+/// Expectation of the logarithm of a chi-square with one pair, `ln 2 - gamma`.
+const MEAN_LOG: f64 = 0.115_931_515_658_412_45;
 /// What both look at together: gains and what is held.
 const OPERATOR: usize = GAINS + HELD;
 /// Time from which samples that are not taken are a gap, and time that is not looked at behind one, s.
@@ -86,7 +86,6 @@ pub struct Detection {
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Statistic {
     pairs: u32,
-    mean_log: f64,
     level: f64,
     levels: f64,
     against_chance: f64,
@@ -96,11 +95,10 @@ struct Statistic {
 crate::state!([] Statistic { level, levels, against_chance, above });
 
 impl Statistic {
-    fn new(pairs: u32, mean_log: f64) -> Self {
+    fn new(pairs: u32) -> Self {
         Self {
             pairs,
-            mean_log,
-            level: mean_log + USUAL,
+            level: mean_log(pairs) + USUAL,
             levels: SUPPOSED,
             against_chance: 0.0,
             above: 0,
@@ -109,7 +107,7 @@ impl Statistic {
 
     /// How many times larger than a chi-square it has been.
     fn usual(&self) -> f64 {
-        libm::exp(self.level - self.mean_log).max(1.0)
+        libm::exp(self.level - mean_log(self.pairs)).max(1.0)
     }
 
     /// Takes T; true where it has been above the threshold for long enough.
@@ -125,6 +123,11 @@ impl Statistic {
         };
         self.above >= persistence
     }
+}
+
+/// Expectation of the logarithm of a chi-square with so many pairs of degrees of freedom.
+fn mean_log(pairs: u32) -> f64 {
+    MEAN_LOG + (1..pairs).map(|k| 1.0 / f64::from(k)).sum::<f64>()
 }
 
 /// `-ln P(chi^2 > x)` for a chi-square with so many pairs of degrees of freedom.
@@ -178,7 +181,7 @@ impl Detector {
             block: EMPTY,
             blocks: [EMPTY; BLOCKS],
             count: 0,
-            statistics: core::array::from_fn(|i| Statistic::new(PAIRS[i], MEAN_LOG[i])),
+            statistics: PAIRS.map(Statistic::new),
             gap: 0,
             behind: 0,
             fresh: BLOCKS,
@@ -224,7 +227,7 @@ impl Detector {
         self.statistics.iter_mut().for_each(|s| s.against_chance = 0.0);
         let recent = self.what.recent.min(self.fresh);
         let before = self.count.saturating_sub(recent);
-        if before < self.what.least || recent < FEWEST {
+        if before < self.what.least || recent < FEWEST.min(self.what.recent) {
             self.statistics.iter_mut().for_each(|s| s.above = 0);
             return;
         }

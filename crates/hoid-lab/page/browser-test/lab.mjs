@@ -4,9 +4,14 @@ import { existsSync } from "node:fs";
 
 const BROWSERS = ["/usr/bin/chromium", "/usr/bin/chromium-browser", "/usr/bin/google-chrome"];
 
-/** The browser that is at hand; nothing where there is none. */
-export function browserPath() {
-  return [process.env.HOID_CHROMIUM, ...BROWSERS].find((path) => path && existsSync(path));
+/** The browser that is at hand; where there is none this is said, and all ends. */
+export function browserOrEnd() {
+  const found = [process.env.HOID_CHROMIUM, ...BROWSERS].find((path) => path && existsSync(path));
+  if (!found) {
+    console.log("skipped: no browser is here (apt-get install chromium, or HOID_CHROMIUM=PATH)");
+    process.exit(0);
+  }
+  return found;
 }
 
 /** `hoid lab` with arguments; its address. */

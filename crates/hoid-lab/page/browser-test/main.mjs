@@ -6,14 +6,10 @@ import { mkdtempSync, readFileSync, readdirSync, rmSync, writeFileSync } from "n
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { chromium } from "playwright-core";
-import { browserPath, injectTime, lab, operator } from "./lab.mjs";
+import { browserOrEnd, injectTime, lab, operator } from "./lab.mjs";
 
 const program = process.argv[2];
-const path = browserPath();
-if (!path) {
-  console.log("skipped: no browser is here (apt-get install chromium, or HOID_CHROMIUM=PATH)");
-  process.exit(0);
-}
+const path = browserOrEnd();
 
 const folder = mkdtempSync(join(tmpdir(), "hoid-lab-"));
 const config = join(folder, "lab.toml");

@@ -12,16 +12,12 @@ import { mkdtempSync, readFileSync, readdirSync, rmSync, writeFileSync } from "n
 import { cpus, tmpdir } from "node:os";
 import { join } from "node:path";
 import { chromium } from "playwright-core";
-import { browserPath, lab } from "./lab.mjs";
+import { browserOrEnd, lab } from "./lab.mjs";
 
 const [program, asked = "3"] = process.argv.slice(2);
 const rounds = Number(asked);
 assert.ok(Number.isInteger(rounds) && rounds > 0, `found ${asked} rounds, expected a whole number above zero`);
-const path = browserPath();
-if (!path) {
-  console.log("skipped: no browser is here (apt-get install chromium, or HOID_CHROMIUM=PATH)");
-  process.exit(0);
-}
+const path = browserOrEnd();
 
 /** Of the lag: x one tick on is a x + (1 - a) e, held over a tick. */
 const decay = Math.exp(-0.001 / 1.0);

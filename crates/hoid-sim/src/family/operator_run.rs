@@ -10,7 +10,7 @@ use super::{
     held_loop::{HeldLoop, OperatorState},
     remnant_run::RemnantRun,
 };
-use crate::{RunSeed, SimError, operator_run::MOST_SAMPLES};
+use crate::{RunSeed, SimError, operator_run::saved_sample};
 
 /// An operator of the family that is at work.
 #[derive(Debug, Clone)]
@@ -93,10 +93,10 @@ impl FamilyOperatorRun {
             return false;
         };
         let is_ours = rest.len() == self.numbers().count();
-        if !is_ours || !(0.0..=MOST_SAMPLES).contains(&k) || k.fract() != 0.0 {
+        let Some(k) = saved_sample(k).filter(|_| is_ours) else {
             return false;
-        }
-        (self.k, self.n) = (k as usize, n);
+        };
+        (self.k, self.n) = (k, n);
         self.numbers().zip(rest).for_each(|(number, saved)| *number = *saved);
         true
     }
