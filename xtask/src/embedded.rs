@@ -9,7 +9,7 @@ use std::{
     process::{Command, Stdio},
 };
 
-use crate::process::{cargo, installed_targets, output, target_directory};
+use crate::process::{AS_TESTS, cargo, installed_targets, output, target_directory};
 
 /// The processor that is run, and the one that is built for.
 pub const CORTEX: &str = "thumbv7em-none-eabihf";
@@ -76,7 +76,7 @@ pub fn embedded(arguments: &[String]) -> Result<(), String> {
 
 /// The trace of `hoid track` for a run of C4, whose e and u are left in `run.csv`.
 fn tracked(target: &Path, directory: &Path) -> Result<String, String> {
-    cargo(&["build", "-p", "hoid-cli", "-p", "hoid-embedded"], &[])?;
+    cargo(&AS_TESTS, &[])?;
     let hoid = || {
         let mut command = Command::new(target.join("debug").join(name("hoid")));
         command.current_dir(directory).stdout(Stdio::null());

@@ -16,7 +16,7 @@ use std::{
     process::{Command, Stdio},
 };
 
-use crate::process::{SHIPPED, cargo, output, run};
+use crate::process::{AS_TESTS, SHIPPED, cargo, output, run};
 
 /// What a program that links the static library links besides.
 const SYSTEM_LIBRARIES: &str = if cfg!(target_os = "linux") {
@@ -86,8 +86,7 @@ fn header() -> Result<(), String> {
 
 fn build(profile: &str, out: &Path) -> Result<(), String> {
     if profile == "dev" {
-        // With the features of the whole workspace, as the tests have compiled it.
-        cargo(&["build", "--workspace", "--lib"], &[])?;
+        cargo(&AS_TESTS, &[])?;
     } else {
         cargo(&["build", "--profile", profile, "-p", "hoid-ffi"], &[])?;
     }

@@ -8,7 +8,7 @@ use std::{env, process::Command};
 
 use crate::{
     page,
-    process::{SHIPPED, cargo, output, target_directory},
+    process::{AS_TESTS, SHIPPED, cargo, output, target_directory},
     processors::{BUILT, other_processors},
     python::{self, Wheel},
 };
@@ -33,7 +33,7 @@ pub fn places(arguments: &[String]) -> Result<(), String> {
         (python::environment(Wheel::Shipped)?, SHIPPED)
     } else {
         other_processors("dev")?;
-        cargo(&["build", "--workspace", "--lib", "--bins", "--examples"], &[])?;
+        cargo(&AS_TESTS, &[])?;
         (python::environment(Wheel::OfTests)?, "debug")
     };
     let hoid = (target_directory().join(folder)).join(format!("hoid{}", env::consts::EXE_SUFFIX));

@@ -52,6 +52,9 @@ pub fn output(command: &mut Command) -> Result<String, String> {
 /// The profile of what is shipped: programs, libraries, wheels.
 pub const SHIPPED: &str = "shipped";
 
+/// What chores beside the tests build: of the same features as the tests, so that nothing is compiled twice.
+pub const AS_TESTS: [&str; 5] = ["build", "--workspace", "--lib", "--bins", "--examples"];
+
 /// Where cargo builds.
 pub fn target_directory() -> PathBuf {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");

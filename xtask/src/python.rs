@@ -12,7 +12,7 @@ use std::{
 
 use crate::{
     counts::Counts,
-    process::{SHIPPED, cargo, each_line, run, target_directory},
+    process::{AS_TESTS, SHIPPED, cargo, each_line, run, target_directory},
     processors::{BUILT, other_processors},
 };
 
@@ -22,12 +22,8 @@ const OLDEST: (u32, u32) = (3, 10);
 /// Builds and installs the wheel, and runs pytest with these arguments.
 pub fn test(arguments: &[String]) -> Result<Counts, String> {
     let target = target_directory();
-    // The same command line as the tests', to compare with, and the examples that the book runs; with the tests, because alone they have
-    // other features and would be compiled again.
-    cargo(
-        &["build", "--quiet", "--workspace", "--bins", "--tests", "--examples"],
-        &[],
-    )?;
+    // The same command line as the tests', to compare with, and the examples that the book runs.
+    cargo(&[&AS_TESTS[..], &["--quiet"]].concat(), &[])?;
     other_processors("dev")?;
     let python = environment(Wheel::OfTests)?;
     let mut counts = Counts::default();
