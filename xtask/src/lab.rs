@@ -1,15 +1,19 @@
-//! The page of `hoid lab`: that the built file is what its sources build, the page in a browser, and the studies
-//! that need both: a long session (`hour.mjs`), operators in real time (`real.mjs`).
+//! The page of `hoid lab`: that the built file is what its sources build, the page in a browser, the page that needs
+//! no program behind it, and the studies that need a browser: a long session (`hour.mjs`), operators in real time
+//! (`real.mjs`).
 //!
-//! All need npm, all but the first a browser; what is not there is said and left out.
+//! All need npm, what looks at a page a browser; what is not there is said and left out.
 
 use std::{
-    env,
-    path::{Path, PathBuf},
+    env, fs,
+    path::{Path, PathBuf, absolute},
     process::{Command, Stdio},
 };
 
-use crate::process::{cargo, run, target_directory};
+use crate::{
+    process::{AS_TESTS, SHIPPED, cargo, cargo_command, output, run, target_directory},
+    processors::webassembly,
+};
 
 /// The studies in a browser in real time: their names, and their scripts in `browser-test`.
 pub const STUDIES: [(&str, &str); 2] = [("lab-hour", "hour.mjs"), ("lab-real", "real.mjs")];
@@ -22,7 +26,58 @@ pub fn lab() -> Result<(), String> {
     run(&mut npm(&["run", "check"]))?;
     run(&mut npm(&["run", "build", "--", "--check"]))?;
     in_browser("dev", "main.mjs", &[])?;
+    if let Some(path) = page_alone("dev", None, &built("of-tests.html"))? {
+        in_browser("dev", "alone.mjs", &[path.to_string_lossy().into_owned()])?;
+    }
     in_browser("dev", "hour.mjs", &["1".to_owned()])
+}
+
+/// The page that needs no program behind it: one file, with an experiment and the tracker in it.
+pub fn alone(arguments: &[String]) -> Result<(), String> {
+    let (mut config, mut out) = (None, None);
+    let mut rest = arguments.iter();
+    while let Some(option) = rest.next() {
+        let place = match option.as_str() {
+            "--config" => &mut config,
+            "--out" => &mut out,
+            _ => return Err("usage: cargo xtask lab-page [--config lab.toml] [--out FILE]".to_owned()),
+        };
+        let named = rest.next().ok_or_else(|| format!("{option} needs a file"))?;
+        *place = Some(absolute(named).map_err(|error| format!("{named}: {error}"))?);
+    }
+    let out = out.unwrap_or_else(|| built("hoid-lab.html"));
+    if npm_is_there()?
+        && let Some(path) = page_alone(SHIPPED, config.as_deref(), &out)?
+    {
+        let path = fs::canonicalize(&path).map_err(|error| format!("{}: {error}", path.display()))?;
+        let size = fs::metadata(&path).map_or(0, |data| data.len());
+        println!("{}, {:.1} MB", path.display(), size as f64 / 1e6);
+    }
+    Ok(())
+}
+
+/// Builds that page with the kernel of a profile; where it is, nothing where Rust cannot build for WebAssembly here.
+fn page_alone(profile: &str, config: Option<&Path>, out: &Path) -> Result<Option<PathBuf>, String> {
+    let Some(kernel) = webassembly(profile)? else {
+        return Ok(None);
+    };
+    let mut tables = cargo_command();
+    tables.args(["run", "--quiet", "-p", "hoid-lab", "--example", "tables", "--"]);
+    let told = output(tables.args(config))?;
+    let tables = built("experiment.json");
+    fs::create_dir_all(built("")).map_err(|error| format!("{}: {error}", built("").display()))?;
+    fs::write(&tables, told).map_err(|error| format!("{}: {error}", tables.display()))?;
+    run(Command::new("node")
+        .args(["build.mjs", "--alone"])
+        .args([&kernel, &tables, out])
+        .current_dir(page()))?;
+    Ok(Some(out.to_owned()))
+}
+
+/// A file of what is built here.
+fn built(name: &str) -> PathBuf {
+    let folder = target_directory().join("lab-page");
+    absolute(folder.join(name)).unwrap_or_else(|_| folder.join(name))
 }
 
 /// One of the studies, with arguments of its own.
@@ -45,10 +100,14 @@ fn npm_is_there() -> Result<bool, String> {
 }
 
 fn in_browser(profile: &str, script: &str, arguments: &[String]) -> Result<(), String> {
-    cargo(
-        &["build", "--profile", profile, "-p", "hoid-cli", "--features", "lab"],
-        &[],
-    )?;
+    if profile == "dev" {
+        cargo(&[&AS_TESTS[..], &["--features", "hoid-cli/lab"]].concat(), &[])?;
+    } else {
+        cargo(
+            &["build", "--profile", profile, "-p", "hoid-cli", "--features", "lab"],
+            &[],
+        )?;
+    }
     run(Command::new("node")
         .arg(Path::new("browser-test").join(script))
         .arg(program(if profile == "dev" { "debug" } else { profile }))

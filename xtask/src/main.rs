@@ -8,6 +8,7 @@
 //! | `cargo xtask crates` | licences, bans and versions of the crates that are used, alone (module `crates`) |
 //! | `cargo xtask book` | the book in `docs/`, into `docs/book/` (needs mdbook) |
 //! | `cargo xtask lab` | that the page of `hoid lab` is what its sources build, and the page in a browser (module `lab`) |
+//! | `cargo xtask lab-page [--config FILE] [--out FILE]` | the page of `hoid lab` as one file that needs no program behind it, into `target/lab-page/` |
 //! | `cargo xtask embedded [--all]` | the kernel on bare processors, with the digits of the host (module `embedded`) |
 //! | `cargo xtask ffi [--dev] [--out DIR]` | the libraries for C with header, pkg-config file, CMake package and examples, into `target/ffi/`; `--header` makes the header anew, `--check` builds the examples by them (module `ffi`) |
 //! | `cargo xtask places [--dry or --dev]` | one run through every place in which hoid runs, as the table of the page "In your simulator" (module `places`) |
@@ -37,7 +38,7 @@ use std::{
 use counts::Counts;
 use process::{SHIPPED, cargo, cargo_command, each_line, run};
 
-const USAGE: &str = "usage: cargo xtask test [ARGUMENT...] | python [ARGUMENT...] | check | crates | book | lab | embedded [--all] | ffi [OPTION...] | places [--dry | --dev] | bench [OPTION...] | slow NAME [ARGUMENT...]";
+const USAGE: &str = "usage: cargo xtask test [ARGUMENT...] | python [ARGUMENT...] | check | crates | book | lab | lab-page [OPTION...] | embedded [--all] | ffi [OPTION...] | places [--dry | --dev] | bench [OPTION...] | slow NAME [ARGUMENT...]";
 
 fn main() -> ExitCode {
     let mut arguments = env::args().skip(1);
@@ -49,6 +50,7 @@ fn main() -> ExitCode {
         Some("book") => book(),
         Some("bench") => bench::bench(&arguments.collect::<Vec<_>>()),
         Some("lab") => lab::lab(),
+        Some("lab-page") => lab::alone(&arguments.collect::<Vec<_>>()),
         Some("embedded") => embedded::embedded(&arguments.collect::<Vec<_>>()),
         Some("ffi") => ffi::ffi(&arguments.collect::<Vec<_>>()),
         Some("places") => places::places(&arguments.collect::<Vec<_>>()),

@@ -1,7 +1,13 @@
 // Builds the page into one file, dist/lab.html, and what of it needs no browser into dist/engine.mjs.
 // With the argument --check nothing is written: it fails where the files are not what is built.
+//
+// With --alone KERNEL EXPERIMENT OUT it builds the page that needs no program behind it: the C ABI of hoid in
+// WebAssembly and the tables of an experiment are packed into it.
 import { build } from "esbuild";
+import { createHash } from "node:crypto";
 import { readFileSync, writeFileSync, mkdirSync, existsSync } from "node:fs";
+import { resolve } from "node:path";
+import { gzipSync } from "node:zlib";
 
 const here = new URL(".", import.meta.url).pathname;
 const bundled = async (entry, format) => {
@@ -19,21 +25,45 @@ const bundled = async (entry, format) => {
   return result.outputFiles[0].text;
 };
 
-const script = await bundled("main.ts", "iife");
-if (script.includes("</script")) throw new Error("the script ends its own element");
-const style = readFileSync(`${here}src/style.css`, "utf8");
-const page = readFileSync(`${here}src/page.html`, "utf8")
-  .replace("/*style*/", () => style)
-  .replace("/*script*/", () => script);
-const built = { "lab.html": page, "engine.mjs": await bundled("engine.ts", "esm") };
+/** The page of a script; `head` and `data` stand before style and script. */
+async function page(entry, head = () => "", data = "") {
+  const script = await bundled(entry, "iife");
+  if (script.includes("</script")) throw new Error("the script ends its own element");
+  const style = readFileSync(`${here}src/style.css`, "utf8");
+  return readFileSync(`${here}src/page.html`, "utf8")
+    .replace("<!--head-->\n", () => head(script, style))
+    .replace("<!--data-->\n", () => data)
+    .replace("/*style*/", () => style)
+    .replace("/*script*/", () => script);
+}
 
-mkdirSync(`${here}dist`, { recursive: true });
-for (const [name, text] of Object.entries(built)) {
-  const path = `${here}dist/${name}`;
-  if (!process.argv.includes("--check")) {
-    writeFileSync(path, text);
-  } else if (!existsSync(path) || readFileSync(path, "utf8") !== text) {
-    console.error(`dist/${name} is not what the sources build: run npm run build in crates/hoid-lab/page`);
-    process.exitCode = 1;
+/** The page alone: its own script and style by their hashes, WebAssembly, and nothing from anywhere. */
+async function alone(kernel, experiment) {
+  const hash = (text) => `'sha256-${createHash("sha256").update(text).digest("base64")}'`;
+  const policy = (script, style) =>
+    `<meta http-equiv="Content-Security-Policy" content="default-src 'none'; script-src ${hash(script)} 'wasm-unsafe-eval'; ` +
+    `style-src ${hash(style)}; img-src data:; base-uri 'none'; form-action 'none'">\n`;
+  const packed = (name, path) =>
+    `<script type="application/gzip" id="${name}">${gzipSync(readFileSync(path), { level: 9 }).toString("base64")}</script>\n`;
+  return page("alone.ts", policy, packed("kernel", kernel) + packed("experiment", experiment));
+}
+
+const [mode, ...paths] = process.argv.slice(2);
+if (mode === "--alone") {
+  const [kernel, experiment, out] = paths.map((path) => resolve(path));
+  writeFileSync(out, await alone(kernel, experiment));
+} else {
+  mkdirSync(`${here}dist`, { recursive: true });
+  for (const [name, text] of [
+    ["lab.html", await page("lab.ts")],
+    ["engine.mjs", await bundled("engine.ts", "esm")],
+  ]) {
+    const path = `${here}dist/${name}`;
+    if (mode !== "--check") {
+      writeFileSync(path, text);
+    } else if (!existsSync(path) || readFileSync(path, "utf8") !== text) {
+      console.error(`dist/${name} is not what the sources build: run npm run build in crates/hoid-lab/page`);
+      process.exitCode = 1;
+    }
   }
 }

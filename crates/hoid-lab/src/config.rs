@@ -221,7 +221,7 @@ and no sound. You may stop at any time by the key Escape or by closing the windo
 its folder. Do not take part if moving patterns make you unwell.";
 
 impl Default for Config {
-    /// A try of two minutes: a short training run, then one run that counts.
+    /// A try of two minutes: one run.
     fn default() -> Self {
         Self {
             name: "First try".to_owned(),

@@ -93,6 +93,17 @@ impl Course {
         }
     }
 
+    /// What is controlled all the time; nothing where that changes.
+    ///
+    /// # Errors
+    /// As [`Course::element_at`].
+    pub fn lasting_element(&self) -> Result<Option<ContinuousTransferFunction>, ModelError> {
+        match self.change_s() {
+            None => self.element_at(0.0).map(Some),
+            Some(_) => Ok(None),
+        }
+    }
+
     /// Target and disturbance.
     pub fn excitations(&self) -> [Excitation; 2] {
         let fixed = |function: &ForcingFunction| Excitation {

@@ -146,10 +146,7 @@ fn known(condition: &Condition) -> Result<ConditionSettings, LabError> {
         .excitations()
         .map(|excitation| !excitation.function.sinusoids().is_empty());
     Ok(ConditionSettings {
-        controlled_element: match course.change_s() {
-            None => Some(course.element_at(0.0)?.to_string()),
-            Some(_) => None,
-        },
+        controlled_element: course.lasting_element()?.map(|element| element.to_string()),
         excitation: match lines {
             [true, _] => Some("f_t".to_owned()),
             [false, true] => Some("d".to_owned()),

@@ -4,12 +4,12 @@ import { Surface } from "./display";
 import { button, h, show } from "./dom";
 import { inputOf } from "./engine";
 import { DEVICES, type Device, type Settings, keep, listen, mapOf, settings } from "./input";
-import { data, digits, facts, percent, runsTable } from "./parts";
-import { Plots, linesOf } from "./plots";
+import { digits, facts, percent, runsTable } from "./parts";
+import { Plots } from "./plots";
 import { play } from "./replay";
 import { type Given, start } from "./session";
 import { time } from "./time";
-import { type Condition, type Done, type FromServer, type LiveLine, type Measures, type RunMessage, type State, Wire } from "./wire";
+import { type Condition, type Done, type FromServer, type LiveLine, type Measures, type Listener, type RunMessage, type State, type Wire } from "./wire";
 
 const looksOn = location.pathname.endsWith("/experimenter");
 let state: State | null = null;
@@ -24,9 +24,13 @@ let elsewhere = false;
 const plotsCanvas = h("canvas", { class: "plots", role: "img", "aria-label": "The estimate over time, with bands of two standard errors" });
 const livePlots = new Plots(plotsCanvas);
 
-const wire = new Wire(hear, tables, gone);
-wire.opened(() => wire.say({ type: "hello", role: looksOn ? "experimenter" : "person", browser: browser() }));
-show("", h("p", {}, "Connecting ..."));
+let wire: Wire;
+
+/** Shows the page of an experiment; who runs it hears of the page when it is `opened`. */
+export function begin(connect: (listener: Listener, opened: () => void) => Wire): void {
+  show("", h("p", {}, "Connecting ..."));
+  wire = connect({ hear, tables, gone }, () => wire.say({ type: "hello", role: looksOn ? "experimenter" : "person", browser: browser() }));
+}
 
 function browser(): Record<string, string> {
   return {
@@ -127,9 +131,10 @@ function consent(): void {
     h("p", {}, s.consent),
     h("label", {}, "Made-up name (letters and digits)", name),
     h("label", { class: "check" }, agree, h("span", {}, s.calibrate ? "Start it." : "I have read this and take part.")),
-    !s.calibrate && h("label", { class: "check" }, cc0, h("span", {}, "My data may be given to everybody without conditions (CC0). Leave this empty if you are not sure.")),
+    wire.alone && h("p", {}, "Your runs stay in this window until you close it. Nothing is sent, and nothing is stored unless you save it."),
+    !s.calibrate && !wire.alone && h("label", { class: "check" }, cc0, h("span", {}, "My data may be given to everybody without conditions (CC0). Leave this empty if you are not sure.")),
     go,
-    !s.calibrate && h("p", { class: "soft" }, h("a", { href: "experimenter", target: "_blank" }, "Window for the experimenter")),
+    !s.calibrate && !wire.alone && h("p", { class: "soft" }, h("a", { href: "experimenter", target: "_blank" }, "Window for the experimenter")),
   );
 }
 
@@ -265,8 +270,7 @@ function result(): void {
 /** The last live estimate of a run, for the person. */
 async function estimate(number: number): Promise<void> {
   const place = document.getElementById("person");
-  const found = await data(number);
-  const lines = linesOf(found?.live ?? []);
+  const lines = (await wire.data(number))?.live ?? [];
   const last = lines[lines.length - 1];
   if (!place || !last) return;
   const cell = (name: string, told: [number | null, number | null], unit: string, none = "–") =>
@@ -278,7 +282,7 @@ async function estimate(number: number): Promise<void> {
       { class: "numbers" },
       cell("Gain", last.gain, ""),
       cell("Lead", last.lead_s, "s"),
-      cell("Lag", last.lag_s, "s", "not determined"),
+      cell("Lag", last.lag_s, "s", last.lag_waiting ?? "–"),
       cell("Delay", last.delay_s, "s"),
       cell("Crossover", last.crossover_rad_s, "rad/s"),
       cell("Phase margin", last.phase_margin_deg, "deg"),
@@ -303,6 +307,7 @@ function finished(): void {
   clearInterval(rest);
   screen = "other";
   const shownDone = s.done[s.done.length - 1];
+  const place = h("div");
   show(
     "",
     h("h1", {}, s.calibrate ? "Calibrated" : "Done. Thank you."),
@@ -312,9 +317,11 @@ function finished(): void {
       : []),
     runsTable(s.done),
     h("div", { id: "person" }),
-    !s.calibrate && links(),
-    h("p", {}, h("a", { class: "button quiet", href: "export.zip", download: `${(s.session ?? "session").replace("/", "_")}.zip` }, "All data as one archive")),
+    !s.calibrate && !wire.alone && links(),
+    wire.takeHome(s),
+    place,
   );
+  if (wire.alone && shownDone) void again(shownDone.number, place, "This run is");
   if (!s.calibrate && s.live !== "never" && shownDone) void estimate(shownDone.number);
 }
 
@@ -360,11 +367,16 @@ function live(number: number, line: LiveLine): void {
 
 // --- A session shown again ---
 
+async function again(number: number, place: HTMLElement, judged: string): Promise<void> {
+  play(await wire.data(number), place, judged);
+}
+
 function replay(): void {
   const s = state as State;
   if (document.getElementById("replay")) return;
   const place = h("div", { id: "replay" });
-  show("wide", h("h1", {}, `${s.name}: ${s.session}`), runsTable(s.done, (number) => void play(number, place)), place, links());
+  const judged = "Recomputed now";
+  show("wide", h("h1", {}, `${s.name}: ${s.session}`), runsTable(s.done, (number) => void again(number, place, judged)), place, links());
   const first = s.done.find((d) => d.how === "finished") ?? s.done[0];
-  if (first) void play(first.number, place);
+  if (first) void again(first.number, place, judged);
 }

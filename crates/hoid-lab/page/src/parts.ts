@@ -1,7 +1,7 @@
-// What several screens show: verdicts, tables of runs, the data of a run.
+// What several screens show: verdicts, tables of runs.
 
 import { button, h } from "./dom";
-import type { Condition, Done, Measures } from "./wire";
+import type { Done, Measures } from "./wire";
 
 export const percent = (v: number) => `${Math.round(v)} of 100`;
 
@@ -40,31 +40,6 @@ export function runsTable(done: Done[], pick?: (number: number) => void): HTMLEl
     );
   const head = ["Run", "Task", "Score", "Worth"].map((text) => h("th", { scope: "col" }, text));
   return h("div", { class: "scroll" }, h("table", {}, h("thead", {}, h("tr", {}, ...head)), h("tbody", {}, ...done.map(row))));
-}
-
-export interface RunData {
-  number: number;
-  condition: Condition;
-  start_s: number;
-  step_s: number;
-  e: number[];
-  u: number[];
-  y: number[];
-  f: number[] | null;
-  live: (number | null)[][];
-  verdict: string;
-  reasons: string;
-}
-
-export async function data(number: number): Promise<RunData | null> {
-  const base = location.pathname.replace(/experimenter$/, "");
-  try {
-    const answer = await fetch(`${base}data/${number}.json`);
-    return answer.ok ? await answer.json() : null;
-  } catch {
-    // The program has ended; the page says so.
-    return null;
-  }
 }
 
 export const digits = (v: number) => v.toFixed(Math.abs(v) < 1 ? 3 : Math.abs(v) < 10 ? 2 : 0);

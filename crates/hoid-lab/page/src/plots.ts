@@ -21,23 +21,6 @@ const PANELS: Panel[] = [
   { title: "Phase margin, deg", of: (l) => l.phase_margin_deg, least: [0, 60] },
 ];
 
-/** Rows of live.csv as lines. */
-export function linesOf(rows: (number | null)[][]): LiveLine[] {
-  return rows.map((r) => ({
-    t: r[0] ?? 0,
-    gain: [r[1], r[2]],
-    lead_s: [r[3], r[4]],
-    lag_s: [r[14] ?? null, r[15] ?? null],
-    lag_waiting: (r[14] ?? null) === null ? "not determined" : null,
-    omega_nm_rad_s: [r[5], r[6]],
-    delay_s: [r[7], r[8]],
-    crossover_rad_s: [r[9], r[10]],
-    phase_margin_deg: [r[11], r[12]],
-    changed_s: r[13] ?? null,
-    waiting: null,
-  }));
-}
-
 export class Plots {
   private lines: LiveLine[] = [];
   private changes: number[] = [];

@@ -2,14 +2,14 @@
 
 import { Surface } from "./display";
 import { button, h } from "./dom";
-import { data } from "./parts";
-import { Plots, linesOf } from "./plots";
+import { Plots } from "./plots";
+import type { RunData } from "./wire";
 
 let stopReplay = () => {};
 
-export async function play(number: number, place: HTMLElement): Promise<void> {
+/** Shows a run again; `judged` is what its verdict is called. */
+export function play(run: RunData | null, place: HTMLElement, judged: string): void {
   stopReplay();
-  const run = await data(number);
   if (!run) {
     place.replaceChildren(h("p", {}, "This run has no data."));
     return;
@@ -25,8 +25,8 @@ export async function play(number: number, place: HTMLElement): Promise<void> {
     toggle.textContent = going ? "Pause" : "Play";
   });
   place.replaceChildren(
-    h("h2", {}, `Run ${number}: ${run.condition.name}`),
-    h("p", {}, "Recomputed now: ", h("span", { class: run.verdict === "verified" ? "good" : "bad" }, run.verdict), run.reasons ? `: ${run.reasons}` : "."),
+    h("h2", {}, `Run ${run.number}: ${run.condition.name}`),
+    h("p", {}, judged, ": ", h("span", { class: run.verdict === "verified" ? "good" : "bad" }, run.verdict), run.reasons ? `: ${run.reasons}` : "."),
     canvas,
     slider,
     clock,
@@ -36,7 +36,7 @@ export async function play(number: number, place: HTMLElement): Promise<void> {
   );
   const surface = new Surface(canvas);
   const estimates = new Plots(curves);
-  estimates.set(linesOf(run.live), run.start_s, run.start_s + run.e.length * run.step_s);
+  estimates.set(run.live, run.start_s, run.start_s + run.e.length * run.step_s);
   let going = true;
   let over = false;
   let at = 0;

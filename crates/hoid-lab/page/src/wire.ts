@@ -1,4 +1,4 @@
-// What page and server say to each other; wire.rs has the same.
+// What page and server say to each other; wire.rs has the same. Whoever runs the experiment is a `Wire`.
 
 import type { Batch, InputMap, Phase, SimulatedOperator } from "./engine";
 
@@ -107,25 +107,35 @@ export type FromPage =
   | { type: "abort"; number: number }
   | { type: "reports" };
 
-export class Wire {
-  private readonly socket: WebSocket;
+/** A run that ended, at 100 Hz. */
+export interface RunData {
+  number: number;
+  condition: Condition;
+  start_s: number;
+  step_s: number;
+  e: number[];
+  u: number[];
+  y: number[];
+  f: number[] | null;
+  live: LiveLine[];
+  verdict: string;
+  reasons: string;
+}
 
-  constructor(hear: (message: FromServer) => void, tables: (numbers: Float64Array) => void, gone: () => void) {
-    const base = location.pathname.replace(/experimenter$/, "");
-    this.socket = new WebSocket(`ws://${location.host}${base}socket`);
-    this.socket.binaryType = "arraybuffer";
-    this.socket.onmessage = (event) => {
-      if (typeof event.data === "string") hear(JSON.parse(event.data));
-      else tables(new Float64Array(event.data));
-    };
-    this.socket.onclose = gone;
-  }
+/** What a wire tells the page. */
+export interface Listener {
+  hear(message: FromServer): void;
+  /** Target, disturbance and noise of the run that was told last. */
+  tables(numbers: Float64Array): void;
+  gone(): void;
+}
 
-  opened(then: () => void): void {
-    this.socket.onopen = then;
-  }
-
-  say(message: FromPage): void {
-    if (this.socket.readyState === WebSocket.OPEN) this.socket.send(JSON.stringify(message));
-  }
+/** Whoever runs the experiment, as the page sees it. */
+export interface Wire {
+  /** True where there is no program behind the page: nothing is stored, and nobody else looks on. */
+  readonly alone: boolean;
+  say(message: FromPage): void;
+  data(number: number): Promise<RunData | null>;
+  /** What can be taken home of the session. */
+  takeHome(state: State): HTMLElement;
 }
