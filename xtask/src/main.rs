@@ -131,8 +131,8 @@ const SLOW: [Slow; 10] = [
         ..slow_of("latency", "hoid-cli", "latency")
     },
     slow_of("lab", "hoid-lab", "lab"),
-    slow_of("challenge", "hoid-study", "challenge"),
-    slow_of("challenge-people", "hoid-study", "challenge_people"),
+    slow_of("challenge", "hoid-challenge", "challenge"),
+    slow_of("challenge-people", "hoid-challenge", "challenge_people"),
 ];
 
 /// Runs one of them, with further arguments of its own.

@@ -58,12 +58,10 @@
 //! | `columns`, `truth`, `true_value` | the tables of a study: fits, traces, cells; what the truth of each column is |
 //! | `summary`, [`statistics`] | statistics over the replications of a cell, with Monte Carlo errors |
 //! | `results`, `query`, `tables` | [`Results`]: a finished study read back, [`Query`]: which rows of it |
-//! | [`challenge`] | cases that can refute a tracker, and how its estimates fare in them |
 //! | [`group`] | recorded runs by subject and condition |
 
 mod batch_fits;
 mod block;
-pub mod challenge;
 mod columns;
 mod directory;
 mod error;

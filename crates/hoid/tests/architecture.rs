@@ -6,7 +6,7 @@ use std::{collections::BTreeMap, process::Command};
 use serde_json::Value;
 
 /// What each crate may depend on within the workspace.
-const ALLOWED: [(&str, &[&str]); 17] = [
+const ALLOWED: [(&str, &[&str]); 18] = [
     ("hoid-core", &[]),
     ("hoid-embedded", &["hoid-core"]),
     ("hoid-model", &["hoid-core"]),
@@ -30,6 +30,10 @@ const ALLOWED: [(&str, &[&str]); 17] = [
             "hoid-study",
             "hoid-report",
         ],
+    ),
+    (
+        "hoid-challenge",
+        &["hoid-model", "hoid-ident", "hoid-sim", "hoid-track", "hoid-io"],
     ),
     (
         "hoid-study",

@@ -1,4 +1,4 @@
-//! The challenge on recorded people (`hoid_study::challenge`, `people`).
+//! The challenge on recorded people (`hoid_challenge`, `people`).
 //!
 //! `cargo xtask slow challenge-people [--kinds fo-so,...] [--methods NAME,...] [--runs N] [--part I/N]
 //! [--out DIRECTORY]`; the environment variable `HOID_HUMAN_DATA` names the directory of the
@@ -7,7 +7,7 @@
 
 use std::{path::PathBuf, process::ExitCode};
 
-use hoid_study::challenge::{PeopleOptions, Portion, challenge_people, tables};
+use hoid_challenge::{PeopleOptions, Portion, challenge_people, tables};
 
 fn main() -> ExitCode {
     match run() {

@@ -322,7 +322,7 @@ pub(super) fn posed_task(case: &Case, of: RunOf) -> Task {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::challenge::contestant::Alarm;
+    use crate::contestant::Alarm;
 
     #[test]
     fn what_is_asked_lies_between_changes() {
@@ -358,7 +358,7 @@ mod tests {
         let posed = Posed::new(
             &case,
             RunOf {
-                seeds: crate::challenge::Seeds::Open,
+                seeds: crate::Seeds::Open,
                 number: 0,
             },
         )

@@ -202,7 +202,7 @@ fn is_borne(operator: &Operator, plant: Plant) -> Result<bool, ModelError> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::challenge::cases;
+    use crate::cases;
 
     #[test]
     fn somebody_bears_every_case_and_nobody_twice() {

@@ -1,4 +1,4 @@
-//! The challenge (`hoid_study::challenge`): methods of tracking in cases that can refute them.
+//! The challenge (`hoid_challenge`): methods of tracking in cases that can refute them.
 //!
 //! `cargo xtask slow challenge [--cases NAME,...] [--methods NAME,...] [--seeds open|sealed] [--runs N]
 //! [--part I/N] [--out DIRECTORY] [--page FILE --measured TEXT] [--list]`: 4 runs of every case, all
@@ -9,7 +9,7 @@
 
 use std::{path::PathBuf, process::ExitCode};
 
-use hoid_study::challenge::{ChallengeOptions, Portion, Seeds, cases, challenge, contestants, page, tables};
+use hoid_challenge::{ChallengeOptions, Portion, Seeds, cases, challenge, contestants, page, tables};
 
 fn main() -> ExitCode {
     match run() {

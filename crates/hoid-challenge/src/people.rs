@@ -23,7 +23,7 @@ use super::{
     measure::{Found, Line, asked, scored},
     run::{chosen_contestants, kept, refused},
 };
-use crate::StudyError;
+use crate::ChallengeError;
 
 /// Seconds of the ramp, of a trial behind it, and of a period.
 const RAMP_S: f64 = 5.0;
@@ -70,8 +70,8 @@ type Cells = BTreeMap<(String, String), Vec<Trial>>;
 /// Runs what is not there yet.
 ///
 /// # Errors
-/// [`StudyError`] for recordings that cannot be read, names that are none, files.
-pub fn challenge_people(options: &PeopleOptions, each: &(dyn Fn(&str) + Sync)) -> Result<Vec<Line>, StudyError> {
+/// [`ChallengeError`] for recordings that cannot be read, names that are none, files.
+pub fn challenge_people(options: &PeopleOptions, each: &(dyn Fn(&str) + Sync)) -> Result<Vec<Line>, ChallengeError> {
     let cells = read_all(&options.recordings)?;
     let (contestants, _) = chosen_contestants(&options.methods)?;
     let mut all = Vec::new();
@@ -115,7 +115,7 @@ pub fn challenge_people(options: &PeopleOptions, each: &(dyn Fn(&str) + Sync)) -
     Ok(lines.concat())
 }
 
-fn read_all(directory: &Path) -> Result<Cells, StudyError> {
+fn read_all(directory: &Path) -> Result<Cells, ChallengeError> {
     let mut names = hoid_io::file_names(directory)?;
     names.sort();
     let mut cells = Cells::new();
@@ -203,7 +203,7 @@ impl Joined {
         }
     }
 
-    fn posed(&self, cells: &Cells) -> Result<Posed, StudyError> {
+    fn posed(&self, cells: &Cells) -> Result<Posed, ChallengeError> {
         let sample_time = SampleTime::new(1.0 / RATE_HZ).map_err(|e| refused(e.to_string()))?;
         let ramp = (RAMP_S * RATE_HZ) as usize;
         let cell = |plant: &str| &cells[&(self.person.clone(), plant.to_owned())];

@@ -109,7 +109,7 @@ pub fn batch(task: &Task, changes_s: &[f64], tau_e_s: f64) -> Vec<Said> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::challenge::{RunOf, Seeds, cases, simulate};
+    use crate::{RunOf, Seeds, cases, simulate};
 
     fn found(name: &str, seconds: f64) -> f64 {
         let case = cases().into_iter().find(|case| case.name == name).unwrap();

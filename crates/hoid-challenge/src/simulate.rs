@@ -335,7 +335,7 @@ impl Run {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::challenge::{Seeds, Theme, cases};
+    use crate::{Seeds, Theme, cases};
 
     fn case(name: &str) -> Case {
         cases().into_iter().find(|case| case.name == name).unwrap()

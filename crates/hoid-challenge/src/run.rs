@@ -17,7 +17,7 @@ use super::{
     draw::{Portion, RunOf, Seeds},
     measure::{BATCH, Line, Posed},
 };
-use crate::StudyError;
+use crate::ChallengeError;
 
 /// What is to be run.
 #[derive(Debug, Clone)]
@@ -39,8 +39,8 @@ pub struct ChallengeOptions {
 /// The contestants of these names, all where there are none, and whether the batch fit is among them.
 ///
 /// # Errors
-/// [`StudyError::Plan`] for a name that is none.
-pub(super) fn chosen_contestants(names: &[String]) -> Result<(Vec<Box<dyn Contestant>>, bool), StudyError> {
+/// [`ChallengeError::Refused`] for a name that is none.
+pub(super) fn chosen_contestants(names: &[String]) -> Result<(Vec<Box<dyn Contestant>>, bool), ChallengeError> {
     let mut all = contestants();
     let known: Vec<String> = all.iter().map(|c| c.name()).chain(["batch".to_owned()]).collect();
     if let Some(unknown) = names.iter().find(|name| !known.contains(name)) {
@@ -56,8 +56,8 @@ pub(super) fn chosen_contestants(names: &[String]) -> Result<(Vec<Box<dyn Contes
 /// The cases of these names, beginnings or themes; all where there are none.
 ///
 /// # Errors
-/// [`StudyError::Plan`] for a name of nothing.
-pub fn chosen_cases(names: &[String]) -> Result<Vec<Case>, StudyError> {
+/// [`ChallengeError::Refused`] for a name of nothing.
+pub fn chosen_cases(names: &[String]) -> Result<Vec<Case>, ChallengeError> {
     let all = cases();
     let is = |case: &Case, name: &String| {
         case.name == *name || case.theme.to_string() == *name || name.ends_with('-') && case.name.starts_with(name)
@@ -75,20 +75,16 @@ pub fn chosen_cases(names: &[String]) -> Result<Vec<Case>, StudyError> {
     Ok(chosen.collect())
 }
 
-pub(super) fn refused(reason: String) -> StudyError {
-    StudyError::Plan {
-        path: "challenge".to_owned(),
-        line: None,
-        reason,
-    }
+pub(super) fn refused(reason: String) -> ChallengeError {
+    ChallengeError::Refused { reason }
 }
 
 /// Runs what is not there yet; the lines of all that was chosen, in the order of cases, runs and
 /// contestants. `each` is called after every run.
 ///
 /// # Errors
-/// [`StudyError`] for names that are none, files, and cases that nobody bears.
-pub fn challenge(options: &ChallengeOptions, each: &(dyn Fn(&str) + Sync)) -> Result<Vec<Line>, StudyError> {
+/// [`ChallengeError`] for names that are none, files, and cases that nobody bears.
+pub fn challenge(options: &ChallengeOptions, each: &(dyn Fn(&str) + Sync)) -> Result<Vec<Line>, ChallengeError> {
     let cases = chosen_cases(&options.cases)?;
     let (contestants, batch) = chosen_contestants(&options.methods)?;
     let all: Vec<(&Case, u64)> = (cases.iter())
@@ -129,8 +125,8 @@ pub(super) fn kept(
     number: u64,
     contestants: &[Box<dyn Contestant>],
     batch: bool,
-    pose: &mut dyn FnMut() -> Result<LineOf, StudyError>,
-) -> Result<Vec<Line>, StudyError> {
+    pose: &mut dyn FnMut() -> Result<LineOf, ChallengeError>,
+) -> Result<Vec<Line>, ChallengeError> {
     let path = folder.join(format!("{number}.jsonl"));
     let mut lines = if path.exists() { read(&path)? } else { Vec::new() };
     let mut wanted: Vec<(String, Option<&dyn Contestant>)> =
@@ -152,7 +148,7 @@ pub(super) fn kept(
     Ok(wanted.iter().filter_map(of).collect())
 }
 
-fn read(path: &Path) -> Result<Vec<Line>, StudyError> {
+fn read(path: &Path) -> Result<Vec<Line>, ChallengeError> {
     let text = hoid_io::read_text(path)?;
     let line = |line: &str| {
         serde_json::from_str(line).map_err(|e| {
@@ -165,7 +161,7 @@ fn read(path: &Path) -> Result<Vec<Line>, StudyError> {
     text.lines().map(line).collect()
 }
 
-fn write(path: &Path, folder: &Path, lines: &[Line]) -> Result<(), StudyError> {
+fn write(path: &Path, folder: &Path, lines: &[Line]) -> Result<(), ChallengeError> {
     hoid_io::make_directory(folder)?;
     let mut text = String::new();
     for line in lines {

@@ -21,6 +21,7 @@
 //! | `run` | [`challenge()`]: all of it, kept on disk |
 //! | `people` | [`challenge_people`]: the same on recorded people |
 //! | `tables`, `page` | [`tables()`], [`page()`] |
+//! | `error` | [`ChallengeError`] |
 
 mod case;
 mod cases;
@@ -28,6 +29,7 @@ mod contestant;
 mod contestants;
 mod draw;
 mod driving;
+mod error;
 mod measure;
 mod noise;
 mod operator;
@@ -44,6 +46,7 @@ pub use cases::cases;
 pub use contestant::{Alarm, Answer, Contestant, Said, Seam, Task};
 pub use contestants::contestants;
 pub use draw::{Portion, RunOf, Seeds};
+pub use error::ChallengeError;
 pub use measure::{Found, Line, Moment, Posed};
 pub use operator::{Operator, Parameter, Plant, hold};
 pub use page::page;

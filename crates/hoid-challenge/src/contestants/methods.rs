@@ -141,7 +141,7 @@ fn said(responses: Option<Vec<Response>>, operator: Option<&OperatorEstimate>) -
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::challenge::{
+    use crate::{
         RunOf, Seeds, cases,
         measure::{Posed, posed_task},
     };

@@ -347,7 +347,7 @@ mod tests {
     use std::collections::BTreeMap;
 
     use super::*;
-    use crate::challenge::measure::{Found, Moment};
+    use crate::measure::{Found, Moment};
 
     #[test]
     fn numbers_are_where_they_belong() {
