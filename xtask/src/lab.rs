@@ -11,7 +11,7 @@ use std::{
 };
 
 use crate::{
-    process::{AS_TESTS, SHIPPED, cargo, cargo_command, output, run, target_directory},
+    process::{AS_TESTS, SHIPPED, cargo, output, run, target_directory},
     processors::webassembly,
 };
 
@@ -61,9 +61,10 @@ fn page_alone(profile: &str, config: Option<&Path>, out: &Path) -> Result<Option
     let Some(kernel) = webassembly(profile)? else {
         return Ok(None);
     };
-    let mut tables = cargo_command();
-    tables.args(["run", "--quiet", "-p", "hoid-lab", "--example", "tables", "--"]);
-    let told = output(tables.args(config))?;
+    // Of the features of the tests, as they have compiled it.
+    cargo(&["build", "--workspace", "--example", "tables"], &[])?;
+    let program = target_directory().join("debug/examples");
+    let told = output(Command::new(program.join(format!("tables{}", env::consts::EXE_SUFFIX))).args(config))?;
     let tables = built("experiment.json");
     fs::create_dir_all(built("")).map_err(|error| format!("{}: {error}", built("").display()))?;
     fs::write(&tables, told).map_err(|error| format!("{}: {error}", tables.display()))?;
