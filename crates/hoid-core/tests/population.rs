@@ -43,7 +43,7 @@ fn prior(threshold: f64) -> PopulationPrior {
         rivals: rivals(),
         detection: Detection {
             frequency: 2.5,
-            recent: 10,
+            recent: [10, 16],
             least: 16,
             most: 80,
             threshold,
@@ -528,4 +528,36 @@ fn what_is_known_stands_at_the_beginning() {
     ] {
         assert!(filter(1e9).knowing(&wrong).is_none());
     }
+}
+
+#[test]
+fn a_stick_that_ends_does_not_make_the_person_answer_less() {
+    let (mut told, mut taken) = (0.0, 0.0);
+    for seed in 0..4 {
+        let (mut person, mut free) = (Person::new(400 + seed), filter(13.5));
+        let (mut knows, mut does_not) = (filter(13.5), filter(13.5));
+        let mut power = 0.0;
+        for _ in 0..3000 {
+            let [e, u] = person.sample(GAINS_OF_A_PERSON, 0.05);
+            power += u * u;
+            free.step(e, u);
+        }
+        let end = 1.2 * (power / 3000.0).sqrt();
+        let mut person = Person::new(400 + seed);
+        for k in 0..3000 {
+            let [e, u] = person.sample(GAINS_OF_A_PERSON, 0.05);
+            let stick = u.clamp(-end, end);
+            knows.step(e, stick);
+            // No two samples alike: nothing tells that the stick stands.
+            does_not.step(e, stick * (1.0 + 1e-9 * f64::from(k % 2)));
+        }
+        let (of, _) = estimate(&free, 2.0);
+        let distance = |filter: &PopulationFilter<Vec<f64>>| {
+            let (y, _) = estimate(filter, 2.0);
+            (y[0] - of[0]).hypot(y[1] - of[1]) / of[0].hypot(of[1])
+        };
+        told += distance(&knows) / 4.0;
+        taken += distance(&does_not) / 4.0;
+    }
+    assert!(told < 0.5 * taken, "{told:.3} for {taken:.3}");
 }

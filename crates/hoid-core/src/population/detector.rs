@@ -11,13 +11,16 @@
 //! - of gains, natural frequency, damping and delay together, the level not: `nu = 6`.
 //!
 //! The first finds people, whose response changes where they control; the second what turns elsewhere, or
-//! what one of them does that another undoes at that frequency.
+//! what one of them does that another undoes at that frequency. It is looked at over a short and over a
+//! long present: small changes need more data than large ones.
 //!
-//! People vary, and no basis is right: T is divided by the level c at which it has been so far, from
-//! the mean of log T, whose expectation for a chi-square is `ln 2 + psi(nu/2)`: .116 and 1.616. Both are
-//! then told as what they have against chance, in nats: for even nu and `x = T/2c`
+//! People vary, and no basis is right: T is held against the level c at which it has been so far, from
+//! the mean of log T, whose expectation for a chi-square is `ln 2 + psi(nu/2)`: .116 and 1.616. Whose T
+//! varies more, varies more unevenly too (a remnant that grows with the error, a stick that ends), so it is
+//! divided by `c^1.5`. Each is then told as what it has against chance, in nats: for even nu and
+//! `x = T/2c^1.5`
 //!
-//! `-ln P(chi^2 > T/c) = x - ln (1 + x + .. + x^(nu/2-1)/(nu/2-1)!)`.
+//! `-ln P(chi^2 > 2x) = x - ln (1 + x + .. + x^(nu/2-1)/(nu/2-1)!)`.
 //!
 //! A change is declared where one of them is above the threshold in some blocks one after another. When it
 //! was, and what changed, is told by the block that leaves least where gains and what is held are free
@@ -39,11 +42,15 @@ use super::{
 };
 
 /// Blocks that there is room for.
-pub const BLOCKS: usize = 90;
+pub const BLOCKS: usize = 96;
 /// Length of a block, s.
 pub const BLOCK_S: f64 = 0.5;
-/// Degrees of freedom of both statistics, in pairs.
-const PAIRS: [u32; 2] = [1, 3];
+/// Which differences, and over which present.
+const STATISTICS: [(Of, usize); 3] = [(Of::Response, SHORT), (Of::All, SHORT), (Of::All, LONG)];
+const SHORT: usize = 0;
+const LONG: usize = 1;
+/// Power of the level that T is divided by.
+const UNEVEN: f64 = 1.5;
 /// Expectation of the logarithm of a chi-square with one pair, `ln 2 - gamma`.
 const MEAN_LOG: f64 = 0.115_931_515_658_412_45;
 /// What both look at together: gains and what is held.
@@ -54,7 +61,7 @@ const BEHIND_S: f64 = 1.0;
 /// Blocks behind a gap from which they are held against those before it.
 const FEWEST: usize = 4;
 /// Blocks that the supposed level of T counts for, and the logarithm of that level.
-const SUPPOSED: f64 = 5.0;
+const SUPPOSED: f64 = 2.0;
 const USUAL: f64 = 0.5;
 /// Blocks that the level is a mean of at most.
 const LONGEST: f64 = 240.0;
@@ -66,13 +73,13 @@ const MOST: f64 = 3.0;
 pub struct Detection {
     /// Frequency, rad/s.
     pub frequency: f64,
-    /// Blocks of the present, and least and largest number of those before.
-    pub recent: usize,
+    /// Blocks of the present: of a short and of a long one.
+    pub recent: [usize; 2],
     /// Least number of blocks before.
     pub least: usize,
     /// Largest number of blocks before.
     pub most: usize,
-    /// What one of the two must have against chance, nats.
+    /// What one of them must have against chance, nats.
     pub threshold: f64,
     /// Standard deviations that are supposed of what is held, in its units.
     pub held: [f64; HELD],
@@ -80,6 +87,23 @@ pub struct Detection {
     pub persistence: u64,
     /// Blocks after a change in which none is declared.
     pub refractory: u64,
+}
+
+/// A difference of now from before.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Of {
+    Response,
+    All,
+}
+
+impl Of {
+    /// Degrees of freedom, in pairs.
+    fn pairs(self) -> u32 {
+        match self {
+            Self::Response => 1,
+            Self::All => 3,
+        }
+    }
 }
 
 /// A statistic in units of what it has been.
@@ -112,7 +136,7 @@ impl Statistic {
 
     /// Takes T; true where it has been above the threshold for long enough.
     fn take(&mut self, t: f64, threshold: f64, persistence: u64) -> bool {
-        self.against_chance = against_chance(t / self.usual(), self.pairs);
+        self.against_chance = against_chance(t / libm::pow(self.usual(), UNEVEN), self.pairs);
         self.levels = (self.levels + 1.0).min(SUPPOSED + LONGEST);
         let log = libm::log(t.max(0.05)).min(self.level + MOST);
         self.level += (log - self.level) / self.levels;
@@ -150,7 +174,7 @@ pub struct Detector {
     block: Block,
     blocks: [Block; BLOCKS],
     count: usize,
-    statistics: [Statistic; 2],
+    statistics: [Statistic; STATISTICS.len()],
     /// Samples that were not taken, one after another, and those that are not looked at from now on.
     gap: u64,
     behind: u64,
@@ -172,7 +196,9 @@ impl Detector {
     /// Without blocks. `response` is that of the basis at the frequency, Ts in s. `None` where there
     /// is no room for the blocks.
     pub fn new(what: Detection, response: [Complex; GAINS], ts: f64) -> Option<Self> {
-        let room = what.recent > 0 && what.least > 0 && what.least <= what.most && what.recent + what.most <= BLOCKS;
+        let [short, long] = what.recent;
+        let present = short > 0 && short <= long;
+        let room = present && what.least > 0 && what.least <= what.most && long + what.most <= BLOCKS;
         let sound = what.held.iter().all(|d| *d > 0.0 && d.is_finite());
         (room && sound).then_some(Self {
             what,
@@ -181,7 +207,7 @@ impl Detector {
             block: EMPTY,
             blocks: [EMPTY; BLOCKS],
             count: 0,
-            statistics: PAIRS.map(Statistic::new),
+            statistics: STATISTICS.map(|(of, _)| Statistic::new(of.pairs())),
             gap: 0,
             behind: 0,
             fresh: BLOCKS,
@@ -215,7 +241,7 @@ impl Detector {
 
     /// Ends a block; `held` is where what is held is now.
     fn close(&mut self, held: [f64; HELD]) {
-        if self.count == self.what.recent + self.what.most {
+        if self.count == self.what.recent[LONG] + self.what.most {
             self.blocks.copy_within(1..self.count, 0);
             self.count -= 1;
         }
@@ -225,41 +251,61 @@ impl Detector {
         self.since += 1;
         self.fresh = (self.fresh + 1).min(BLOCKS);
         self.statistics.iter_mut().for_each(|s| s.against_chance = 0.0);
-        let recent = self.what.recent.min(self.fresh);
-        let before = self.count.saturating_sub(recent);
-        if before < self.what.least || recent < FEWEST.min(self.what.recent) {
-            self.statistics.iter_mut().for_each(|s| s.above = 0);
-            return;
+        let mut passed = false;
+        // The short present last: its spans are those that are told.
+        for present in [LONG, SHORT] {
+            passed |= self.compare(held, present);
         }
-        let sums = [
-            Block::of(&self.blocks[..before]),
-            Block::of(&self.blocks[before..self.count]),
-        ];
-        let [Some(past), Some(present)] = sums.each_ref().map(Block::fit) else {
-            return;
-        };
-        self.spans = [past, present];
-        let whole = sums.each_ref().map(|sum| sum.fit_whole(held, self.what.held));
-        if let [Some(past), Some(present)] = whole {
-            self.whole = [past, present];
-        }
-        let Some(t) = self.of_response() else { return };
-        let Detection {
-            threshold, persistence, ..
-        } = self.what;
-        let of_response = self.statistics[0].take(t, threshold, persistence);
-        let of_all = self
-            .of_all()
-            .is_some_and(|t| self.statistics[1].take(t, threshold, persistence));
-        if (of_response || of_all) && self.since > self.what.refractory {
+        if passed && self.since > self.what.refractory {
             self.declared = true;
             self.since = 0;
             self.statistics.iter_mut().for_each(|s| s.above = 0);
-            self.split(held, recent);
+            self.split(held, self.what.recent[LONG].min(self.fresh));
             // What was before is no measure of what comes.
             self.blocks.copy_within(self.count - self.ago..self.count, 0);
             self.count = self.ago;
         }
+    }
+
+    /// Holds a present against what was before it; true where a statistic has been above for long enough.
+    fn compare(&mut self, held: [f64; HELD], present: usize) -> bool {
+        let Detection {
+            least,
+            most,
+            threshold,
+            persistence,
+            ..
+        } = self.what;
+        let recent = self.what.recent[present].min(self.fresh);
+        let middle = self.count.saturating_sub(recent);
+        let of_this = STATISTICS.map(|(of, over)| (over == present).then_some(of));
+        if middle < least || recent < FEWEST.min(self.what.recent[SHORT]) {
+            let these = self.statistics.iter_mut().zip(of_this).filter(|(_, of)| of.is_some());
+            these.for_each(|(s, _)| s.above = 0);
+            return false;
+        }
+        let sums = [
+            Block::of(&self.blocks[middle.saturating_sub(most)..middle]),
+            Block::of(&self.blocks[middle..self.count]),
+        ];
+        let [Some(past), Some(now)] = sums.each_ref().map(Block::fit) else {
+            return false;
+        };
+        self.spans = [past, now];
+        let whole = sums.each_ref().map(|sum| sum.fit_whole(held, self.what.held));
+        if let [Some(past), Some(now)] = whole {
+            self.whole = [past, now];
+        }
+        let mut passed = false;
+        for (i, of) in of_this.into_iter().enumerate() {
+            let t = match of {
+                Some(Of::Response) => self.of_response(),
+                Some(Of::All) => self.of_all(),
+                None => None,
+            };
+            passed |= t.is_some_and(|t| self.statistics[i].take(t, threshold, persistence));
+        }
+        passed
     }
 
     /// The spans before and after the block that leave least when the change is supposed to be there.
@@ -328,15 +374,16 @@ impl Detector {
         distance::<OPERATOR>(c, d)
     }
 
-    /// What the last block has against chance, nats: of Y and of all; zero while there is too little to
-    /// compare.
-    pub fn against_chance(&self) -> [f64; 2] {
-        self.statistics.map(|s| s.against_chance)
+    /// What the last block has against chance, nats: the most that one of them has; zero while there is too
+    /// little to compare.
+    pub fn against_chance(&self) -> f64 {
+        self.statistics.iter().fold(0.0, |most, s| s.against_chance.max(most))
     }
 
-    /// How many times larger than a chi-square T of Y and T of all have been without a change.
+    /// How many times larger than a chi-square T of Y and T of all have been without a change, over the
+    /// short present.
     pub fn usual_levels(&self) -> [f64; 2] {
-        self.statistics.map(|s| s.usual())
+        [0, 1].map(|i| self.statistics[i].usual())
     }
 
     /// Before and now, at the last block; before and after the change where one was declared at it.
@@ -368,9 +415,14 @@ impl Detector {
         self.declared = false;
     }
 
+    /// A sample says nothing, and is no fault: no change is declared at it.
+    pub fn pass_over(&mut self) {
+        self.declared = false;
+    }
+
     /// A sample is not taken: no change is declared at it, and behind many of them nothing is looked at.
     pub fn skip(&mut self) {
-        self.declared = false;
+        self.pass_over();
         self.gap += 1;
         let samples = |seconds: f64| (seconds / BLOCK_S * self.samples_of_block as f64) as u64;
         let (long, behind) = (samples(GAP_S).max(1), samples(BEHIND_S));

@@ -5,6 +5,7 @@ use super::{
     blocks::Row,
     contest::Contest,
     detector::Detector,
+    ends::Ends,
     follower::{Follower, LARGEST, LATEST_S, Learnt, Past},
     gains::Gains,
     known::Known,
@@ -31,6 +32,7 @@ pub struct PopulationFilter<E> {
     errors: E,
     newest: usize,
     u: [f64; LARGEST_ORDER],
+    ends: Ends,
     restarts: u64,
     /// Samples for which there has been an estimate that began where this one did, and those of the
     /// one that was left at the last sample.
@@ -48,6 +50,7 @@ impl<E: AsMut<[f64]>> State for PopulationFilter<E> {
                 &mut self.detector,
                 &mut self.newest,
                 &mut self.u,
+                &mut self.ends,
                 &mut self.restarts,
                 &mut self.age,
                 &mut self.left,
@@ -87,6 +90,7 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> PopulationFilter<E> {
             errors,
             newest: 0,
             u,
+            ends: Ends::new(),
             restarts: 0,
             age: 0,
             left: 0,
@@ -104,6 +108,9 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> PopulationFilter<E> {
     /// Takes a sample. Both must be finite.
     pub fn step(&mut self, e: f64, u: f64) -> Step {
         self.respond(e);
+        if let Some(step) = self.at_an_end(u) {
+            return step;
+        }
         let past = Past {
             errors: self.errors.as_ref(),
             newest: self.newest,
@@ -135,6 +142,24 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> PopulationFilter<E> {
             innovation: learnt.innovation,
             shortened: false,
         }
+    }
+
+    /// Nothing is learnt of a stick that stands at its end ([`super::ends`]).
+    #[inline(always)]
+    fn at_an_end(&mut self, u: f64) -> Option<Step> {
+        let ends = self.ends;
+        self.ends.remember(u);
+        if !self.believed.began || ends.beyond(u, u).is_none() {
+            return None;
+        }
+        let innovation = self.foretold(u);
+        let u = ends.beyond(u, u - innovation)?;
+        self.detector.pass_over();
+        self.keep(u, innovation);
+        Some(Step {
+            innovation,
+            shortened: false,
+        })
     }
 
     /// As [`PopulationFilter::step`], but the estimate stays: only the filters move on.

@@ -28,6 +28,7 @@
 //!   and the gain are those of a Student distribution, so that an outlier says little.
 //! - **Rivals** (`contest`). Others begin at other delays and poles, at the start and after each
 //!   change; the one that foretells best is believed.
+//! - **The end of the stick** (`ends`). Nothing is learnt of an output that stands there.
 //! - **Changes** ([`detector`]). Declared from the difference of Y at one frequency, or of gains
 //!   and what is held, between the last seconds and the time before ([`blocks`]), each fitted by least squares with
 //!   a variance of its own (G. C. Chow, Econometrica 28 (1960) 591-605; unequal variances: B. L. Welch,
@@ -49,6 +50,7 @@ pub mod usual;
 
 mod cholesky;
 mod contest;
+mod ends;
 mod filter;
 mod follower;
 mod kalman;

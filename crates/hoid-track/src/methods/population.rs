@@ -332,8 +332,7 @@ impl Recursion for PopulationRecursion {
     }
 
     fn change_odds(&self) -> Option<f64> {
-        let [of_response, of_all] = self.model.detector().against_chance();
-        Some(of_response.max(of_all))
+        Some(self.model.detector().against_chance())
     }
 
     fn change(&self) -> Option<Change> {
