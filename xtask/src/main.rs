@@ -11,6 +11,7 @@
 //! | `cargo xtask lab-page [--config FILE] [--out FILE]` | the page of `hoid lab` as one file that needs no program behind it, into `target/lab-page/` |
 //! | `cargo xtask embedded [--all]` | the kernel on bare processors, with the digits of the host (module `embedded`) |
 //! | `cargo xtask ffi [--dev] [--out DIR]` | the libraries for C with header, pkg-config file, CMake package and examples, into `target/ffi/`; `--header` makes the header anew, `--check` builds the examples by them (module `ffi`) |
+//! | `cargo xtask miri [ARGUMENT...]` | the boundary to C under Miri, arguments for its tests (module `miri`) |
 //! | `cargo xtask places [--dry or --dev]` | one run through every place in which hoid runs, as the table of the page "In your simulator" (module `places`) |
 //! | `cargo xtask bench [OPTION...]` | the tasks of the page "Speed beside others" beside the peers that are installed, or how cost grows (module `bench`) |
 //! | `cargo xtask slow NAME [ARGUMENT...]` | a study that takes too long for a test: `people-coverage`, `faults`, `faults-clean`, `tracker-faults`, `mutations`, `kills`, `latency`, `lab`, `lab-hour`, `lab-real`, `challenge`, `challenge-people` |
@@ -24,6 +25,7 @@ mod crates;
 mod embedded;
 mod ffi;
 mod lab;
+mod miri;
 mod page;
 mod places;
 mod process;
@@ -38,7 +40,7 @@ use std::{
 use counts::Counts;
 use process::{SHIPPED, cargo, cargo_command, each_line, run};
 
-const USAGE: &str = "usage: cargo xtask test [ARGUMENT...] | python [ARGUMENT...] | check | crates | book | lab | lab-page [OPTION...] | embedded [--all] | ffi [OPTION...] | places [--dry | --dev] | bench [OPTION...] | slow NAME [ARGUMENT...]";
+const USAGE: &str = "usage: cargo xtask test [ARGUMENT...] | python [ARGUMENT...] | check | crates | book | lab | lab-page [OPTION...] | embedded [--all] | ffi [OPTION...] | miri [ARGUMENT...] | places [--dry | --dev] | bench [OPTION...] | slow NAME [ARGUMENT...]";
 
 fn main() -> ExitCode {
     let mut arguments = env::args().skip(1);
@@ -53,6 +55,7 @@ fn main() -> ExitCode {
         Some("lab-page") => lab::alone(&arguments.collect::<Vec<_>>()),
         Some("embedded") => embedded::embedded(&arguments.collect::<Vec<_>>()),
         Some("ffi") => ffi::ffi(&arguments.collect::<Vec<_>>()),
+        Some("miri") => miri::miri(&arguments.collect::<Vec<_>>()),
         Some("places") => places::places(&arguments.collect::<Vec<_>>()),
         Some("slow") => slow(&arguments.collect::<Vec<_>>()),
         _ => Err(USAGE.to_owned()),

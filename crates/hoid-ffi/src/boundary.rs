@@ -204,7 +204,7 @@ mod tests {
         std::panic::set_hook(Box::new(|_| {}));
         let mut trackers = [ptr::null_mut(), ptr::null_mut()];
         for place in &mut trackers {
-            let session = Session::new(None, 0.01, None, None).unwrap();
+            let session = Session::new(Some("rpem"), 0.01, Some("{\"nk\": 9}"), None).unwrap();
             // SAFETY: a place on the stack.
             unsafe { hand_over(session, place) }.unwrap();
         }

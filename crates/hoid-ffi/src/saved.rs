@@ -81,7 +81,14 @@ mod tests {
     const AT_ONCE: &str =
         r#"{"nk": 29, "nd": 1, "start": {"b0": 0.04, "b1": -0.04, "d1": -0.8, "f1": -1.9, "f2": 0.92}}"#;
 
+    /// Samples until it is saved, and in all; under Miri a few will do.
+    const TAKEN: [usize; 2] = if cfg!(miri) { [5, 8] } else { [1500, 2500] };
+
     fn samples() -> Vec<Sample> {
+        if cfg!(miri) {
+            let each = (0..TAKEN[1]).map(|k| [(0.3 * k as f64).sin(), (0.2 * k as f64).cos()]);
+            return each.map(|[e, u]| Sample { e, u, reference: None }).collect();
+        }
         let simulator = Simulator::new(&Scenario::condition(Condition::C4)).unwrap();
         let record = simulator.run(RunSeed::default(), false).unwrap();
         let pairs = record.input().iter().zip(record.output());
@@ -96,12 +103,20 @@ mod tests {
     #[test]
     fn a_saved_tracker_goes_on_with_the_same_digits() {
         let samples = samples();
-        for (method, options, taken) in [
-            ("population", None, 1500),
-            ("rpem", Some(AT_ONCE), 1500),
-            ("rpem", Some("{\"nk\": 29, \"nd\": 1, \"warm_up\": 20}"), 1500),
-            ("rpem", Some("{\"nk\": 29, \"nd\": [1, 2], \"warm_up\": 10}"), 1500),
-        ] {
+        let [taken, all] = TAKEN;
+        let of_bank = [("population", None)];
+        let at_work = [("rpem", Some(AT_ONCE))];
+        let warm = [
+            ("rpem", Some("{\"nk\": 29, \"nd\": 1, \"warm_up\": 20}")),
+            ("rpem", Some("{\"nk\": 29, \"nd\": [1, 2], \"warm_up\": 10}")),
+        ];
+        let warming = [("rpem", Some("{\"nk\": 29, \"nd\": 1, \"warm_up\": 1}"))];
+        let cases = if cfg!(miri) {
+            [&at_work[..], &warming].concat()
+        } else {
+            [&of_bank[..], &at_work, &warm, &warming].concat()
+        };
+        for (method, options) in cases {
             let mut first = Session::new(Some(method), 0.01, options, None).unwrap();
             for sample in &samples[..taken] {
                 first.take(*sample, true);
@@ -109,7 +124,7 @@ mod tests {
             let bytes = first.saved();
             assert_eq!(bytes, first.saved(), "saving changes nothing");
             let mut second = Session::restored(&bytes).unwrap();
-            for sample in &samples[taken..2500] {
+            for sample in &samples[taken..all] {
                 let (a, b) = (first.take(*sample, true), second.take(*sample, true));
                 assert_eq!(a.innovation.to_bits(), b.innovation.to_bits());
             }
@@ -120,8 +135,14 @@ mod tests {
 
     #[test]
     fn damaged_bytes_are_refused() {
-        let mut session = Session::new(None, 0.01, None, None).unwrap();
+        let (method, options) = if cfg!(miri) {
+            (Some("rpem"), Some(AT_ONCE))
+        } else {
+            (None, None)
+        };
+        let mut session = Session::new(method, 0.01, options, None).unwrap();
         let bytes = session.saved();
+        let places = if cfg!(miri) { 9 } else { 199 };
         let refused = |bytes: &[u8]| {
             let failure = Session::restored(bytes).err().unwrap();
             assert_eq!(failure.status, HOID_BAD_STATE);
@@ -129,7 +150,7 @@ mod tests {
         for length in [0, 7, 8, 15, 16, 24, 100, bytes.len() - 1] {
             refused(&bytes[..length.min(bytes.len())]);
         }
-        for place in (0..bytes.len()).step_by(bytes.len() / 199 + 1) {
+        for place in (0..bytes.len()).step_by(bytes.len() / places + 1) {
             let mut changed = bytes.clone();
             changed[place] ^= 0x40;
             refused(&changed);

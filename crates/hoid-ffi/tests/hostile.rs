@@ -118,8 +118,14 @@ fn null_pointers_are_refused_everywhere() {
     // SAFETY: null is allowed.
     let status = unsafe { hoid_tracker_step(ptr::null_mut(), 0.0, 0.0, ptr::null_mut()) };
     assert_eq!(status, HOID_BAD_POINTER);
+    // The usual method, or under Miri the one that is made in no time.
+    let (method, options) = if cfg!(miri) {
+        (c"rpem".as_ptr(), c"{\"nk\": 9}".as_ptr())
+    } else {
+        (ptr::null(), ptr::null())
+    };
     // SAFETY: null is allowed.
-    let status = unsafe { hoid_tracker_new(ptr::null(), 0.01, ptr::null(), ptr::null_mut()) };
+    let status = unsafe { hoid_tracker_new(method, 0.01, options, ptr::null_mut()) };
     assert_eq!(status, HOID_BAD_POINTER);
     let mut tracker = ptr::null_mut();
     // SAFETY: null is allowed.
@@ -128,7 +134,7 @@ fn null_pointers_are_refused_everywhere() {
     // SAFETY: null is allowed.
     let status = unsafe { hoid_tracker_restore(ptr::null(), 9, &mut tracker) };
     assert_eq!(status, HOID_BAD_POINTER);
-    let tracker = made("population", 0.01, "").ok().unwrap();
+    let tracker = made("rpem", 0.01, r#"{"nk": 9}"#).ok().unwrap();
     // SAFETY: null is allowed.
     let status = unsafe { hoid_tracker_operator(tracker.0, ptr::null_mut(), 6, ptr::null_mut()) };
     assert!([HOID_BAD_POINTER, HOID_NOTHING].contains(&status));
@@ -141,6 +147,7 @@ fn null_pointers_are_refused_everywhere() {
 }
 
 #[test]
+#[cfg_attr(miri, ignore = "the filters of population take minutes there")]
 fn a_fit_is_what_a_tracker_begins_with() {
     let fit = r#"{"structure": "grey-box", "form": "gain", "neuromuscular": true, "verdict": {"level": "trustworthy"},
         "records": [{"sample_time": 0.01, "units": {"input": "", "output": ""}}], "parameters": [],
@@ -232,10 +239,11 @@ const NAMES: [&str; 24] = [
 ];
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 200, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: if cfg!(miri) { 4 } else { 200 }, failure_persistence: None, ..ProptestConfig::default() })]
 
     /// Samples of any kind move no tracker out of its senses.
     #[test]
+    #[cfg_attr(miri, ignore = "the filters of population take minutes there; tests/every_function.rs has few samples")]
     fn any_samples_are_taken(
         samples in prop::collection::vec((hostile_number(), hostile_number(), hostile_number(), any::<i32>()), 1..60),
         method in prop_oneof![Just("population"), Just("rpem"), Just("adaptive")],
@@ -261,6 +269,7 @@ proptest! {
 
     /// Options of any kind make a tracker or say why not.
     #[test]
+    #[cfg_attr(miri, ignore = "the filters of population take minutes there; tests/every_function.rs has few samples")]
     fn any_options_have_an_answer(
         method in prop_oneof![Just("population"), Just("rpem"), Just("adaptive"), Just("rls"), Just("window"), Just("ekf")],
         sample_time in prop_oneof![4 => Just(0.01), 1 => hostile_number()],
