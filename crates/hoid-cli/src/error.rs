@@ -1,12 +1,12 @@
 //! What ends a command early, and with which exit code.
 
-use hoid_ident::IdentError;
-use hoid_io::{IoError, ScenarioFileError};
-use hoid_model::{ModelError, Verdict, VerdictLevel};
-use hoid_report::ReportError;
-use hoid_sim::SimError;
-use hoid_study::StudyError;
-use hoid_thesis::ThesisError;
+use hoid::ident::IdentError;
+use hoid::io::{IoError, ScenarioFileError};
+use hoid::model::{ModelError, Verdict, VerdictLevel};
+use hoid::report::ReportError;
+use hoid::sim::SimError;
+use hoid::study::StudyError;
+use hoid::thesis::ThesisError;
 use thiserror::Error;
 
 use crate::interrupt;

@@ -1,7 +1,7 @@
 //! An operator of the family that polynomials stand for, shown to people and to programs.
 
-use hoid_ident::family::{FamilyConversion, PoleRole};
-use hoid_model::{GainUnit, NotConvertible};
+use hoid::ident::family::{FamilyConversion, PoleRole};
+use hoid::model::{GainUnit, NotConvertible};
 use serde_json::{Map, Value, json};
 
 use crate::{json, text};

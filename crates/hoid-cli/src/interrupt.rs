@@ -36,7 +36,7 @@ pub fn on_interrupt(new: impl FnMut(i32) + Send + 'static) {
 
 /// Ends the program; what is on its way to a file is removed.
 pub fn end(code: i32) -> ! {
-    hoid_io::remove_unfinished_files();
+    hoid::io::remove_unfinished_files();
     std::process::exit(code)
 }
 

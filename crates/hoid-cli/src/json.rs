@@ -1,16 +1,16 @@
 //! Results as JSON objects, the contract with other programs.
 
-use hoid_ident::{
+use hoid::ident::{
     Choice, Fit, GreyBoxFit, IdentError, MarginEstimates, Root, Termination,
     grey_box::OrderCandidate,
     validation::{GoodnessOfFit, LjungBox, Validation},
 };
-use hoid_model::{
+use hoid::model::{
     Fault, Finding, NotConvertible, Orders, Record, Verdict,
     margins::Margins,
     uncertainty::{Estimate, OperatorEstimate, RemnantEstimate},
 };
-use hoid_track::{Change, Determined, NoCrossover, OpenLoop, Response, TrackFault};
+use hoid::track::{Change, Determined, NoCrossover, OpenLoop, Response, TrackFault};
 use serde::Serialize;
 use serde_json::{Map, Value, json};
 
@@ -299,7 +299,7 @@ impl Identified<'_> {
         let of = self.operator.as_ref().ok().filter(|_| self.has_operator());
         let named = of.iter().flat_map(|o| o.rows()).map(|(name, _, e)| (name, e.value));
         let margins = self.margins;
-        hoid_report::sentence(
+        hoid::report::sentence(
             named,
             margins.and_then(|m| m.crossover_rad_s),
             margins.and_then(|m| m.phase_margin_deg),
@@ -482,7 +482,7 @@ fn remnant_orders(grey_box: &GreyBoxFit) -> Value {
 }
 
 fn candidates(choice: &Choice) -> Value {
-    let row = |c: &hoid_ident::Candidate| match &c.outcome {
+    let row = |c: &hoid::ident::Candidate| match &c.outcome {
         Ok(f) => json!({
             "orders": orders(&c.orders),
             "loss": number(f.loss),

@@ -2,9 +2,9 @@
 
 use std::{collections::BTreeMap, ops::RangeInclusive};
 
-use hoid_ident::{Constraint, NamedOrders, OrderRanges, Prior, order_selection::default_operator_ranges};
-use hoid_model::{MAX_DELAY, MAX_ORDER, Orders, SampleTime, Structure};
-use hoid_track::theta_of;
+use hoid::ident::{Constraint, NamedOrders, OrderRanges, Prior, order_selection::default_operator_ranges};
+use hoid::model::{MAX_DELAY, MAX_ORDER, Orders, SampleTime, Structure};
+use hoid::track::theta_of;
 
 use crate::error::CliError;
 
@@ -148,7 +148,7 @@ pub fn ranges(
     sample_time: SampleTime,
 ) -> Result<OrderRanges, CliError> {
     let usual = default_operator_ranges(structure, sample_time);
-    let usage = |error: hoid_ident::IdentError| CliError::Usage(error.to_string());
+    let usage = |error: hoid::ident::IdentError| CliError::Usage(error.to_string());
     let ranges = (usual.with(&named_orders(orders, nk, sample_time)?)).map_err(usage)?;
     ranges.candidates().map_err(usage)?;
     Ok(ranges)

@@ -13,8 +13,8 @@ use std::{
 
 use anstream::{AutoStream, ColorChoice};
 use anstyle::AnsiColor;
-use hoid_ident::progress;
-use hoid_model::VerdictLevel;
+use hoid::ident::progress;
+use hoid::model::VerdictLevel;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::error::CliError;

@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
-use hoid_ident::{Choice, IdentError, OrderRanges};
-use hoid_io::{is_fit_file, read_fit};
-use hoid_model::{Record, SampleTime, Structure};
-use hoid_track::{Method, StartAt, TrackOptions, TrackPlan, ranges_of};
+use hoid::ident::{Choice, IdentError, OrderRanges};
+use hoid::io::{is_fit_file, read_fit};
+use hoid::model::{Record, SampleTime, Structure};
+use hoid::track::{Method, StartAt, TrackOptions, TrackPlan, ranges_of};
 
 use crate::{
     args::{RecursionArgs, flag, methods_with},

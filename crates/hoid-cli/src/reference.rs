@@ -3,11 +3,11 @@
 //!
 //! `HOID_UPDATE_DOCS=1 cargo test -p hoid-cli` renews them.
 
-use hoid_ident::{
+use hoid::ident::{
     estimators,
     settings::{Kind, MethodSpec, Setting},
 };
-use hoid_track::Method;
+use hoid::track::Method;
 
 /// The type of a value in words.
 fn kind_in_words(kind: Kind) -> String {
@@ -123,7 +123,7 @@ fn python_settings(methods: &[MethodSpec]) -> String {
         }
     }
     let names: Vec<&str> = methods.iter().map(|spec| spec.name).collect();
-    let structures = hoid_model::Structure::ALL.map(|structure| structure.name());
+    let structures = hoid::model::Structure::ALL.map(|structure| structure.name());
     let one_a_line = |words: &[&str]| {
         words
             .iter()
@@ -193,7 +193,7 @@ fn python_settings(methods: &[MethodSpec]) -> String {
 #[cfg(test)]
 mod tests {
     use clap::{Command, CommandFactory};
-    use hoid_ident::settings::Bounds;
+    use hoid::ident::settings::Bounds;
 
     use super::*;
     use crate::args::{Cli, with_settings};
@@ -263,7 +263,7 @@ mod tests {
             help.contains("--tremor-band <LO..HI>") && help.contains("[default: 8..12]"),
             "{help}"
         );
-        let schema = hoid_study::plan_schema_of(&methods);
+        let schema = hoid::study::plan_schema_of(&methods);
         assert!(schema.contains("\"tremor_band_s\"") && schema.contains("count as tremor. For adaptive."));
         let python = python_settings(&methods);
         assert!(python.contains("    tremor_band: tuple[float, float] | None\n"));

@@ -1,15 +1,15 @@
 //! Results as tables for people.
 
-use hoid_ident::{
+use hoid::ident::{
     Choice, Fit, GreyBoxFit, MarginEstimates,
     order_selection::Criterion,
     validation::{GoodnessOfFit, Validation},
 };
-use hoid_model::{
+use hoid::model::{
     GainUnit, NotConvertible, Record, Verdict,
     uncertainty::{Estimate, OperatorEstimate, RemnantEstimate},
 };
-use hoid_report::numbers;
+use hoid::report::numbers;
 
 use crate::{commands::reading::Account, table::Rows};
 
@@ -228,7 +228,7 @@ pub fn interval(e: &Estimate) -> (String, String) {
 
 /// Three digits: an interval has no more.
 pub fn significant(value: f64) -> String {
-    hoid_model::numbers::significant(value, 3)
+    hoid::model::numbers::significant(value, 3)
 }
 
 /// `value ± standard error`.
@@ -428,7 +428,7 @@ pub fn candidates(choice: &Choice) -> String {
         .collect();
     let key = choice.criterion.label();
     good.sort_by(|a, b| {
-        let value = |f: &hoid_ident::order_selection::CandidateFigures| f.value(choice.criterion);
+        let value = |f: &hoid::ident::order_selection::CandidateFigures| f.value(choice.criterion);
         value(a.1).total_cmp(&value(b.1))
     });
     // The usual columns, and the one that decided where it is another.

@@ -102,8 +102,8 @@ fn convert_gives_the_operator_behind_three_poles_and_says_which_is_the_lag() {
     let directory = TempDir::new().unwrap();
     let d = directory.path();
     // 25 (.6 s + 1)/(5 s + 1) with omega_nm = 12 rad/s, zeta_nm = .25, tau_e = .137 s.
-    let family = hoid_model::FamilyOperator::of_names(
-        hoid_model::Form::LeadLag,
+    let family = hoid::model::FamilyOperator::of_names(
+        hoid::model::Form::LeadLag,
         &[
             ("K", 25.0),
             ("T_L", 0.6),
@@ -115,7 +115,7 @@ fn convert_gives_the_operator_behind_three_poles_and_says_which_is_the_lag() {
         .map(|(name, value)| (name.to_owned(), value)),
     )
     .unwrap();
-    let held = family.hold(hoid_model::SampleTime::HUNDREDTH).unwrap();
+    let held = family.hold(hoid::model::SampleTime::HUNDREDTH).unwrap();
     let list = |c: &[f64]| c.iter().map(f64::to_string).collect::<Vec<_>>().join(",");
     let (f, b, nk) = (list(&held.f), list(&held.b), held.nk.to_string());
     let arguments = ["convert", "--f", &f, "--b", &b, "--nk", &nk, "--sample-time", "0.01"];

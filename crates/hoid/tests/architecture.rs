@@ -69,20 +69,7 @@ const ALLOWED: [(&str, &[&str]); 18] = [
             "hoid-report",
         ],
     ),
-    (
-        "hoid-cli",
-        &[
-            "hoid-model",
-            "hoid-ident",
-            "hoid-sim",
-            "hoid-io",
-            "hoid-study",
-            "hoid-thesis",
-            "hoid-track",
-            "hoid-report",
-            "hoid-lab",
-        ],
-    ),
+    ("hoid-cli", &["hoid", "hoid-lab"]),
     (
         "hoid-python",
         &[

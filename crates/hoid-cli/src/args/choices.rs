@@ -1,7 +1,7 @@
 //! Choices of the library as the command line reads them: by their own names.
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
-use hoid_model::NamedChoice;
+use hoid::model::NamedChoice;
 
 /// One of some choices of the library, by its name.
 pub fn choice_of<T: NamedChoice + Send + Sync>(choices: &'static [T]) -> impl TypedValueParser<Value = T> {

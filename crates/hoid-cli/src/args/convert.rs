@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use hoid_io::readable_endings;
-use hoid_model::{ContinuousTransferFunction, discretise};
+use hoid::io::readable_endings;
+use hoid::model::{ContinuousTransferFunction, discretise};
 
 use crate::orders::parse_numbers;
 

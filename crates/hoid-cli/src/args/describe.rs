@@ -3,9 +3,9 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use hoid_ident::frequency::USUAL_EXCITATIONS;
-use hoid_io::readable_endings;
-use hoid_model::ContinuousTransferFunction;
+use hoid::ident::frequency::USUAL_EXCITATIONS;
+use hoid::io::readable_endings;
+use hoid::model::ContinuousTransferFunction;
 
 use super::{
     figure::FigureArgs,

@@ -3,9 +3,9 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use hoid_io::fmu::FmiVersion;
-use hoid_model::{ContinuousTransferFunction, scenario::Condition};
-use hoid_track::Method;
+use hoid::io::fmu::FmiVersion;
+use hoid::model::{ContinuousTransferFunction, scenario::Condition};
+use hoid::track::Method;
 
 use super::{choices::choice_of, recursion::method_names};
 

@@ -3,9 +3,9 @@
 use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
-use hoid_model::{ContinuousTransferFunction, Form, scenario::Condition};
-use hoid_sim::people::{Plant, RemnantKind};
-use hoid_study::group::SamplingDefect;
+use hoid::model::{ContinuousTransferFunction, Form, scenario::Condition};
+use hoid::sim::people::{Plant, RemnantKind};
+use hoid::study::group::SamplingDefect;
 
 use super::{choices::choice_of, figure::FigureArgs, parse::parse_span, show::ShowArgs};
 

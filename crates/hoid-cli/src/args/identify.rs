@@ -3,13 +3,13 @@
 use std::{ops::RangeInclusive, path::PathBuf};
 
 use clap::Args;
-use hoid_ident::{
+use hoid::ident::{
     Focus, InitialState, IvMethod, SearchMethod, estimator_setting, estimators,
     order_selection::Criterion,
     settings::{Kind, MethodSpec},
 };
-use hoid_io::{readable_endings, writable_endings};
-use hoid_model::{ContinuousTransferFunction, Form, Structure, remnant::RemnantDiscretisation};
+use hoid::io::{readable_endings, writable_endings};
+use hoid::model::{ContinuousTransferFunction, Form, Structure, remnant::RemnantDiscretisation};
 
 use super::{
     choices::{by_name, choice_of},

@@ -1,8 +1,8 @@
 //! The options by which `hoid identify` and `hoid track` read records and prepare them.
 
 use clap::Args;
-use hoid_io::{Offset, QualityIssueKind, Scaling};
-use hoid_model::{Detrend, FaultHandling};
+use hoid::io::{Offset, QualityIssueKind, Scaling};
+use hoid::model::{Detrend, FaultHandling};
 
 use super::choices::choice_of;
 
@@ -116,12 +116,12 @@ fn parse_unit(text: &str) -> Result<(String, String), String> {
 
 pub fn parse_scale(text: &str) -> Result<(String, Scaling), String> {
     let (name, value) = pair(text)?;
-    Ok((name, value.parse().map_err(|e: hoid_io::IoError| e.to_string())?))
+    Ok((name, value.parse().map_err(|e: hoid::io::IoError| e.to_string())?))
 }
 
 fn parse_offset(text: &str) -> Result<(String, Offset), String> {
     let (name, value) = pair(text)?;
-    Ok((name, value.parse().map_err(|e: hoid_io::IoError| e.to_string())?))
+    Ok((name, value.parse().map_err(|e: hoid::io::IoError| e.to_string())?))
 }
 
 #[cfg(test)]

@@ -6,10 +6,10 @@ use clap::{
     Args,
     builder::{PossibleValue, PossibleValuesParser, TypedValueParser},
 };
-use hoid_ident::{order_selection::Criterion, settings::MethodSpec};
-use hoid_io::{Scaling, readable_endings, writable_endings};
-use hoid_model::{ContinuousTransferFunction, Structure};
-use hoid_track::Method;
+use hoid::ident::{order_selection::Criterion, settings::MethodSpec};
+use hoid::io::{Scaling, readable_endings, writable_endings};
+use hoid::model::{ContinuousTransferFunction, Structure};
+use hoid::track::Method;
 
 use super::{
     ReadArgs, choices::choice_of, figure::FigureArgs, parse_span, settings::SettingArgs, show::ShowArgs, udp::UdpPlaces,

@@ -4,8 +4,8 @@
 use std::collections::BTreeSet;
 
 use clap::{Arg, ArgAction, ArgMatches, Args, Command, FromArgMatches};
-use hoid_ident::settings::{Kind, MethodSpec, Setting};
-use hoid_track::Method;
+use hoid::ident::settings::{Kind, MethodSpec, Setting};
+use hoid::track::Method;
 
 use super::choices::by_name;
 

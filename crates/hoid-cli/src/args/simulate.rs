@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use hoid_model::{
+use hoid::model::{
     remnant_gain::NoiseDefinition,
     scenario::{Condition, Realisation},
 };

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
-use hoid_study::Shard;
+use hoid::study::Shard;
 
 #[derive(Debug, Subcommand)]
 pub enum StudyCommand {

@@ -1,12 +1,12 @@
 //! `hoid convert`: discrete coefficients to operator parameters, back, and any transfer function to
 //! discrete time.
 
-use hoid_ident::family::family_of_polynomials;
-use hoid_model::{
+use hoid::ident::family::family_of_polynomials;
+use hoid::model::{
     ContinuousTransferFunction, DiscreteOperator, GainUnit, OperatorParameters, Orders, PolynomialModel, SampleTime,
     Structure, discretise::discretise, second_order::HeldSecondOrder, uncertainty::OperatorEstimate,
 };
-use hoid_report::numbers;
+use hoid::report::numbers;
 use serde_json::{Map, Value, json};
 
 use crate::{args::ConvertArgs, error::CliError, family_operator, json, output, text};

@@ -3,16 +3,16 @@
 
 use std::path::PathBuf;
 
-use hoid_ident::{Choice, Estimator, Fit, choose_orders, order_selection};
-use hoid_io::{make_directory, write_record};
-use hoid_model::{
+use hoid::ident::{Choice, Estimator, Fit, choose_orders, order_selection};
+use hoid::io::{make_directory, write_record};
+use hoid::model::{
     GainUnit, Record, Structure,
     scenario::{Condition, Scenario},
     uncertainty::OperatorEstimate,
 };
-use hoid_report::{BatchLine, ModelSection, Report, TraceSection, TrackReport, known_operator, numbers, write_report};
-use hoid_sim::{RunSeed, Simulator};
-use hoid_track::{Method, OPERATOR_COLUMNS, StartAt, Trace, TrackOptions, track};
+use hoid::report::{BatchLine, ModelSection, Report, TraceSection, TrackReport, known_operator, numbers, write_report};
+use hoid::sim::{RunSeed, Simulator};
+use hoid::track::{Method, OPERATOR_COLUMNS, StartAt, Trace, TrackOptions, track};
 
 use crate::{
     args::DemoArgs,

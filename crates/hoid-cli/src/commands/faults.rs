@@ -1,8 +1,8 @@
 //! Faults of recorded data, looked for and mended before a fit: what was done stands in the account
 //! of each record, on its page, in its JSON and in its report.
 
-use hoid_ident::faults::mend;
-use hoid_model::{FaultHandling, Finding, Record, Verdict};
+use hoid::ident::faults::mend;
+use hoid::model::{FaultHandling, Finding, Record, Verdict};
 
 use super::reading::{Account, ReadAll};
 use crate::error::CliError;

@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use hoid_io::write_atomically;
-use hoid_report::figures::{FigureFormat, with_width_mm};
+use hoid::io::write_atomically;
+use hoid::report::figures::{FigureFormat, with_width_mm};
 
 use crate::{error::CliError, output};
 

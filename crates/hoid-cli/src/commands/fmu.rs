@@ -5,14 +5,14 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use hoid_io::{
+use hoid::io::{
     AnyScenario, IoError,
     fmu::{FmiVersion, FmuKind, FmuSettings, FmuStart, Library, write_fmu},
     is_fit_file, parse_any_scenario, parse_fit, read_text,
 };
-use hoid_model::SampleTime;
-use hoid_sim::{FamilyOperatorRun, FamilySimulator, RunSeed, Simulator};
-use hoid_track::Method;
+use hoid::model::SampleTime;
+use hoid::sim::{FamilyOperatorRun, FamilySimulator, RunSeed, Simulator};
+use hoid::track::Method;
 
 use super::places;
 use crate::{

@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
-use hoid_ident::faults::mend;
-use hoid_io::{ColumnSurvey, FileSurvey, ReadOptions, SamplingSurvey, ValueSurvey, read_record, survey};
-use hoid_model::{Fault, FaultHandling};
-use hoid_report::numbers;
+use hoid::ident::faults::mend;
+use hoid::io::{ColumnSurvey, FileSurvey, ReadOptions, SamplingSurvey, ValueSurvey, read_record, survey};
+use hoid::model::{Fault, FaultHandling};
+use hoid::report::numbers;
 use serde_json::{Value, json};
 
 use crate::{args::InfoArgs, error::CliError, json, output, text};

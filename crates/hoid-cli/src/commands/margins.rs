@@ -1,13 +1,13 @@
 //! `hoid margins`: crossover, margins and remnant gains of a scenario.
 
-use hoid_io::AnyScenario;
-use hoid_model::{
+use hoid::io::AnyScenario;
+use hoid::model::{
     FamilyScenario, ModelError,
     margins::{MANUAL_CONTROL_RANGE_RAD_S, margins},
     remnant::HIGHEST_ORDER,
     remnant_gain::NoiseDefinition,
 };
-use hoid_sim::FamilySimulator;
+use hoid::sim::FamilySimulator;
 use serde_json::{Value, json};
 
 use super::scenario::chosen_scenario;

@@ -3,7 +3,7 @@
 
 use std::path::Path;
 
-use hoid_io::{check_output, check_output_directory};
+use hoid::io::{check_output, check_output_directory};
 
 use crate::error::CliError;
 

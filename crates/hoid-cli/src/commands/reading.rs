@@ -5,10 +5,10 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use hoid_io::{
+use hoid::io::{
     NewRate, Preparation, QualityIssue, ReadOptions, ReadRecord, Repair, Step, read_prepared, read_segments,
 };
-use hoid_model::{Fault, Finding, Record, uncertainty::Estimate};
+use hoid::model::{Fault, Finding, Record, uncertainty::Estimate};
 
 use crate::{
     args::{MaskArgs, ReadArgs},

@@ -2,7 +2,7 @@
 
 use std::sync::atomic::Ordering;
 
-use hoid_thesis::{
+use hoid::thesis::{
     ThesisError,
     reproduction::{CLAIMS, Reproduction, ReproductionEvent, items, reproduce},
 };

@@ -1,7 +1,7 @@
 //! The scenario of a command that simulates.
 
-use hoid_io::{AnyScenario, read_any_scenario};
-use hoid_model::scenario::Scenario;
+use hoid::io::{AnyScenario, read_any_scenario};
+use hoid::model::scenario::Scenario;
 
 use crate::{args::ScenarioChoice, error::CliError};
 

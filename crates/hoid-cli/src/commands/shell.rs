@@ -4,7 +4,7 @@
 use clap::Command;
 use clap_complete::generate;
 use clap_mangen::Man;
-use hoid_io::{make_directory, write_atomically};
+use hoid::io::{make_directory, write_atomically};
 
 use crate::{
     args::{self, CompletionsArgs, ManArgs},

@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
-use hoid_io::{AnyScenario, write_record, write_record_csv};
-use hoid_model::{FamilyScenario, Record, SampleTime, scenario::Scenario};
-use hoid_report::numbers;
-use hoid_sim::{FamilySimulator, RunSeed, Simulator};
+use hoid::io::{AnyScenario, write_record, write_record_csv};
+use hoid::model::{FamilyScenario, Record, SampleTime, scenario::Scenario};
+use hoid::report::numbers;
+use hoid::sim::{FamilySimulator, RunSeed, Simulator};
 
 use super::{places, scenario::chosen_scenario};
 use crate::{args::SimulateArgs, error::CliError, output};

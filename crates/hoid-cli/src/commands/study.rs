@@ -8,8 +8,8 @@ use std::{
     },
 };
 
-use hoid_study::{Outcome, Plan, Progress, RunOptions, StudyError, merge, plan_schema, run};
-use hoid_thesis::plans::{find as find_plan, named_plans};
+use hoid::study::{Outcome, Plan, Progress, RunOptions, StudyError, merge, plan_schema, run};
+use hoid::thesis::plans::{find as find_plan, named_plans};
 use serde_json::json;
 
 use crate::{
@@ -50,7 +50,7 @@ fn run_plan(args: &StudyRunArgs) -> Result<(), CliError> {
         plan = plan.with_replications(replications)?;
     }
     if !args.resume {
-        hoid_io::check_output_directory(&args.out, &[])?;
+        hoid::io::check_output_directory(&args.out, &[])?;
     }
     let options = RunOptions {
         shard: args.shard,
@@ -189,7 +189,7 @@ fn description(plan: &Plan) -> String {
             text.push_str(&format!("  ... and {} more\n", entries.len() - MOST));
         }
     };
-    let of_cell = |cell: &hoid_study::plan::Cell| {
+    let of_cell = |cell: &hoid::study::plan::Cell| {
         let axes: Vec<String> = cell
             .axes
             .iter()

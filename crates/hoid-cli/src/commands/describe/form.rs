@@ -1,11 +1,11 @@
 //! A description as a page for people and as an object for programs.
 
-use hoid_ident::{
+use hoid::ident::{
     MarginEstimates,
     frequency::{Description, Realisation},
 };
-use hoid_model::{ContinuousTransferFunction, Record, uncertainty::Estimate};
-use hoid_report::numbers;
+use hoid::model::{ContinuousTransferFunction, Record, uncertainty::Estimate};
+use hoid::report::numbers;
 use serde_json::{Map, Value, json};
 
 use crate::{commands::reading::Account, json, text};

@@ -2,10 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
-use hoid_ident::frequency::{Description, DescriptionOptions, describe_runs};
-use hoid_io::Offset;
-use hoid_model::{Detrend, Record};
-use hoid_report::figures::describing;
+use hoid::ident::frequency::{Description, DescriptionOptions, describe_runs};
+use hoid::io::Offset;
+use hoid::model::{Detrend, Record};
+use hoid::report::figures::describing;
 
 use super::form::Described;
 use crate::{

@@ -1,9 +1,9 @@
 //! A finished group as a page for people and as an object for programs.
 
-use hoid_ident::family::Parameter;
-use hoid_model::VerdictLevel;
-use hoid_report::{PeopleTable, people_table};
-use hoid_study::group::{GroupSummary, Person, RunFailure};
+use hoid::ident::family::Parameter;
+use hoid::model::VerdictLevel;
+use hoid::report::{PeopleTable, people_table};
+use hoid::study::group::{GroupSummary, Person, RunFailure};
 use serde_json::{Map, Value, json};
 
 use crate::{json, text};

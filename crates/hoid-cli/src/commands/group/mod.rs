@@ -5,10 +5,10 @@ mod form;
 
 use std::path::{Path, PathBuf};
 
-use hoid_model::{SampleTime, VerdictLevel};
-use hoid_report::{group_figures, write_group_pages};
-use hoid_sim::people::{Population, Range};
-use hoid_study::{
+use hoid::model::{SampleTime, VerdictLevel};
+use hoid::report::{group_figures, write_group_pages};
+use hoid::sim::people::{Population, Range};
+use hoid::study::{
     RunOptions,
     group::{
         GroupSummary, Known, MANIFEST, Manifest, Pattern, PeopleExperiment, VirtualExperiment, commented, inspect,
@@ -132,7 +132,7 @@ fn write_manifest(args: &GroupInitArgs) -> Result<(), CliError> {
         output::print(&text)?;
         return Ok(());
     }
-    hoid_io::write_atomically(&path, |file| file.write_all(text.as_bytes()))?;
+    hoid::io::write_atomically(&path, |file| file.write_all(text.as_bytes()))?;
     let mut said = format!("{} runs in {}\n", manifest.runs.len(), path.display());
     if !others.is_empty() {
         said.push_str(&format!(
@@ -175,7 +175,7 @@ fn analyse(path: &Path, out: &Path, args: &GroupRunArgs) -> Result<(), CliError>
     let manifest = Manifest::read(&path)?;
     // What goes on writes no manifest.
     if !args.resume {
-        hoid_io::check_output_directory(out, &[&path])?;
+        hoid::io::check_output_directory(out, &[&path])?;
     }
     let base = path.parent().map_or_else(|| PathBuf::from("."), Path::to_path_buf);
     let runs = manifest.runs.iter().filter(|run| run.counts).count();

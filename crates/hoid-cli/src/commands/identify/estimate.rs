@@ -1,11 +1,11 @@
 //! From the options of `hoid identify` to a fit.
 
-use hoid_ident::{
+use hoid::ident::{
     Choice, Estimator, Fit, Focus, GreyBox, GreyBoxFit, InstrumentalVariable, Instruments, Loss, SearchMethod,
     SearchOptions, estimators,
     order_selection::{OrderRanges, fit_or_choose},
 };
-use hoid_model::{Record, Structure};
+use hoid::model::{Record, Structure};
 
 use crate::{
     args::{IdentifyArgs, ModelKind, estimators_with, flag},

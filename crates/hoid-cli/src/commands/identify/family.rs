@@ -2,15 +2,15 @@
 
 use std::path::Path;
 
-use hoid_ident::{
+use hoid::ident::{
     IdentError, SearchOptions,
     family::{FamilyEstimator, HIGHEST_NOISE_ORDER, OperatorPrior},
     frequency::Description,
     judgement::second_opinion,
 };
-use hoid_io::{IoError, is_fit_file, read_fit};
-use hoid_model::{Detrend, Record, VerdictLevel, operator_family::Coordinate};
-use hoid_report::{
+use hoid::io::{IoError, is_fit_file, read_fit};
+use hoid::model::{Detrend, Record, VerdictLevel, operator_family::Coordinate};
+use hoid::report::{
     ModelSection, Picture, Report,
     figures::{ModelCurve, describing},
     write_report,
@@ -247,8 +247,8 @@ fn settings(args: &IdentifyArgs, estimator: &FamilyEstimator) -> Vec<(String, St
 fn curves(found: &Found<'_>, described: &Description) -> Vec<ModelCurve> {
     let operator = &found.fit.operator(0).operator;
     let half = 0.5 * found.fit.sample_time.s();
-    let curve = |name: &str, operator: &hoid_model::FamilyOperator| {
-        let turn = |omega: f64| hoid_model::Complex64::from_polar(1.0, -omega * half);
+    let curve = |name: &str, operator: &hoid::model::FamilyOperator| {
+        let turn = |omega: f64| hoid::model::Complex64::from_polar(1.0, -omega * half);
         ModelCurve::over(described, name, operator.tau_e_s() + half, |omega| {
             operator.response(omega) * turn(omega)
         })

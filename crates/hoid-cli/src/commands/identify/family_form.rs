@@ -1,6 +1,6 @@
 //! The operator of a person, shown to people and to programs.
 
-use hoid_ident::{
+use hoid::ident::{
     MarginEstimates,
     family::{
         AgreementMethod, AgreementPair, AgreementRow, ClusterKind, FamilyFit, FormFigures, LoopMeasures,
@@ -8,8 +8,8 @@ use hoid_ident::{
     },
     validation::GoodnessOfFit,
 };
-use hoid_model::{ContinuousTransferFunction, FamilyOperator, GainUnit, Record, uncertainty::Estimate};
-use hoid_report::{Answer, AnswerRow, numbers, sentence};
+use hoid::model::{ContinuousTransferFunction, FamilyOperator, GainUnit, Record, uncertainty::Estimate};
+use hoid::report::{Answer, AnswerRow, numbers, sentence};
 use serde_json::{Map, Value, json};
 
 use crate::{
@@ -246,7 +246,7 @@ impl Found<'_> {
         ));
         page.push_str(&format!("Search: {}.\n", fit.termination));
         let entries = fit.prior.entries();
-        let entry = |e: &hoid_ident::family::ParameterPrior| {
+        let entry = |e: &hoid::ident::family::ParameterPrior| {
             format!(
                 "{} = {} within a factor of {:.2}",
                 e.parameter,

@@ -1,7 +1,7 @@
 //! The level of recorded data: one constant of u a record, estimated with the fit.
 
-use hoid_ident::level::may_have_level;
-use hoid_model::{Detrend, Record, uncertainty::Estimate};
+use hoid::ident::level::may_have_level;
+use hoid::model::{Detrend, Record, uncertainty::Estimate};
 
 use crate::{args::IdentifyArgs, commands::reading::Account};
 

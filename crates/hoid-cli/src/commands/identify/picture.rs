@@ -1,12 +1,12 @@
 //! The figure of a fit: the model through the describing function of the records, where they have a
 //! periodic excitation; else its frequency response with the bands of its coefficients.
 
-use hoid_ident::{
+use hoid::ident::{
     Fit,
     frequency::{Description, DescriptionOptions, describe_runs},
 };
-use hoid_model::{Detrend, Record};
-use hoid_report::{
+use hoid::model::{Detrend, Record};
+use hoid::report::{
     Picture,
     figures::{BodeModel, ModelCurve, bode, describing},
 };

@@ -2,16 +2,16 @@
 
 use std::path::{Path, PathBuf};
 
-use hoid_ident::{
+use hoid::ident::{
     Fit, MarginEstimates,
     judgement::second_opinion,
     level::without_level,
     validation::{GoodnessOfFit, nrmse_fit, vaf},
 };
-use hoid_model::{
+use hoid::model::{
     ContinuousTransferFunction, Detrend, GainUnit, NotConvertible, Record, margins::MANUAL_CONTROL_RANGE_RAD_S,
 };
-use hoid_report::{Answer, ModelSection, Report, known_operator, write_report};
+use hoid::report::{Answer, ModelSection, Report, known_operator, write_report};
 
 use super::{
     estimate::{self, Estimated, FittedBy},

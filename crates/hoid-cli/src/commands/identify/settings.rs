@@ -7,7 +7,7 @@ pub fn common_settings(args: &IdentifyArgs, with_input: bool) -> Vec<(String, St
     let mut list = vec![(
         "initial state".to_owned(),
         args.initial_state
-            .map_or("auto", hoid_ident::InitialState::name)
+            .map_or("auto", hoid::ident::InitialState::name)
             .to_owned(),
     )];
     list.extend(reading::settings(&args.read, with_input));

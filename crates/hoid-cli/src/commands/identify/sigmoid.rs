@@ -1,13 +1,13 @@
 //! `hoid identify --structure time-varying`: the operator whose gains change once.
 
-use hoid_ident::{
+use hoid::ident::{
     ChangedOperator, InitialState, SigmoidChange, SigmoidFit,
     judgement::second_opinion,
     validation::{LjungBox, whiteness},
 };
-use hoid_io::write_record;
-use hoid_model::{Channel, Form, GainUnit, Record, Verdict};
-use hoid_report::numbers;
+use hoid::io::write_record;
+use hoid::model::{Channel, Form, GainUnit, Record, Verdict};
+use hoid::report::numbers;
 use serde_json::{Map, Value, json};
 
 use super::{estimate::search, family::prior, level, settings::common_settings};

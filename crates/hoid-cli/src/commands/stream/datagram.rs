@@ -22,8 +22,8 @@
 //!
 //! What is not known is NaN.
 
-use hoid_model::{SampleTime, VerdictLevel, uncertainty::Estimate};
-use hoid_track::{Change, Live};
+use hoid::model::{SampleTime, VerdictLevel, uncertainty::Estimate};
+use hoid::track::{Change, Live};
 
 use super::lines::Read;
 

@@ -1,7 +1,7 @@
 //! One line of the output.
 
-use hoid_model::{Finding, VerdictLevel, uncertainty::Estimate};
-use hoid_track::{Change, Live, TrackFault, Tracker};
+use hoid::model::{Finding, VerdictLevel, uncertainty::Estimate};
+use hoid::track::{Change, Live, TrackFault, Tracker};
 use serde::{Serialize, Serializer};
 use serde_json::Value;
 

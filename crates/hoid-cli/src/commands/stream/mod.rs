@@ -24,7 +24,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use hoid_model::SampleTime;
+use hoid::model::SampleTime;
 
 use crate::{args::StreamArgs, error::CliError, interrupt, output, recursion::Plan};
 use lines::Lines;

@@ -2,9 +2,9 @@
 
 use std::collections::VecDeque;
 
-use hoid_ident::Choice;
-use hoid_model::{Finding, SampleTime};
-use hoid_track::{Change, Live, LiveOutcome, Sample, TrackFault, TrackOptions};
+use hoid::ident::Choice;
+use hoid::model::{Finding, SampleTime};
+use hoid::track::{Change, Live, LiveOutcome, Sample, TrackFault, TrackOptions};
 
 use super::{
     clock::{Arrival, Clock, LONGEST_GAP_S},

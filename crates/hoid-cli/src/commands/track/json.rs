@@ -1,8 +1,8 @@
 //! A trace as JSON.
 
-use hoid_ident::Fit;
-use hoid_model::{Record, remnant::RemnantDiscretisation};
-use hoid_track::NoCrossover;
+use hoid::ident::Fit;
+use hoid::model::{Record, remnant::RemnantDiscretisation};
+use hoid::track::NoCrossover;
 use serde_json::{Map, Value, json};
 
 use super::result::Tracked;

@@ -1,8 +1,8 @@
 //! A summary of a trace for people.
 
-use hoid_model::{GainUnit, uncertainty::Estimate};
-use hoid_report::numbers;
-use hoid_track::value_of;
+use hoid::model::{GainUnit, uncertainty::Estimate};
+use hoid::report::numbers;
+use hoid::track::value_of;
 
 use super::result::Tracked;
 use crate::{error::CliError, text};

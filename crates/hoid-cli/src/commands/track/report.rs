@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use hoid_report::{
+use hoid::report::{
     BatchFit, BatchLine, TraceSection, TrackReport, batch_fit, default_batch_fits, figures::trace_panels, write_report,
 };
 

@@ -2,10 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use hoid_ident::{Choice, Fit};
-use hoid_io::{ColumnValues, OutputColumn, OutputTable};
-use hoid_model::{NotConvertible, Record, Verdict, uncertainty::OperatorEstimate};
-use hoid_track::{NoCrossover, Trace};
+use hoid::ident::{Choice, Fit};
+use hoid::io::{ColumnValues, OutputColumn, OutputTable};
+use hoid::model::{NotConvertible, Record, Verdict, uncertainty::OperatorEstimate};
+use hoid::track::{NoCrossover, Trace};
 
 use super::errors::relative_errors;
 use crate::commands::reading::Account;

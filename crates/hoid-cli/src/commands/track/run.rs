@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
-use hoid_io::{check_table_path, write_table};
-use hoid_model::Record;
-use hoid_track::{StartAt, TrackOptions, track, usual_start_span};
+use hoid::io::{check_table_path, write_table};
+use hoid::model::Record;
+use hoid::track::{StartAt, TrackOptions, track, usual_start_span};
 
 use super::{report, result::Tracked};
 use crate::{
