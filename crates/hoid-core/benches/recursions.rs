@@ -12,6 +12,7 @@ use hoid_core::{
     error_bars::{ErrorBars, NoErrorBars},
     innovation_variance::InnovationVariance,
     physical::{PhysicalModel, PhysicalRpem},
+    population::{PopulationFilter, basis::Basis, errors_needed, usual::Usual},
     predictor::Regressor,
     recursion::Stable,
     rls::Rls,
@@ -199,6 +200,21 @@ fn plain(data: &[(f64, f64)], history: &mut Vec<[f64; 4]>) {
     }
 }
 
+/// A person in the basis that people share, at its usual settings.
+fn person() -> PopulationFilter<Vec<f64>> {
+    let (usual, ts) = (Usual::with_delay(0.285), 0.01);
+    let errors = vec![0.0; errors_needed(ts)];
+    PopulationFilter::new(Basis::new(usual.point, ts).unwrap(), usual.prior(ts), errors).unwrap()
+}
+
+/// Goes on with a person: from their beginning with all rivals at first, or from where the rivals are gone.
+fn follow(mut person: PopulationFilter<Vec<f64>>, data: &[(f64, f64)], history: &mut Vec<f64>) {
+    history.clear();
+    for &(x, u) in data {
+        history.push(person.step(x, u).innovation);
+    }
+}
+
 fn bench(c: &mut Criterion) {
     let data = data();
     let data = black_box(data.as_slice());
@@ -248,6 +264,18 @@ fn bench(c: &mut Criterion) {
     let mut h32: Vec<[f64; 32]> = Vec::with_capacity(SAMPLES);
     group.bench_function("rls 32", |b| {
         b.iter(|| rls(any(16, 16, 0, 0), scalar(), data, &mut h32))
+    });
+    let mut innovations: Vec<f64> = Vec::with_capacity(SAMPLES);
+    // The rivals of the first 40 s are among these 82 s, and not among the next.
+    group.bench_function("population, from the beginning", |b| {
+        b.iter(|| follow(person(), data, &mut innovations))
+    });
+    let mut later = person();
+    data.iter().for_each(|&(x, u)| {
+        later.step(x, u);
+    });
+    group.bench_function("population, without rivals", |b| {
+        b.iter(|| follow(later.clone(), data, &mut innovations))
     });
     group.finish();
 }
