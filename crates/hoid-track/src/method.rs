@@ -84,6 +84,11 @@ pub(crate) trait RecursiveMethod: Settings {
         false
     }
 
+    /// Lag of the basis in which it estimates gains, s; `None` without one.
+    fn lag_of_basis_s(&self) -> Option<f64> {
+        None
+    }
+
     /// True where the two-sided estimate of a recorded run was asked for.
     fn smooths(&self) -> bool {
         false

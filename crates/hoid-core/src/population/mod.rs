@@ -62,4 +62,4 @@ mod sizes;
 pub use filter::{PopulationFilter, errors_needed};
 pub use operator::through;
 pub use prior::PopulationPrior;
-pub use sizes::{DRIFTS, FORMS, GAINS, HELD, LARGEST_ORDER, LINEAR, PARAMETERS, RIVALS, STATES};
+pub use sizes::{DRIFTS, FORMS, GAINS, HELD, LARGEST_ORDER, LINEAR, PARAMETERS, RIVALS, SIGNALS, STATES};

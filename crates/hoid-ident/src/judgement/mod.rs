@@ -19,6 +19,7 @@
 //! |---|---|
 //! | `residuals` | how far residuals are from white; also for the family |
 //! | `constancy` | whether parameters change; also for the family |
+//! | `left_response` | whether a response is left that a model does not have |
 //! | `operator` | gains, poles and delay of an operator |
 //! | `operator_step` | what a stretch of data says against an operator |
 //! | `second_opinion` | fits to records that no single sample can carry |
@@ -27,11 +28,13 @@
 pub(crate) mod constancy;
 mod fit;
 mod grey_box;
+mod left_response;
 mod operator;
 mod operator_step;
 pub(crate) mod residuals;
 pub mod second_opinion;
 mod sigmoid;
 
+pub use left_response::{LeftResponse, left_response};
 pub use operator::{gain_findings, is_open, leads_backwards, neuromuscular_finding, pole_findings};
 pub use operator_step::{OperatorStep, operator_step};

@@ -26,14 +26,16 @@
 //! | `idle-head` | a head in which neither e nor u moves: left out of the start span (a note), or in it (a doubt) |
 //! | `supposed` | omega_nm, zeta_nm or tau_e of the last row are what was supposed before the record (a note) |
 //! | `not-followed` | what the last seconds of the record say against the last row |
+//! | `structure` | errors of before say more of u than the operator at the end does |
 //! | `not-finite` | an estimate that is no number |
 //!
 //! `operators` judges the operators of the rows, `recording` what the guard, the head and the end of the
-//! record say, `moment` one sample.
+//! record say, `structure` the form of the operator, `moment` one sample.
 
 mod moment;
 mod operators;
 mod recording;
+mod structure;
 #[cfg(test)]
 mod tests;
 
@@ -77,6 +79,7 @@ impl Trace {
         all.extend(self.idle_finding(record));
         all.extend(self.supposed_finding());
         all.extend(self.not_followed(record));
+        all.extend(self.missed_structure(record));
         Ok(Verdict::of(all))
     }
 

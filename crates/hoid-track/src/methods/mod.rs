@@ -200,6 +200,11 @@ impl Method {
         self.inner().starts_itself()
     }
 
+    /// Lag of the basis in which it estimates gains, s; `None` for a method without one.
+    pub fn lag_of_basis_s(&self) -> Option<f64> {
+        self.inner().lag_of_basis_s()
+    }
+
     /// Its memories, where it has some.
     pub fn memories(&self) -> Option<&MemoryOptions> {
         self.inner().memories()

@@ -150,6 +150,11 @@ impl RecursiveMethod for PopulationOptions {
         (!known).then_some([spread[0] * point.omega, spread[1] * point.zeta, spread[2]])
     }
 
+    fn lag_of_basis_s(&self) -> Option<f64> {
+        let Beginning { point, .. } = Beginning::of(&self.prior, 0.0, SampleTime::HUNDREDTH).ok()?;
+        Some(point.lag)
+    }
+
     fn person_prior(&self) -> Option<&PersonPrior> {
         Some(&self.prior)
     }

@@ -1,0 +1,135 @@
+//! Whether the operator of the last row has the structure that the person has.
+//!
+//! The numerator, corrections of the poles and of the delay, and a level are what the basis of people can
+//! estimate; together they span the six signals of its filter. Whether the errors before, since the last
+//! change, say anything more of u is the question ([`hoid_ident::judgement::left_response()`]).
+
+use hoid_core::population::{
+    SIGNALS,
+    basis::{Basis, Point, Signals},
+};
+use hoid_ident::judgement::{LeftResponse, left_response};
+use hoid_model::{Finding, Record};
+
+use crate::{guard::GuardKind, trace::Trace};
+
+/// Probability below which a structure is missed.
+const UNLIKELY: f64 = 1e-3;
+/// Seconds that are looked at, at most, and at the beginning not: the filter is at rest there.
+const LONGEST_S: f64 = 120.0;
+const SETTLING_S: f64 = 10.0;
+
+impl Trace {
+    /// What the record says against the structure.
+    pub(super) fn missed_structure(&self, record: &Record) -> Option<Finding> {
+        let found = self.left_response(record)?;
+        (found.p_value < UNLIKELY).then(|| {
+            Finding::doubt(
+                "structure",
+                format!(
+                    "structure missed: the errors before say more of u than the operator at the end does, with any gains \
+                     and corrections (p = {:.1e}, {:.1} % of the innovations); its parameters are those of the nearest \
+                     person that the method knows",
+                    found.p_value,
+                    100.0 * found.share
+                ),
+            )
+        })
+    }
+
+    /// The test itself, where the method has a basis.
+    pub(super) fn left_response(&self, record: &Record) -> Option<LeftResponse> {
+        let row = self.len().checked_sub(1)?;
+        let lag = self.options().method.lag_of_basis_s()?;
+        let operator = self.operator(row).ok()?;
+        let ts = self.sample_time().s();
+        let point = Point {
+            tau: operator.tau_e_s.value + 0.5 * ts,
+            omega: operator.omega_nm_rad_s.value,
+            zeta: operator.zeta_nm.value,
+            lag,
+        };
+        let end = self.times_s()[row] + ts;
+        let changed = self.changes().last().map(|(t, change)| t - change.seconds_ago);
+        // What was no tracking is in the filter until it has faded.
+        let outliers = [GuardKind::Outlier, GuardKind::Step, GuardKind::Outdone];
+        let hostile = self.faults().iter().filter(|fault| !outliers.contains(&fault.kind));
+        let rest = hostile.fold(record.time_s(0), |last, fault| last.max(fault.to_s));
+        let from = (rest + SETTLING_S)
+            .max(changed.unwrap_or(f64::MIN))
+            .max(end - LONGEST_S);
+        let first = ((from - record.time_s(0)) / ts).round().max(0.0) as usize;
+        left_response(&signals(point, record)?, record.input(), record.output(), first, ts)
+    }
+}
+
+/// The signals of the basis of a point over a record.
+fn signals(point: Point, record: &Record) -> Option<Vec<Vec<f64>>> {
+    let mut basis = Basis::new(point, record.sample_time().s())?;
+    let (e, delay) = (record.input(), basis.delay());
+    let error = |k: usize, ago: usize| k.checked_sub(ago).map_or(0.0, |k| e[k]);
+    let rows: Vec<Signals> = (0..e.len())
+        .map(|k| basis.step([0, 1, 2].map(|j| error(k, delay + j))))
+        .collect();
+    let column = |j: usize| rows.iter().map(|z| z[j]).collect();
+    Some((0..SIGNALS).map(column).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use hoid_model::{
+        Channel,
+        scenario::{Condition, Scenario},
+    };
+    use hoid_sim::{RunSeed, Simulator};
+
+    use super::*;
+    use crate::{Method, TrackOptions, track};
+
+    fn run(replication: u64) -> Record {
+        let simulator = Simulator::new(&Scenario::condition(Condition::C1)).unwrap();
+        let seed = RunSeed {
+            seed: 4400,
+            replication,
+            ..RunSeed::default()
+        };
+        simulator.run(seed, false).unwrap()
+    }
+
+    /// The same with another response to the error on its way: this share of K_e, so many samples later.
+    fn with_echo(record: &Record, share: f64, later: usize) -> Record {
+        let e = record.input();
+        let echo = |k: usize| k.checked_sub(later).map_or(0.0, |k| share * 0.09 * e[k]);
+        let u = (0..e.len()).map(|k| record.output()[k] + echo(k)).collect();
+        let channel = |name: &str, values| Channel::new(name, "deg", values);
+        Record::new(record.sample_time(), channel("e", e.to_vec()), channel("u", u)).unwrap()
+    }
+
+    fn found(record: &Record) -> LeftResponse {
+        let options = TrackOptions::usual(Method::population(), 29);
+        track(record, &options, 50).unwrap().left_response(record).unwrap()
+    }
+
+    #[test]
+    fn chance_is_chance_and_another_response_is_seen() {
+        // Of 30 people of the right form 1.5 are below .05 by chance, standard error 1.2.
+        let clean: Vec<f64> = (0..30).map(|i| found(&run(i)).p_value).collect();
+        assert!(clean.iter().filter(|p| **p < 0.05).count() <= 6, "{clean:?}");
+        assert!(clean.iter().all(|p| *p > UNLIKELY), "{clean:?}");
+        // A third of the gain once more, .85 s behind the error: far beyond the delay and its corrections.
+        let echoes: Vec<f64> = (0..6).map(|i| found(&with_echo(&run(i), 0.33, 85)).p_value).collect();
+        assert!(echoes.iter().filter(|p| **p < UNLIKELY).count() >= 5, "{echoes:?}");
+    }
+
+    #[test]
+    fn too_little_says_nothing() {
+        let record = run(0).span(0.0, 25.0).unwrap();
+        let trace = track(&record, &TrackOptions::usual(Method::population(), 29), 50).unwrap();
+        assert_eq!(trace.left_response(&record), None);
+        // A method without this basis is not asked.
+        let record = run(0);
+        let trace = track(&record, &TrackOptions::usual(Method::rls(), 29), 50).unwrap();
+        assert_eq!(trace.missed_structure(&record), None);
+    }
+}
