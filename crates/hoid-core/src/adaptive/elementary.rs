@@ -1,5 +1,10 @@
 //! `ln(1 + x)` and `e^x` without a call, for the density of every hypothesis at every sample.
 
+/// ln 2 in two parts, the first with so few digits that its multiples are exact.
+const LN_2: [f64; 2] = [6.931_471_803_691_238e-1, 1.908_214_929_270_587_7e-10];
+/// Bits of the mantissa of an f64.
+const MANTISSA: u32 = 52;
+
 /// `ln(1 + x)` for x that is not negative, in a third of the time where x is small: with
 /// `z = x/(2 + x)`, `2 (z + z^3/3 + z^5/5 + ...)`, whose next term is below 1e-16 of the first.
 #[inline(always)]
@@ -23,10 +28,17 @@ pub(crate) fn exp(x: f64) -> f64 {
     if x.abs() >= 700.0 || x.is_nan() {
         return libm::exp(x);
     }
-    // Adding and taking away 3/2 2^52 rounds to the nearest whole number.
+    exp_within(x)
+}
+
+/// The same where x is known to be between -700 and 700: without a branch, so that several are computed
+/// side by side.
+#[inline(always)]
+pub(crate) fn exp_within(x: f64) -> f64 {
+    // Adding and taking away 3/2 2^52 rounds to the nearest whole number, which then are the last bits.
     const ROUNDS: f64 = 6_755_399_441_055_744.0;
-    const LN_2: [f64; 2] = [6.931_471_803_691_238e-1, 1.908_214_929_270_587_7e-10];
-    let k = (x * core::f64::consts::LOG2_E + ROUNDS) - ROUNDS;
+    let shifted = x * core::f64::consts::LOG2_E + ROUNDS;
+    let k = shifted - ROUNDS;
     let r = (x - k * LN_2[0]) - k * LN_2[1];
     let mut sum = 1.0 / 6_227_020_800.0;
     for factorial in [
@@ -46,7 +58,37 @@ pub(crate) fn exp(x: f64) -> f64 {
     ] {
         sum = sum * r + 1.0 / factorial;
     }
-    sum * f64::from_bits(((k as i64 + 1023) as u64) << 52)
+    f64::from_bits(sum.to_bits().wrapping_add(shifted.to_bits() << MANTISSA))
+}
+
+/// `ln x` to 1e-15 of the larger of 1 and itself, without a branch: `x = 2^k m` with m between the roots
+/// of 1/2 and 2, `f = m - 1`, `s = f/(2 + f)`, `ln m = f - s (f - R)` with the polynomial R(s) of FDLIBM
+/// (Sun Microsystems, 1993). Of numbers that are not positive, not finite or below the smallest normal one it
+/// makes something finite.
+#[inline(always)]
+pub(crate) fn ln_of_normal(x: f64) -> f64 {
+    const ROOT_OF_HALF: u64 = 0x3fe6_a09e_667f_3bcd;
+    const ONE: u64 = 0x3ff0_0000_0000_0000;
+    // 2^52 with the exponent in its last bits.
+    const WHOLE: u64 = 0x4330_0000_0000_0000;
+    let bits = x.to_bits().wrapping_add(ONE - ROOT_OF_HALF);
+    let k = f64::from_bits((bits >> MANTISSA) | WHOLE) - (4_503_599_627_370_496.0 + 1023.0);
+    let f = f64::from_bits((bits & ((1 << MANTISSA) - 1)) + ROOT_OF_HALF) - 1.0;
+    let s = f / (2.0 + f);
+    let square = s * s;
+    let mut r = 1.479_819_860_511_658_6e-1;
+    for coefficient in [
+        1.531_383_769_920_937_3e-1,
+        1.818_357_216_161_805e-1,
+        2.222_219_843_214_978_4e-1,
+        2.857_142_874_366_239_2e-1,
+        3.999_999_999_940_942e-1,
+        6.666_666_666_666_735e-1,
+    ] {
+        r = r * square + coefficient;
+    }
+    let half = 0.5 * f * f;
+    k * LN_2[0] - ((half - (s * (half + r * square) + k * LN_2[1])) - f)
 }
 
 #[cfg(test)]
@@ -60,6 +102,15 @@ mod tests {
                 let e = libm::exp(x);
                 assert!((super::exp(x) - e).abs() <= 4e-16 * e, "{x}");
             }
+        }
+        for i in -3000..3000 {
+            let x = libm::exp(0.1003 * f64::from(i));
+            let ln = libm::log(x);
+            assert!((super::ln_of_normal(x) - ln).abs() <= 1e-15 * ln.abs().max(1.0), "{x}");
+        }
+        assert_eq!(super::ln_of_normal(1.0), 0.0);
+        for x in [0.0, -1.0, 5e-324, f64::INFINITY, f64::NAN, -f64::NAN] {
+            assert!(super::ln_of_normal(x).is_finite(), "{x}");
         }
         assert_eq!(super::exp(f64::NEG_INFINITY), 0.0);
         assert!(super::exp(f64::NAN).is_nan() && super::log1p(1e300) == libm::log1p(1e300));

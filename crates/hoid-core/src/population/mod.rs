@@ -53,6 +53,7 @@ mod contest;
 mod ends;
 mod filter;
 mod follower;
+mod forms;
 mod kalman;
 mod operator;
 mod place;
