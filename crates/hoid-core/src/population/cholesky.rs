@@ -1,41 +1,42 @@
-//! Solution of positive definite systems in place: `A = L L'`, then two triangular systems.
+//! Solution of positive definite systems in place: `A = U' U`, then two triangular systems.
 
-/// L in the place of the lower triangle of A, n by n with rows of N; false where A is not positive
-/// definite.
+/// U in the place of the upper triangle of A, n by n with rows of N; false where A is not positive
+/// definite. A row is taken out of all below it as soon as it is there: its numbers stand one after another.
 pub(super) fn factor<const N: usize>(a: &mut [[f64; N]; N], n: usize) -> bool {
-    for i in 0..n {
-        for j in 0..=i {
-            let mut sum = a[i][j];
-            for k in 0..j {
-                sum -= a[i][k] * a[j][k];
-            }
-            if i > j {
-                a[i][j] = sum / a[j][j];
-            } else if sum > 0.0 && sum.is_finite() {
-                a[i][i] = libm::sqrt(sum);
-            } else {
-                return false;
+    for k in 0..n {
+        let Some((row, below)) = a[k..n].split_first_mut() else { break };
+        let square = row[k];
+        if !(square > 0.0 && square.is_finite()) {
+            return false;
+        }
+        row[k] = libm::sqrt(square);
+        let share = row[k];
+        row[k + 1..n].iter_mut().for_each(|u| *u /= share);
+        for (j, other) in (k + 1..n).zip(below) {
+            let factor = row[j];
+            for (a, u) in other[j..n].iter_mut().zip(&row[j..n]) {
+                *a -= factor * u;
             }
         }
     }
     true
 }
 
-/// The solution in the place of b, with L of [`factor`].
-pub(super) fn solve<const N: usize>(l: &[[f64; N]; N], n: usize, b: &mut [f64; N]) {
+/// The solution in the place of b, with U of [`factor`].
+pub(super) fn solve<const N: usize>(u: &[[f64; N]; N], n: usize, b: &mut [f64; N]) {
     for i in 0..n {
         let mut sum = b[i];
         for k in 0..i {
-            sum -= l[i][k] * b[k];
+            sum -= u[k][i] * b[k];
         }
-        b[i] = sum / l[i][i];
+        b[i] = sum / u[i][i];
     }
     for i in (0..n).rev() {
         let mut sum = b[i];
         for k in i + 1..n {
-            sum -= l[k][i] * b[k];
+            sum -= u[i][k] * b[k];
         }
-        b[i] = sum / l[i][i];
+        b[i] = sum / u[i][i];
     }
 }
 

@@ -8,7 +8,7 @@ use super::{
     noise::NoiseModel,
     place::Place,
     prior::PopulationPrior,
-    sizes::{GAINS, HELD, LARGEST_ORDER, LINEAR, STATES},
+    sizes::{GAINS, HELD, LARGEST_ORDER, LINEAR, SIGNALS, STATES},
 };
 
 /// Magnitude beyond which the filters are brought to rest.
@@ -143,8 +143,8 @@ impl Follower {
         let (mut y, mut z): (f64, Signals) = (u, *self.place.signals());
         for ((d, u), past) in self.noise.d().iter().zip(past.u).zip(self.place.past()) {
             y += d * u;
-            for (z, past) in z.iter_mut().zip(past) {
-                *z += d * past;
+            for i in 0..SIGNALS {
+                z[i] += d * past[i];
             }
         }
         Whitened {
@@ -266,8 +266,12 @@ impl Follower {
         }
         let weights = self.place.basis().weights(state);
         let left = |u: f64, z: &Signals| {
-            let response: f64 = weights.iter().zip(z).map(|(w, z)| w * z).sum();
-            u - state[GAINS] - response
+            let [mut even, mut odd] = [weights[0] * z[0], weights[1] * z[1]];
+            for i in (2..SIGNALS).step_by(2) {
+                even += weights[i] * z[i];
+                odd += weights[i + 1] * z[i + 1];
+            }
+            u - state[GAINS] - (even + odd)
         };
         let mut v = [0.0; LARGEST_ORDER + 1];
         v[0] = left(u, self.place.signals());

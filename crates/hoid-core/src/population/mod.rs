@@ -56,6 +56,7 @@ mod follower;
 mod forms;
 mod kalman;
 mod operator;
+mod past;
 mod place;
 mod prior;
 mod sizes;

@@ -12,12 +12,17 @@
 use super::{cholesky, sizes::LARGEST_ORDER};
 
 const WIDTH: usize = LARGEST_ORDER + 1;
+/// The same as whole pairs: two products are added at a time.
+const PADDED: usize = WIDTH.next_multiple_of(2);
 /// A number for each lag from zero on.
 pub type Lags = [f64; WIDTH];
 /// Time constants of the remnant that is supposed before anything is known, s.
 const USUAL: [f64; 2] = [0.3, 0.06];
 /// Weight of that supposition: a share of the power of v, in samples.
 const SUPPOSED: f64 = 1e-4;
+
+/// Share of the sums from which on they are scaled anew.
+const FADED: f64 = 0.5;
 
 /// The sums and D.
 #[derive(Debug, Clone, PartialEq)]
@@ -28,13 +33,16 @@ pub struct NoiseModel {
     prior: f64,
     longest: f64,
     shortest: f64,
-    products: [[f64; WIDTH]; WIDTH],
+    /// Upper triangle of the sums over `fade`, in whole pairs. A sample leaves the sums of before as they
+    /// are and counts for more, until the digits would be lost.
+    products: [[f64; PADDED]; PADDED],
+    fade: f64,
     weight: f64,
     samples: f64,
     d: [f64; LARGEST_ORDER],
 }
 
-crate::state!([] NoiseModel { products, weight, samples, d });
+crate::state!([] NoiseModel { products, fade, weight, samples, d });
 
 impl NoiseModel {
     /// Before anything is known. Ts and memory in s. `None` for an order below 2 or above
@@ -53,7 +61,8 @@ impl NoiseModel {
             prior: 1.0 / ts,
             longest: memory / ts,
             shortest: (3.0 / ts).min(memory / ts).max(2.0 * order as f64),
-            products: [[0.0; WIDTH]; WIDTH],
+            products: [[0.0; PADDED]; PADDED],
+            fade: 1.0,
             weight: 0.0,
             samples: 0.0,
             d,
@@ -69,7 +78,7 @@ impl NoiseModel {
         // The memory is half of the samples that were taken.
         let weight = samples.min(self.longest);
         self.samples = 2.0 * weight;
-        self.weight = weight;
+        (self.weight, self.fade) = (weight, 1.0);
         for i in 0..=self.order {
             for j in i..=self.order {
                 self.products[i][j] = weight * lags[j - i];
@@ -101,18 +110,38 @@ impl NoiseModel {
         let memory = (0.5 * self.samples).clamp(self.shortest, self.longest.max(self.shortest));
         let lambda = 1.0 - 1.0 / memory;
         self.weight = lambda * self.weight + 1.0;
-        let n = self.order + 1;
-        for i in 0..n {
-            let a = weight * v[i];
-            for (product, v) in self.products[i][i..n].iter_mut().zip(&v[i..n]) {
-                *product = lambda * *product + a * v;
+        self.fade *= lambda;
+        if self.fade < FADED {
+            self.products.as_flattened_mut().iter_mut().for_each(|p| *p *= self.fade);
+            self.fade = 1.0;
+        }
+        let weight = weight / self.fade;
+        let mut padded = [0.0; PADDED];
+        padded[..WIDTH].copy_from_slice(v);
+        let pairs = self.order / 2 + 1;
+        let v = &padded.as_chunks::<2>().0[..pairs];
+        for (first, rows) in self.products.as_chunks_mut::<2>().0[..pairs].iter_mut().enumerate() {
+            let a = v[first].map(|v| weight * v);
+            let [above, below] = rows.each_mut().map(|row| &mut row.as_chunks_mut::<2>().0[first..pairs]);
+            for ((above, below), v) in above.iter_mut().zip(below).zip(&v[first..]) {
+                for i in 0..2 {
+                    above[i] += a[0] * v[i];
+                }
+                for i in 0..2 {
+                    below[i] += a[1] * v[i];
+                }
             }
         }
     }
 
+    /// The sum of the products of two lags, the first not the larger.
+    fn product(&self, i: usize, j: usize) -> f64 {
+        self.fade * self.products[i][j]
+    }
+
     /// Weight of what is supposed, in the unit of the sums.
     fn ridge(&self) -> f64 {
-        self.prior * self.products[0][0] / self.weight.max(1.0) * SUPPOSED + 1e-12
+        self.prior * self.product(0, 0) / self.weight.max(1.0) * SUPPOSED + 1e-12
     }
 
     /// Cholesky factor of the sums over the lags.
@@ -120,8 +149,8 @@ impl NoiseModel {
         let p = self.order;
         let mut matrix = [[0.0; LARGEST_ORDER]; LARGEST_ORDER];
         for i in 0..p {
-            for j in 0..=i {
-                matrix[i][j] = self.products[j + 1][i + 1];
+            for j in i..p {
+                matrix[i][j] = self.product(i + 1, j + 1);
             }
             matrix[i][i] += self.ridge();
         }
@@ -148,7 +177,7 @@ impl NoiseModel {
         let ridge = self.ridge();
         let mut d = [0.0; LARGEST_ORDER];
         for (i, d) in d.iter_mut().enumerate().take(p) {
-            *d = ridge * self.supposed.get(i).copied().unwrap_or(0.0) - self.products[0][i + 1];
+            *d = ridge * self.supposed.get(i).copied().unwrap_or(0.0) - self.product(0, i + 1);
         }
         let Some(matrix) = self.factor() else { return };
         cholesky::solve(&matrix, p, &mut d);
