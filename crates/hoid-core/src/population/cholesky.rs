@@ -1,42 +1,59 @@
 //! Solution of positive definite systems in place: `A = U' U`, then two triangular systems.
+//!
+//! By rows, whose numbers stand one after another: several columns are made at a time.
+
+/// Columns that are made at a time.
+const WIDE: usize = 4;
 
 /// U in the place of the upper triangle of A, n by n with rows of N; false where A is not positive
-/// definite. A row is taken out of all below it as soon as it is there: its numbers stand one after another.
+/// definite. What is below the diagonal and beyond n is no result.
 pub(super) fn factor<const N: usize>(a: &mut [[f64; N]; N], n: usize) -> bool {
-    for k in 0..n {
-        let Some((row, below)) = a[k..n].split_first_mut() else { break };
-        let square = row[k];
+    for i in 0..n {
+        let (above, below) = a.split_at_mut(i);
+        let Some(row) = below.first_mut() else { return false };
+        let (blocks, rest) = row.as_chunks_mut::<WIDE>();
+        let end = n.div_ceil(WIDE).min(blocks.len());
+        for (b, block) in blocks[..end].iter_mut().enumerate().skip(i / WIDE) {
+            let mut sums = *block;
+            for other in above.iter() {
+                let (factor, other) = (other[i], &other.as_chunks::<WIDE>().0[b]);
+                for (sum, u) in sums.iter_mut().zip(other) {
+                    *sum -= factor * u;
+                }
+            }
+            *block = sums;
+        }
+        for (sum, k) in rest.iter_mut().zip(N / WIDE * WIDE..n) {
+            for other in above.iter() {
+                *sum -= other[i] * other[k];
+            }
+        }
+        let square = row[i];
         if !(square > 0.0 && square.is_finite()) {
             return false;
         }
-        row[k] = libm::sqrt(square);
-        let share = row[k];
-        row[k + 1..n].iter_mut().for_each(|u| *u /= share);
-        for (j, other) in (k + 1..n).zip(below) {
-            let factor = row[j];
-            for (a, u) in other[j..n].iter_mut().zip(&row[j..n]) {
-                *a -= factor * u;
-            }
-        }
+        let pivot = libm::sqrt(square);
+        row[i] = pivot;
+        row[i + 1..n].iter_mut().for_each(|u| *u /= pivot);
     }
     true
 }
 
 /// The solution in the place of b, with U of [`factor`].
 pub(super) fn solve<const N: usize>(u: &[[f64; N]; N], n: usize, b: &mut [f64; N]) {
-    for i in 0..n {
-        let mut sum = b[i];
-        for k in 0..i {
-            sum -= u[k][i] * b[k];
+    for (i, row) in u.iter().enumerate().take(n) {
+        let x = b[i] / row[i];
+        b[i] = x;
+        for (b, u) in b[i + 1..n].iter_mut().zip(&row[i + 1..n]) {
+            *b -= x * u;
         }
-        b[i] = sum / u[i][i];
     }
-    for i in (0..n).rev() {
+    for (i, row) in u.iter().enumerate().take(n).rev() {
         let mut sum = b[i];
-        for k in i + 1..n {
-            sum -= u[i][k] * b[k];
+        for (b, u) in b[i + 1..n].iter().zip(&row[i + 1..n]) {
+            sum -= u * b;
         }
-        b[i] = sum / u[i][i];
+        b[i] = sum / row[i];
     }
 }
 

@@ -141,10 +141,15 @@ impl Follower {
     #[inline(always)]
     pub fn whitened(&self, past: &Past, u: f64) -> Whitened {
         let (mut y, mut z): (f64, Signals) = (u, *self.place.signals());
-        for ((d, u), past) in self.noise.d().iter().zip(past.u).zip(self.place.past()) {
-            y += d * u;
-            for i in 0..SIGNALS {
-                z[i] += d * past[i];
+        let (d, u, before) = (self.noise.padded_d(), past.u, self.place.past());
+        // Four lags at a time.
+        let (d, u, before) = (d.as_chunks::<4>().0, u.as_chunks::<4>().0, before.as_chunks::<4>().0);
+        for ((d, u), before) in d.iter().zip(u).zip(before) {
+            for k in 0..4 {
+                y += d[k] * u[k];
+                for i in 0..SIGNALS {
+                    z[i] += d[k] * before[k][i];
+                }
             }
         }
         Whitened {

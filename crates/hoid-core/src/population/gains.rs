@@ -21,7 +21,7 @@
 use super::{
     basis::{Basis, Point, Regressors},
     forms::Forms,
-    kalman::{Kalman, Seen, Shapes, shapes_of},
+    kalman::{Innovation, Kalman, Seen, Shapes, shapes_of},
     sizes::{DRIFTS, FILTERS, FORMS, GAINS, HELD, LINEAR, NEWBORNS, STATES},
 };
 use crate::adaptive::elementary::{exp_within, ln_of_normal};
@@ -229,19 +229,21 @@ impl Gains {
         let seen = Seen::new(y, regressors, level, around.variance, point, tails);
         let [among_forms, among_drifts] = prior.forgotten;
         let (mut innovation, mut total) = (Forms::ZERO, Forms::ZERO);
+        let mut innovations = [Innovation::ZERO; FILTERS];
         for (k, filter) in self.filters.iter_mut().enumerate() {
-            let (drift, forgotten) = match prior.drifts.get(k) {
-                Some(drift) => (*drift, among_drifts),
-                None => (prior.newborn[0], 0.0),
-            };
-            let walk = drift * around.unit;
+            let walk = prior.drifts.get(k).copied().unwrap_or(prior.newborn[0]) * around.unit;
             filter.open_gains(&self.shapes, walk * walk * ts);
             filter.open(GAINS, around.level[usize::from(k > 0)] * ts);
-            let (eps, log_density) = filter.update(&seen);
-            innovation += filter.weight * eps;
+            innovations[k] = filter.update(&seen);
+        }
+        // Apart from the updates, so that the logarithms of all filters are made at a time.
+        for (k, (filter, own)) in self.filters.iter_mut().zip(&innovations).enumerate() {
+            innovation += filter.weight * own.eps;
             total += filter.weight;
+            let forgotten = if k < DRIFTS { among_drifts } else { 0.0 };
             let supposed = Forms::all(self.supposed[k]);
-            filter.log_weight += Forms::all(forgotten) * (supposed - filter.log_weight) + log_density;
+            filter.log_weight +=
+                Forms::all(forgotten) * (supposed - filter.log_weight) + own.log_density(&seen);
         }
         let innovation = (self.weights * innovation).sum() / (self.weights * total).sum();
         let log_density = normalise(&mut self.filters);

@@ -102,14 +102,46 @@ pub(super) struct Kalman {
 
 crate::state!([] Kalman { state, covariance, weight, log_weight });
 
+/// An innovation with its variance S, and `eps^2/S`.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Innovation {
+    pub eps: Forms,
+    total: Forms,
+    square: Forms,
+}
+
+impl Innovation {
+    pub const ZERO: Self = Self {
+        eps: Forms::ZERO,
+        total: Forms::ZERO,
+        square: Forms::ZERO,
+    };
+
+    /// Logarithm of its density, but for a constant.
+    #[inline(always)]
+    pub fn log_density(&self, seen: &Seen) -> Forms {
+        let tails = (Forms::all(1.0) + self.square * seen.per_nu).map(ln_of_normal);
+        Forms::all(-0.5) * (self.total.map(ln_of_normal) + Forms::all(seen.nu + 1.0) * tails)
+    }
+}
+
+/// `a' b`, in two sums that do not wait for each other.
+#[inline(always)]
+fn product(a: [Forms; STATES], b: &[Forms; STATES]) -> Forms {
+    let (mut even, mut odd) = (a[0] * b[0], a[1] * b[1]);
+    for i in (2..STATES).step_by(2) {
+        even += a[i] * b[i];
+    }
+    for i in (3..STATES).step_by(2) {
+        odd += a[i] * b[i];
+    }
+    even + odd
+}
+
 /// A row of P times psi.
 #[inline(always)]
 fn row<const I: usize>(p: &[Forms; ENTRIES], psi: &[Forms; STATES]) -> Forms {
-    let mut sum = p[at(I, 0)] * psi[0];
-    for j in 1..STATES {
-        sum += p[at(I, j)] * psi[j];
-    }
-    sum
+    product(core::array::from_fn(|j| p[at(I, j)]), psi)
 }
 
 /// A row of P without its share of `g (P psi)'`; `back` is -g.
@@ -157,9 +189,9 @@ impl Kalman {
         seen.y - self.predicted(seen).0
     }
 
-    /// Takes a sample: innovations, and logarithms of their densities.
+    /// Takes a sample.
     #[inline(always)]
-    pub fn update(&mut self, seen: &Seen) -> (Forms, Forms) {
+    pub fn update(&mut self, seen: &Seen) -> Innovation {
         let (predicted, psi) = self.predicted(seen);
         let eps = seen.y - predicted;
         let p = &mut self.covariance;
@@ -172,18 +204,12 @@ impl Kalman {
             row::<5>(p, &psi),
             row::<6>(p, &psi),
         ];
-        let mut spread = through[0] * psi[0];
-        for i in 1..STATES {
-            spread += through[i] * psi[i];
-        }
         // Rounding may leave a covariance that is not positive where almost nothing is open.
-        let spread = spread.at_least(Forms::ZERO);
+        let spread = product(through, &psi).at_least(Forms::ZERO);
         let total = spread + seen.variance;
         let square = eps * eps / total;
         let one = Forms::all(1.0);
         let per_weight = ((Forms::all(seen.nu) + square) * seen.per_more).at_least(one);
-        let tails = (one + square * seen.per_nu).map(ln_of_normal);
-        let log_density = Forms::all(-0.5) * (total.map(ln_of_normal) + Forms::all(seen.nu + 1.0) * tails);
         let mut limited = eps;
         // Hardly ever, and where a number is none.
         if !square.0.iter().all(|square| *square <= seen.limit * seen.limit) {
@@ -205,7 +231,7 @@ impl Kalman {
         for (i, [low, high]) in seen.bounds.into_iter().enumerate() {
             self.state[LINEAR + i] = self.state[LINEAR + i].at_least(low).at_most(high);
         }
-        (eps, log_density)
+        Innovation { eps, total, square }
     }
 
     /// Adds a variance to the gains, of these shapes.
