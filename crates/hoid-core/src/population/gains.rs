@@ -21,7 +21,7 @@
 use super::{
     basis::{Basis, Point, Regressors},
     forms::Forms,
-    kalman::{Innovation, Kalman, Seen, Shapes, shapes_of},
+    kalman::{Foretold, Kalman, Move, Seen, Shapes, shapes_of},
     sizes::{DRIFTS, FILTERS, FORMS, GAINS, HELD, LINEAR, NEWBORNS, STATES},
 };
 use crate::adaptive::elementary::{exp_within, ln_of_normal};
@@ -229,21 +229,26 @@ impl Gains {
         let seen = Seen::new(y, regressors, level, around.variance, point, tails);
         let [among_forms, among_drifts] = prior.forgotten;
         let (mut innovation, mut total) = (Forms::ZERO, Forms::ZERO);
-        let mut innovations = [Innovation::ZERO; FILTERS];
+        // Each step for all filters before the next: they do not wait for one another, the steps do.
+        let mut foretold = [Foretold::NOTHING; FILTERS];
         for (k, filter) in self.filters.iter_mut().enumerate() {
             let walk = prior.drifts.get(k).copied().unwrap_or(prior.newborn[0]) * around.unit;
             filter.open_gains(&self.shapes, walk * walk * ts);
             filter.open(GAINS, around.level[usize::from(k > 0)] * ts);
-            innovations[k] = filter.update(&seen);
+            foretold[k] = filter.foretold(&seen);
         }
-        // Apart from the updates, so that the logarithms of all filters are made at a time.
-        for (k, (filter, own)) in self.filters.iter_mut().zip(&innovations).enumerate() {
+        let mut moves = [Move::NONE; FILTERS];
+        for (k, (filter, own)) in self.filters.iter_mut().zip(&foretold).enumerate() {
             innovation += filter.weight * own.eps;
             total += filter.weight;
             let forgotten = if k < DRIFTS { among_drifts } else { 0.0 };
             let supposed = Forms::all(self.supposed[k]);
-            filter.log_weight +=
-                Forms::all(forgotten) * (supposed - filter.log_weight) + own.log_density(&seen);
+            let (by, log_density) = own.weighed(&seen);
+            moves[k] = by;
+            filter.log_weight += Forms::all(forgotten) * (supposed - filter.log_weight) + log_density;
+        }
+        for ((filter, own), by) in self.filters.iter_mut().zip(&foretold).zip(&moves) {
+            filter.learn(own, by, &seen);
         }
         let innovation = (self.weights * innovation).sum() / (self.weights * total).sum();
         let log_density = normalise(&mut self.filters);

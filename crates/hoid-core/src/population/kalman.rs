@@ -102,27 +102,54 @@ pub(super) struct Kalman {
 
 crate::state!([] Kalman { state, covariance, weight, log_weight });
 
-/// An innovation with its variance S, and `eps^2/S`.
+/// What a filter foretells of a sample before it takes it: the innovation, `P psi` and `psi' P psi`.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Innovation {
+pub(super) struct Foretold {
     pub eps: Forms,
-    total: Forms,
-    square: Forms,
+    through: [Forms; STATES],
+    spread: Forms,
 }
 
-impl Innovation {
-    pub const ZERO: Self = Self {
+impl Foretold {
+    pub const NOTHING: Self = Self {
         eps: Forms::ZERO,
-        total: Forms::ZERO,
-        square: Forms::ZERO,
+        through: [Forms::ZERO; STATES],
+        spread: Forms::ZERO,
     };
 
-    /// Logarithm of its density, but for a constant.
+    /// How much the sample moves the filter, and the logarithm of its density, but for a constant.
     #[inline(always)]
-    pub fn log_density(&self, seen: &Seen) -> Forms {
-        let tails = (Forms::all(1.0) + self.square * seen.per_nu).map(ln_of_normal);
-        Forms::all(-0.5) * (self.total.map(ln_of_normal) + Forms::all(seen.nu + 1.0) * tails)
+    pub fn weighed(&self, seen: &Seen) -> (Move, Forms) {
+        let Self { eps, spread, .. } = *self;
+        let total = spread + seen.variance;
+        let square = eps * eps / total;
+        let one = Forms::all(1.0);
+        let per_weight = ((Forms::all(seen.nu) + square) * seen.per_more).at_least(one);
+        let back = Forms::all(-1.0) / (spread + seen.variance * per_weight);
+        let mut limited = eps;
+        // Hardly ever, and where a number is none.
+        if !square.0.iter().all(|square| *square <= seen.limit * seen.limit) {
+            let most = total.map(|total| seen.limit * libm::sqrt(total));
+            limited = eps.at_least(Forms::ZERO - most).at_most(most);
+        }
+        let tails = (one + square * seen.per_nu).map(ln_of_normal);
+        let log_density = Forms::all(-0.5) * (total.map(ln_of_normal) + Forms::all(seen.nu + 1.0) * tails);
+        (Move { back, limited }, log_density)
     }
+}
+
+/// `-1/(psi' P psi + sigma^2/w)`, and the limited innovation.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Move {
+    back: Forms,
+    limited: Forms,
+}
+
+impl Move {
+    pub const NONE: Self = Self {
+        back: Forms::ZERO,
+        limited: Forms::ZERO,
+    };
 }
 
 /// `a' b`, in two sums that do not wait for each other.
@@ -189,12 +216,11 @@ impl Kalman {
         seen.y - self.predicted(seen).0
     }
 
-    /// Takes a sample.
+    /// What it foretells of a sample.
     #[inline(always)]
-    pub fn update(&mut self, seen: &Seen) -> Innovation {
+    pub fn foretold(&self, seen: &Seen) -> Foretold {
         let (predicted, psi) = self.predicted(seen);
-        let eps = seen.y - predicted;
-        let p = &mut self.covariance;
+        let p = &self.covariance;
         let through = [
             row::<0>(p, &psi),
             row::<1>(p, &psi),
@@ -204,34 +230,33 @@ impl Kalman {
             row::<5>(p, &psi),
             row::<6>(p, &psi),
         ];
-        // Rounding may leave a covariance that is not positive where almost nothing is open.
-        let spread = product(through, &psi).at_least(Forms::ZERO);
-        let total = spread + seen.variance;
-        let square = eps * eps / total;
-        let one = Forms::all(1.0);
-        let per_weight = ((Forms::all(seen.nu) + square) * seen.per_more).at_least(one);
-        let mut limited = eps;
-        // Hardly ever, and where a number is none.
-        if !square.0.iter().all(|square| *square <= seen.limit * seen.limit) {
-            let most = total.map(|total| seen.limit * libm::sqrt(total));
-            limited = eps.at_least(Forms::ZERO - most).at_most(most);
+        Foretold {
+            eps: seen.y - predicted,
+            through,
+            // Rounding may leave a covariance that is not positive where almost nothing is open.
+            spread: product(through, &psi).at_least(Forms::ZERO),
         }
-        let back = Forms::all(-1.0) / (spread + seen.variance * per_weight);
-        let g = through.map(|through| through * back);
-        learn::<0>(p, &through, g[0]);
-        learn::<1>(p, &through, g[1]);
-        learn::<2>(p, &through, g[2]);
-        learn::<3>(p, &through, g[3]);
-        learn::<4>(p, &through, g[4]);
-        learn::<5>(p, &through, g[5]);
-        learn::<6>(p, &through, g[6]);
+    }
+
+    /// Takes the sample.
+    #[inline(always)]
+    pub fn learn(&mut self, foretold: &Foretold, by: &Move, seen: &Seen) {
+        let through = &foretold.through;
+        let back = through.map(|through| through * by.back);
+        let p = &mut self.covariance;
+        learn::<0>(p, through, back[0]);
+        learn::<1>(p, through, back[1]);
+        learn::<2>(p, through, back[2]);
+        learn::<3>(p, through, back[3]);
+        learn::<4>(p, through, back[4]);
+        learn::<5>(p, through, back[5]);
+        learn::<6>(p, through, back[6]);
         for i in 0..STATES {
-            self.state[i] -= g[i] * limited;
+            self.state[i] -= back[i] * by.limited;
         }
         for (i, [low, high]) in seen.bounds.into_iter().enumerate() {
             self.state[LINEAR + i] = self.state[LINEAR + i].at_least(low).at_most(high);
         }
-        Innovation { eps, total, square }
     }
 
     /// Adds a variance to the gains, of these shapes.
