@@ -28,7 +28,11 @@
 //!
 //! Each x_i is divided by its gain at [`REFERENCE`], so that all gains are in units of |Y| there.
 
-use super::sizes::{GAINS, HELD, SIGNALS, STATES};
+use super::{
+    pair::Pair,
+    past::{Paired, paired},
+    sizes::{GAINS, HELD, SIGNALS, STATES},
+};
 
 /// Frequency at which each response has a gain of one, rad/s.
 pub const REFERENCE: f64 = 2.0;
@@ -87,8 +91,8 @@ pub struct Basis {
     point: Point,
     sample_time: f64,
     /// Columns of Phi, and T_0 to T_2, each with a zero behind, so that they are as long as the signals.
-    columns: [Signals; N],
-    taps: [Signals; 3],
+    columns: [Paired; N],
+    taps: [Paired; 3],
     monic: [f64; N],
     delay: usize,
     part: f64,
@@ -110,8 +114,8 @@ impl Basis {
         let mut basis = Self {
             point,
             sample_time,
-            columns: [[0.0; SIGNALS]; N],
-            taps: [[0.0; SIGNALS]; 3],
+            columns: [[Pair::ZERO; SIGNALS / 2]; N],
+            taps: [[Pair::ZERO; SIGNALS / 2]; 3],
             monic: [0.0; N],
             delay: 0,
             part: 0.0,
@@ -124,7 +128,7 @@ impl Basis {
         let sound = basis
             .scale
             .iter()
-            .chain(basis.columns.iter().flatten())
+            .chain(basis.columns.iter().flatten().flat_map(|pair| &pair.0))
             .all(|s| s.is_finite());
         sound.then_some(basis)
     }
@@ -164,7 +168,7 @@ impl Basis {
             first[i][N] * (1.0 - part) + first[i][N + 1] / ts
         }));
         let late = through(core::array::from_fn(|i| first[i][N] * part - first[i][N + 1] / ts));
-        let column = |of: &dyn Fn(usize) -> f64| -> Signals { core::array::from_fn(|i| if i < N { of(i) } else { 0.0 }) };
+        let column = |of: &dyn Fn(usize) -> f64| -> Paired { paired(&core::array::from_fn(|i| if i < N { of(i) } else { 0.0 })) };
         self.columns = core::array::from_fn(|j| column(&|i| phi[i][j]));
         self.taps = [
             column(&|i| second[i][N + 1] / ts),
@@ -202,6 +206,7 @@ impl Basis {
             .columns
             .iter()
             .flatten()
+            .flat_map(|pair| &pair.0)
             .chain(&other.z)
             .all(|x| x.is_finite())
             .then_some(other)
@@ -232,17 +237,16 @@ impl Basis {
     /// The signals of a sample from the errors of `delay`, `delay + 1` and `delay + 2` samples ago.
     #[inline(always)]
     pub fn step(&mut self, errors: [f64; 3]) -> Signals {
-        let mut signals = [0.0; SIGNALS];
-        for (column, z) in self.columns.iter().zip(self.z) {
-            for i in 0..SIGNALS {
-                signals[i] += column[i] * z;
+        let mut sums = [Pair::ZERO; SIGNALS / 2];
+        for i in 0..sums.len() {
+            for j in 0..N {
+                sums[i] += self.columns[j][i] * Pair::both(self.z[j]);
+            }
+            for j in 0..3 {
+                sums[i] += self.taps[j][i] * Pair::both(errors[j]);
             }
         }
-        for (column, error) in self.taps.iter().zip(errors) {
-            for i in 0..SIGNALS {
-                signals[i] += column[i] * error;
-            }
-        }
+        let mut signals: Signals = core::array::from_fn(|i| sums[i / 2].0[i % 2]);
         let mut last = self.delayed([errors[0], errors[1]]);
         for i in 0..N {
             self.z[i] = signals[i];

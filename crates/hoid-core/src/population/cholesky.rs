@@ -6,7 +6,7 @@
 const WIDE: usize = 4;
 
 /// U in the place of the upper triangle of A, n by n with rows of N; false where A is not positive
-/// definite. What is below the diagonal and beyond n is no result.
+/// definite. What is below the diagonal is zero next to it and else no result, nor is what is beyond n.
 pub(super) fn factor<const N: usize>(a: &mut [[f64; N]; N], n: usize) -> bool {
     for i in 0..n {
         let (above, below) = a.split_at_mut(i);
@@ -35,6 +35,7 @@ pub(super) fn factor<const N: usize>(a: &mut [[f64; N]; N], n: usize) -> bool {
         let pivot = libm::sqrt(square);
         row[i] = pivot;
         row[i + 1..n].iter_mut().for_each(|u| *u /= pivot);
+        row[i / WIDE * WIDE..i].fill(0.0);
     }
     true
 }
@@ -43,10 +44,18 @@ pub(super) fn factor<const N: usize>(a: &mut [[f64; N]; N], n: usize) -> bool {
 pub(super) fn solve<const N: usize>(u: &[[f64; N]; N], n: usize, b: &mut [f64; N]) {
     for (i, row) in u.iter().enumerate().take(n) {
         let x = b[i] / row[i];
-        b[i] = x;
-        for (b, u) in b[i + 1..n].iter_mut().zip(&row[i + 1..n]) {
+        // By blocks: what is in the first of them before i is zero in U, and at i stands x.
+        let (blocks, rest) = b.as_chunks_mut::<WIDE>();
+        let (of_blocks, of_rest) = row.as_chunks::<WIDE>();
+        for (block, of) in blocks[..n.div_ceil(WIDE).min(N / WIDE)].iter_mut().zip(of_blocks).skip(i / WIDE) {
+            for (b, u) in block.iter_mut().zip(of) {
+                *b -= x * u;
+            }
+        }
+        for (b, u) in rest.iter_mut().zip(of_rest) {
             *b -= x * u;
         }
+        b[i] = x;
     }
     for (i, row) in u.iter().enumerate().take(n).rev() {
         let mut sum = b[i];

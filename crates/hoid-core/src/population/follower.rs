@@ -2,13 +2,15 @@
 //! the past are shared with others who are followed beside ([`super::contest`]).
 
 use super::{
-    basis::{Basis, Complex, Point, REFERENCE, Regressors, Signals},
+    basis::{Basis, Complex, Point, REFERENCE, Regressors},
     gains::{Around, Gains},
     known::Known,
     noise::NoiseModel,
+    pair::Pair,
+    past::{Paired, paired},
     place::Place,
     prior::PopulationPrior,
-    sizes::{GAINS, HELD, LARGEST_ORDER, LINEAR, SIGNALS, STATES},
+    sizes::{GAINS, HELD, LARGEST_ORDER, LINEAR, STATES},
 };
 
 /// Magnitude beyond which the filters are brought to rest.
@@ -140,21 +142,21 @@ impl Follower {
     /// `D u`, D times the responses, and D at zero.
     #[inline(always)]
     pub fn whitened(&self, past: &Past, u: f64) -> Whitened {
-        let (mut y, mut z): (f64, Signals) = (u, *self.place.signals());
+        let (mut y, mut z) = (u, paired(self.place.signals()));
         let (d, u, before) = (self.noise.padded_d(), past.u, self.place.past());
         // Four lags at a time.
         let (d, u, before) = (d.as_chunks::<4>().0, u.as_chunks::<4>().0, before.as_chunks::<4>().0);
         for ((d, u), before) in d.iter().zip(u).zip(before) {
             for k in 0..4 {
                 y += d[k] * u[k];
-                for i in 0..SIGNALS {
-                    z[i] += d[k] * before[k][i];
+                for (z, before) in z.iter_mut().zip(before[k]) {
+                    *z += Pair::both(d[k]) * before;
                 }
             }
         }
         Whitened {
             y,
-            regressors: self.place.basis().regressors(&z),
+            regressors: self.place.basis().regressors(&core::array::from_fn(|i| z[i / 2].0[i % 2])),
             level: self.noise.sum(),
         }
     }
@@ -269,17 +271,13 @@ impl Follower {
         if self.samples <= order as u64 {
             return;
         }
-        let weights = self.place.basis().weights(state);
-        let left = |u: f64, z: &Signals| {
-            let [mut even, mut odd] = [weights[0] * z[0], weights[1] * z[1]];
-            for i in (2..SIGNALS).step_by(2) {
-                even += weights[i] * z[i];
-                odd += weights[i + 1] * z[i + 1];
-            }
-            u - state[GAINS] - (even + odd)
+        let weights = paired(&self.place.basis().weights(state));
+        let left = |u: f64, z: &Paired| {
+            let response = weights[0] * z[0] + weights[1] * z[1] + weights[2] * z[2];
+            u - state[GAINS] - response.sum()
         };
         let mut v = [0.0; LARGEST_ORDER + 1];
-        v[0] = left(u, self.place.signals());
+        v[0] = left(u, &paired(self.place.signals()));
         for ((v, u), z) in v[1..=order].iter_mut().zip(past.u).zip(self.place.past()) {
             *v = left(*u, z);
         }

@@ -20,8 +20,7 @@
 
 use super::{
     basis::{Basis, Point, Regressors},
-    forms::Forms,
-    kalman::{Foretold, Kalman, Move, Seen, Shapes, shapes_of},
+    kalman::{Forms, Foretold, Kalman, Move, Seen, Shapes, shapes_of},
     sizes::{DRIFTS, FILTERS, FORMS, GAINS, HELD, LINEAR, NEWBORNS, STATES},
 };
 use crate::adaptive::elementary::{exp_within, ln_of_normal};
@@ -39,7 +38,6 @@ const NOTHING: f64 = 1e-9;
 const OPEN_AGAIN: f64 = 0.3;
 /// Logarithm of the weight of each form where all are alike.
 const EVEN: f64 = -core::f64::consts::LN_2;
-const _: () = assert!(FORMS == 2);
 /// K_e_dot of the form with a lead is supposed to be so much of K_e, s.
 const LEAD_S: f64 = 0.5;
 
@@ -147,10 +145,10 @@ impl Gains {
     }
 
     fn weigh_anew(&mut self) {
-        self.weights = Forms::all(1.0 / FORMS as f64);
-        self.log_weights = Forms::all(EVEN);
+        self.weights = Forms::both(1.0 / FORMS as f64);
+        self.log_weights = Forms::both(EVEN);
         for (filter, supposed) in self.filters.iter_mut().zip(self.supposed) {
-            filter.log_weight = Forms::all(supposed);
+            filter.log_weight = Forms::both(supposed);
         }
         normalise(&mut self.filters);
     }
@@ -213,7 +211,7 @@ impl Gains {
     pub fn moved(&mut self, by: [f64; HELD]) {
         for filter in &mut self.filters {
             for (i, by) in (LINEAR..STATES).zip(by) {
-                filter.state[i] -= Forms::all(by);
+                filter.state[i] -= Forms::both(by);
                 filter.open(i, OPEN_AGAIN * by * by);
             }
         }
@@ -242,17 +240,17 @@ impl Gains {
             innovation += filter.weight * own.eps;
             total += filter.weight;
             let forgotten = if k < DRIFTS { among_drifts } else { 0.0 };
-            let supposed = Forms::all(self.supposed[k]);
+            let supposed = Forms::both(self.supposed[k]);
             let (by, log_density) = own.weighed(&seen);
             moves[k] = by;
-            filter.log_weight += Forms::all(forgotten) * (supposed - filter.log_weight) + log_density;
+            filter.log_weight += Forms::both(forgotten) * (supposed - filter.log_weight) + log_density;
         }
         for ((filter, own), by) in self.filters.iter_mut().zip(&foretold).zip(&moves) {
             filter.learn(own, by, &seen);
         }
         let innovation = (self.weights * innovation).sum() / (self.weights * total).sum();
         let log_density = normalise(&mut self.filters);
-        self.log_weights += Forms::all(among_forms) * (Forms::all(EVEN) - self.log_weights) + log_density;
+        self.log_weights += Forms::both(among_forms) * (Forms::both(EVEN) - self.log_weights) + log_density;
         let log_density = self.normalise_forms();
         self.samples += 1;
         self.renew(around.unit);
@@ -262,11 +260,11 @@ impl Gains {
     /// Makes the weights of the forms sum to one; returns the logarithm of what they summed to.
     fn normalise_forms(&mut self) -> f64 {
         let highest = self.log_weights.0.into_iter().fold(-1e300, f64::max);
-        let each = (self.log_weights - Forms::all(highest)).at_least(Forms::all(LOWEST));
+        let each = (self.log_weights - Forms::both(highest)).at_least(Forms::both(LOWEST));
         let each = each.map(exp_within);
         let log_sum = highest + ln_of_normal(each.sum());
-        self.weights = each * Forms::all(1.0 / each.sum());
-        self.log_weights -= Forms::all(log_sum);
+        self.weights = each * Forms::both(1.0 / each.sum());
+        self.log_weights -= Forms::both(log_sum);
         log_sum
     }
 
@@ -276,8 +274,8 @@ impl Gains {
         if self.samples < self.still {
             for k in 1..DRIFTS {
                 self.filters[k] = Kalman {
-                    weight: Forms::all(WEIGHT_AGAIN),
-                    log_weight: Forms::all(AGAIN),
+                    weight: Forms::both(WEIGHT_AGAIN),
+                    log_weight: Forms::both(AGAIN),
                     ..self.filters[0]
                 };
             }
@@ -305,8 +303,8 @@ impl Gains {
             let jump = self.prior.newborn[1] * unit;
             let mut child = self.filters[0];
             child.open_gains(&self.shapes, jump * jump);
-            child.weight = child.weight * Forms::all(self.prior.odds);
-            child.log_weight += Forms::all(libm::log(self.prior.odds));
+            child.weight = child.weight * Forms::both(self.prior.odds);
+            child.log_weight += Forms::both(libm::log(self.prior.odds));
             self.filters[DRIFTS + i] = child;
         }
     }
@@ -409,17 +407,17 @@ fn shapes(basis: &Basis) -> Shapes {
 /// Densities of zero by underflow say no more than very small ones.
 #[inline(always)]
 fn normalise(filters: &mut [Kalman; FILTERS]) -> Forms {
-    let mut highest = Forms::all(-1e300);
+    let mut highest = Forms::both(-1e300);
     for filter in filters.iter() {
         highest = filter.log_weight.at_least(highest);
     }
     let mut sum = Forms::ZERO;
     for filter in filters.iter_mut() {
-        let log = (filter.log_weight - highest).at_least(Forms::all(LOWEST));
+        let log = (filter.log_weight - highest).at_least(Forms::both(LOWEST));
         filter.weight = log.map(exp_within);
         sum += filter.weight;
     }
-    let (share, log_sum) = (Forms::all(1.0) / sum, highest + sum.map(ln_of_normal));
+    let (share, log_sum) = (Forms::both(1.0) / sum, highest + sum.map(ln_of_normal));
     for filter in filters.iter_mut() {
         filter.weight = filter.weight * share;
         filter.log_weight -= log_sum;

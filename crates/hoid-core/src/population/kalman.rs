@@ -19,10 +19,13 @@
 
 use super::{
     basis::{Point, Regressors},
-    forms::Forms,
     sizes::{FORMS, GAINS, HELD, LINEAR, STATES},
 };
 use crate::adaptive::elementary::ln_of_normal;
+
+/// A number of each form. A filter does the same with the numbers of both.
+pub(super) use super::pair::Pair as Forms;
+const _: () = assert!(FORMS == 2);
 
 /// Largest correction of omega and zeta, as a share of theirs, and of tau, s.
 const FARTHEST: [[f64; 2]; HELD] = [[-0.5, 0.6], [-0.8, 1.5], [-0.1, 0.1]];
@@ -74,16 +77,16 @@ impl Seen {
     pub fn new(y: f64, r: &Regressors, level: f64, variance: f64, point: Point, [nu, limit]: [f64; 2]) -> Self {
         let of = [point.omega, point.zeta, 1.0];
         Self {
-            y: Forms::all(y),
-            x: r.x.map(Forms::all),
-            by: r.by.map(|by| by.map(Forms::all)),
-            level: Forms::all(level),
-            variance: Forms::all(variance),
-            bounds: core::array::from_fn(|i| FARTHEST[i].map(|bound| Forms::all(bound * of[i]))),
+            y: Forms::both(y),
+            x: r.x.map(Forms::both),
+            by: r.by.map(|by| by.map(Forms::both)),
+            level: Forms::both(level),
+            variance: Forms::both(variance),
+            bounds: core::array::from_fn(|i| FARTHEST[i].map(|bound| Forms::both(bound * of[i]))),
             nu,
             limit,
-            per_nu: Forms::all(1.0 / nu),
-            per_more: Forms::all(1.0 / (nu + 1.0)),
+            per_nu: Forms::both(1.0 / nu),
+            per_more: Forms::both(1.0 / (nu + 1.0)),
         }
     }
 }
@@ -123,9 +126,9 @@ impl Foretold {
         let Self { eps, spread, .. } = *self;
         let total = spread + seen.variance;
         let square = eps * eps / total;
-        let one = Forms::all(1.0);
-        let per_weight = ((Forms::all(seen.nu) + square) * seen.per_more).at_least(one);
-        let back = Forms::all(-1.0) / (spread + seen.variance * per_weight);
+        let one = Forms::both(1.0);
+        let per_weight = ((Forms::both(seen.nu) + square) * seen.per_more).at_least(one);
+        let back = Forms::both(-1.0) / (spread + seen.variance * per_weight);
         let mut limited = eps;
         // Hardly ever, and where a number is none.
         if !square.0.iter().all(|square| *square <= seen.limit * seen.limit) {
@@ -133,7 +136,7 @@ impl Foretold {
             limited = eps.at_least(Forms::ZERO - most).at_most(most);
         }
         let tails = (one + square * seen.per_nu).map(ln_of_normal);
-        let log_density = Forms::all(-0.5) * (total.map(ln_of_normal) + Forms::all(seen.nu + 1.0) * tails);
+        let log_density = Forms::both(-0.5) * (total.map(ln_of_normal) + Forms::both(seen.nu + 1.0) * tails);
         (Move { back, limited }, log_density)
     }
 }
@@ -263,14 +266,14 @@ impl Kalman {
     #[inline(always)]
     pub fn open_gains(&mut self, shapes: &Shapes, variance: f64) {
         for (p, shape) in self.covariance.iter_mut().zip(shapes) {
-            *p += Forms::all(variance) * *shape;
+            *p += Forms::both(variance) * *shape;
         }
     }
 
     /// Adds a variance to a state.
     #[inline(always)]
     pub fn open(&mut self, state: usize, variance: f64) {
-        self.covariance[at(state, state)] += Forms::all(variance);
+        self.covariance[at(state, state)] += Forms::both(variance);
     }
 
     /// Forgets how well gains and level are known, and all that was learnt of the corrections'
@@ -286,10 +289,10 @@ impl Kalman {
 
     /// Everywhere at this estimate with its covariance.
     pub fn place_at(&mut self, state: &[f64; STATES], covariance: &[[f64; STATES]; STATES]) {
-        self.state = state.map(Forms::all);
+        self.state = state.map(Forms::both);
         for i in 0..STATES {
             for j in 0..=i {
-                self.covariance[at(i, j)] = Forms::all(covariance[i][j]);
+                self.covariance[at(i, j)] = Forms::both(covariance[i][j]);
             }
         }
     }

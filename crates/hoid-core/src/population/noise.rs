@@ -9,11 +9,11 @@
 //!
 //! D is only ever used as a filter of finite length: it need not be stable.
 
-use super::{cholesky, sizes::LARGEST_ORDER};
+use super::{cholesky, pair::Pair, sizes::LARGEST_ORDER, usual::ORDER};
 
 const WIDTH: usize = LARGEST_ORDER + 1;
-/// The same as whole pairs: two products are added at a time.
-const PADDED: usize = WIDTH.next_multiple_of(2);
+/// The same in pairs, a whole number of them.
+const PAIRS: usize = WIDTH.div_ceil(2);
 /// A number for each lag from zero on.
 pub type Lags = [f64; WIDTH];
 /// Time constants of the remnant that is supposed before anything is known, s.
@@ -33,9 +33,9 @@ pub struct NoiseModel {
     prior: f64,
     longest: f64,
     shortest: f64,
-    /// Upper triangle of the sums over `fade`, in whole pairs. A sample leaves the sums of before as they
+    /// Upper triangle of the sums over `fade`, in pairs of rows and of columns. A sample leaves the sums of before as they
     /// are and counts for more, until the digits would be lost.
-    products: [[f64; PADDED]; PADDED],
+    products: [[[Pair; PAIRS]; 2]; PAIRS],
     fade: f64,
     weight: f64,
     samples: f64,
@@ -61,7 +61,7 @@ impl NoiseModel {
             prior: 1.0 / ts,
             longest: memory / ts,
             shortest: (3.0 / ts).min(memory / ts).max(2.0 * order as f64),
-            products: [[0.0; PADDED]; PADDED],
+            products: [[[Pair::ZERO; PAIRS]; 2]; PAIRS],
             fade: 1.0,
             weight: 0.0,
             samples: 0.0,
@@ -81,7 +81,7 @@ impl NoiseModel {
         (self.weight, self.fade) = (weight, 1.0);
         for i in 0..=self.order {
             for j in i..=self.order {
-                self.products[i][j] = weight * lags[j - i];
+                self.products[i / 2][i % 2][j / 2].0[j % 2] = weight * lags[j - i];
             }
         }
         self.solve();
@@ -118,31 +118,35 @@ impl NoiseModel {
         self.weight = lambda * self.weight + 1.0;
         self.fade *= lambda;
         if self.fade < FADED {
-            self.products.as_flattened_mut().iter_mut().for_each(|p| *p *= self.fade);
+            let fade = Pair::both(self.fade);
+            self.products.as_flattened_mut().as_flattened_mut().iter_mut().for_each(|p| *p = *p * fade);
             self.fade = 1.0;
         }
         let weight = weight / self.fade;
-        let mut padded = [0.0; PADDED];
-        padded[..WIDTH].copy_from_slice(v);
-        let pairs = self.order / 2 + 1;
-        let v = &padded.as_chunks::<2>().0[..pairs];
-        for (first, rows) in self.products.as_chunks_mut::<2>().0[..pairs].iter_mut().enumerate() {
-            let a = v[first].map(|v| weight * v);
-            let [above, below] = rows.each_mut().map(|row| &mut row.as_chunks_mut::<2>().0[first..pairs]);
-            for ((above, below), v) in above.iter_mut().zip(below).zip(&v[first..]) {
-                for i in 0..2 {
-                    above[i] += a[0] * v[i];
-                }
-                for i in 0..2 {
-                    below[i] += a[1] * v[i];
-                }
+        // As a constant the usual order makes loops of known length.
+        match self.order {
+            ORDER => self.add(v, weight, ORDER),
+            order => self.add(v, weight, order),
+        }
+    }
+
+    #[inline(always)]
+    fn add(&mut self, v: &Lags, weight: f64, order: usize) {
+        let pairs = (order / 2 + 1).min(PAIRS);
+        let v: [Pair; PAIRS] = core::array::from_fn(|i| Pair([v[2 * i], v.get(2 * i + 1).copied().unwrap_or(0.0)]));
+        for first in 0..pairs {
+            let [above, below] = &mut self.products[first];
+            let [a, b] = v[first].0.map(|v| Pair::both(weight * v));
+            for k in first..pairs {
+                above[k] += a * v[k];
+                below[k] += b * v[k];
             }
         }
     }
 
     /// The sum of the products of two lags, the first not the larger.
     fn product(&self, i: usize, j: usize) -> f64 {
-        self.fade * self.products[i][j]
+        self.fade * self.products[i / 2][i % 2][j / 2].0[j % 2]
     }
 
     /// Weight of what is supposed, in the unit of the sums.
@@ -155,8 +159,9 @@ impl NoiseModel {
         let p = self.order;
         let mut matrix = [[0.0; LARGEST_ORDER]; LARGEST_ORDER];
         for i in 0..p {
-            for j in i..p {
-                matrix[i][j] = self.product(i + 1, j + 1);
+            let sums = &self.products[(i + 1) / 2][(i + 1) % 2];
+            for (j, to) in matrix[i][..p].iter_mut().enumerate() {
+                *to = self.fade * sums[(j + 1) / 2].0[(j + 1) % 2];
             }
             matrix[i][i] += self.ridge();
         }

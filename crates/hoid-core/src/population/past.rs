@@ -5,27 +5,37 @@
 
 use super::{
     basis::Signals,
+    pair::Pair,
     sizes::{LARGEST_ORDER, SIGNALS},
 };
 use crate::state::State;
 
+/// Signals in pairs.
+pub(super) type Paired = [Pair; SIGNALS / 2];
+
+/// In pairs.
+#[inline(always)]
+pub(super) fn paired(signals: &Signals) -> Paired {
+    core::array::from_fn(|i| Pair([signals[2 * i], signals[2 * i + 1]]))
+}
+
 /// The signals of the last samples.
 #[derive(Debug, Clone)]
 pub(super) struct PastSignals {
-    twice: [Signals; 2 * LARGEST_ORDER],
+    twice: [Paired; 2 * LARGEST_ORDER],
     newest: usize,
 }
 
 impl PastSignals {
     /// All zero.
     pub const ZERO: Self = Self {
-        twice: [[0.0; SIGNALS]; 2 * LARGEST_ORDER],
+        twice: [[Pair::ZERO; SIGNALS / 2]; 2 * LARGEST_ORDER],
         newest: 0,
     };
 
     /// The newest first.
     #[inline(always)]
-    pub fn newest_first(&self) -> &[Signals] {
+    pub fn newest_first(&self) -> &[Paired] {
         self.twice[self.newest..].first_chunk::<LARGEST_ORDER>().map_or(&[], |past| past)
     }
 
@@ -33,8 +43,8 @@ impl PastSignals {
     #[inline(always)]
     pub fn push(&mut self, signals: &Signals) {
         self.newest = self.newest.checked_sub(1).unwrap_or(LARGEST_ORDER - 1);
-        self.twice[self.newest] = *signals;
-        self.twice[self.newest + LARGEST_ORDER] = *signals;
+        self.twice[self.newest] = paired(signals);
+        self.twice[self.newest + LARGEST_ORDER] = paired(signals);
     }
 }
 
@@ -67,7 +77,7 @@ mod tests {
             past.push(&[f64::from(t); SIGNALS]);
             let expected = |age: usize| (f64::from(t) - age as f64).max(0.0);
             for (age, signals) in past.newest_first().iter().enumerate() {
-                assert_eq!(*signals, [expected(age); SIGNALS]);
+                assert_eq!(*signals, paired(&[expected(age); SIGNALS]));
             }
             assert_eq!(past.newest_first().len(), LARGEST_ORDER);
             let (mut copy, mut age) = (past.clone(), 0);

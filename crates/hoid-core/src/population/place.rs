@@ -7,7 +7,7 @@
 
 use super::{
     basis::{Basis, Point, Signals},
-    past::PastSignals,
+    past::{Paired, PastSignals},
     sizes::{HELD, SIGNALS},
 };
 use crate::state::{State, visit_all};
@@ -68,7 +68,7 @@ impl Place {
 
     /// Those before it, the newest first.
     #[inline(always)]
-    pub fn past(&self) -> &[Signals] {
+    pub fn past(&self) -> &[Paired] {
         self.now.past.newest_first()
     }
 

@@ -1,31 +1,29 @@
-//! A number of each form, side by side.
+//! Two numbers side by side.
 //!
-//! A filter does the same with the numbers of every form, so they stand side by side, and the processor
-//! takes two at a time where it can. What is done to one does not depend on what stands beside it: the
-//! digits are those of one alone, on every machine.
+//! Every processor with vector registers takes two at a time, where they stand at a multiple of 16 bytes.
+//! What is done to one does not depend on what stands beside it: the digits are those of one alone, on
+//! every machine.
 
 use core::ops::{Add, AddAssign, Div, Mul, Sub, SubAssign};
 
-use super::sizes::FORMS;
-
-/// A number of each form.
+/// Two numbers.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[repr(align(16))]
-pub(super) struct Forms(pub [f64; FORMS]);
+pub(super) struct Pair(pub [f64; 2]);
 
-impl crate::state::State for Forms {
+impl crate::state::State for Pair {
     fn visit(&mut self, each: &mut dyn FnMut(&mut f64)) {
         self.0.visit(each);
     }
 }
 
-impl Forms {
-    pub const ZERO: Self = Self::all(0.0);
+impl Pair {
+    pub const ZERO: Self = Self::both(0.0);
 
-    /// The same for all.
+    /// One number twice.
     #[inline(always)]
-    pub const fn all(x: f64) -> Self {
-        Self([x; FORMS])
+    pub const fn both(x: f64) -> Self {
+        Self([x; 2])
     }
 
     #[inline(always)]
@@ -50,14 +48,14 @@ impl Forms {
         self.with(bound, |x, bound| if x < bound { x } else { bound })
     }
 
-    /// Of all forms.
+    /// Their sum.
     #[inline(always)]
     pub fn sum(self) -> f64 {
         self.0.iter().sum()
     }
 }
 
-impl Add for Forms {
+impl Add for Pair {
     type Output = Self;
     #[inline(always)]
     fn add(self, other: Self) -> Self {
@@ -65,7 +63,7 @@ impl Add for Forms {
     }
 }
 
-impl Sub for Forms {
+impl Sub for Pair {
     type Output = Self;
     #[inline(always)]
     fn sub(self, other: Self) -> Self {
@@ -73,7 +71,7 @@ impl Sub for Forms {
     }
 }
 
-impl Mul for Forms {
+impl Mul for Pair {
     type Output = Self;
     #[inline(always)]
     fn mul(self, other: Self) -> Self {
@@ -81,7 +79,7 @@ impl Mul for Forms {
     }
 }
 
-impl Div for Forms {
+impl Div for Pair {
     type Output = Self;
     #[inline(always)]
     fn div(self, other: Self) -> Self {
@@ -89,14 +87,14 @@ impl Div for Forms {
     }
 }
 
-impl AddAssign for Forms {
+impl AddAssign for Pair {
     #[inline(always)]
     fn add_assign(&mut self, other: Self) {
         *self = *self + other;
     }
 }
 
-impl SubAssign for Forms {
+impl SubAssign for Pair {
     #[inline(always)]
     fn sub_assign(&mut self, other: Self) {
         *self = *self - other;
