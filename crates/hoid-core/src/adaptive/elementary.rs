@@ -21,6 +21,9 @@ pub(crate) fn log1p(x: f64) -> f64 {
     2.0 * z * sum
 }
 
+/// Adding and taking away 3/2 2^52 rounds to the nearest whole number, which then are the last bits.
+const ROUNDS: f64 = 6_755_399_441_055_744.0;
+
 /// `e^x` without a call, to 4e-16 between -700 and 700 and libm's beyond: `2^k e^r` with
 /// `|r| <= ln(2)/2`, by Taylor's series.
 #[inline(always)]
@@ -28,17 +31,7 @@ pub(crate) fn exp(x: f64) -> f64 {
     if x.abs() >= 700.0 || x.is_nan() {
         return libm::exp(x);
     }
-    exp_within(x)
-}
-
-/// The same where x is known to be between -700 and 700: without a branch, so that several are computed
-/// side by side.
-#[inline(always)]
-pub(crate) fn exp_within(x: f64) -> f64 {
-    // Adding and taking away 3/2 2^52 rounds to the nearest whole number, which then are the last bits.
-    const ROUNDS: f64 = 6_755_399_441_055_744.0;
-    let shifted = x * core::f64::consts::LOG2_E + ROUNDS;
-    let k = shifted - ROUNDS;
+    let k = (x * core::f64::consts::LOG2_E + ROUNDS) - ROUNDS;
     let r = (x - k * LN_2[0]) - k * LN_2[1];
     let mut sum = 1.0 / 6_227_020_800.0;
     for factorial in [
@@ -58,7 +51,30 @@ pub(crate) fn exp_within(x: f64) -> f64 {
     ] {
         sum = sum * r + 1.0 / factorial;
     }
-    f64::from_bits(sum.to_bits().wrapping_add(shifted.to_bits() << MANTISSA))
+    sum * f64::from_bits(((k as i64 + 1023) as u64) << MANTISSA)
+}
+
+/// The same where x is known to be between -700 and 700, for several side by side: without a branch, and
+/// with even and odd powers apart, which do not wait for each other.
+#[inline(always)]
+pub(crate) fn exp_within(x: f64) -> f64 {
+    let shifted = x * core::f64::consts::LOG2_E + ROUNDS;
+    let k = shifted - ROUNDS;
+    let r = (x - k * LN_2[0]) - k * LN_2[1];
+    let square = r * r;
+    let (mut even, mut odd) = (1.0 / 479_001_600.0, 1.0 / 6_227_020_800.0);
+    for [of_even, of_odd] in [
+        [3_628_800.0, 39_916_800.0],
+        [40_320.0, 362_880.0],
+        [720.0, 5_040.0],
+        [24.0, 120.0],
+        [2.0, 6.0],
+        [1.0, 1.0],
+    ] {
+        even = even * square + 1.0 / of_even;
+        odd = odd * square + 1.0 / of_odd;
+    }
+    f64::from_bits((even + odd * r).to_bits().wrapping_add(shifted.to_bits() << MANTISSA))
 }
 
 /// `ln x` to 1e-15 of the larger of 1 and itself, without a branch: `x = 2^k m` with m between the roots
@@ -97,6 +113,7 @@ mod tests {
             for x in [-x, x, -180.0 * x] {
                 let e = libm::exp(x);
                 assert!((super::exp(x) - e).abs() <= 4e-16 * e, "{x}");
+                assert!((super::exp_within(x) - e).abs() <= 4e-16 * e, "{x}");
             }
         }
         for i in -3000..3000 {

@@ -145,12 +145,11 @@ impl Gains {
     }
 
     fn weigh_anew(&mut self) {
-        self.weights = Forms::both(1.0 / FORMS as f64);
         self.log_weights = Forms::both(EVEN);
         for (filter, supposed) in self.filters.iter_mut().zip(self.supposed) {
             filter.log_weight = Forms::both(supposed);
         }
-        normalise(&mut self.filters);
+        self.weigh();
     }
 
     /// Begins with gains of zero and these standard deviations of gains and level; what is held is
@@ -249,23 +248,41 @@ impl Gains {
             filter.learn(own, by, &seen);
         }
         let innovation = (self.weights * innovation).sum() / (self.weights * total).sum();
-        let log_density = normalise(&mut self.filters);
-        self.log_weights += Forms::both(among_forms) * (Forms::both(EVEN) - self.log_weights) + log_density;
-        let log_density = self.normalise_forms();
+        let even = Forms::both(EVEN);
+        self.log_weights += Forms::both(among_forms) * (even - self.log_weights);
+        let log_density = self.weigh();
         self.samples += 1;
         self.renew(around.unit);
         (innovation, log_density)
     }
 
-    /// Makes the weights of the forms sum to one; returns the logarithm of what they summed to.
-    fn normalise_forms(&mut self) -> f64 {
-        let highest = self.log_weights.0.into_iter().fold(-1e300, f64::max);
-        let each = (self.log_weights - Forms::both(highest)).at_least(Forms::both(LOWEST));
-        let each = each.map(exp_within);
-        let log_sum = highest + ln_of_normal(each.sum());
+    /// Makes the weights of the forms, and those of each form's filters, sum to one by their logarithms;
+    /// returns the logarithm of what all summed to. Densities of zero by underflow say no more than very
+    /// small ones. Nothing waits for a logarithm.
+    #[inline(always)]
+    fn weigh(&mut self) -> f64 {
+        let lowest = Forms::both(LOWEST);
+        let mut highest = Forms::both(-1e300);
+        for filter in &self.filters {
+            highest = filter.log_weight.at_least(highest);
+        }
+        let of_form = self.log_weights + highest;
+        let top = of_form.0.into_iter().fold(-1e300, f64::max);
+        let mut sum = Forms::ZERO;
+        for filter in &mut self.filters {
+            filter.weight = (filter.log_weight - highest).at_least(lowest).map(exp_within);
+            sum += filter.weight;
+        }
+        let each = (of_form - Forms::both(top)).at_least(lowest).map(exp_within) * sum;
+        let (share, log_sum) = (Forms::both(1.0) / sum, sum.map(ln_of_normal));
+        let log_total = top + ln_of_normal(each.sum());
+        for filter in &mut self.filters {
+            filter.weight = filter.weight * share;
+            filter.log_weight -= highest + log_sum;
+        }
         self.weights = each * Forms::both(1.0 / each.sum());
-        self.log_weights -= Forms::both(log_sum);
-        log_sum
+        self.log_weights = of_form + log_sum - Forms::both(log_total);
+        log_total
     }
 
     /// Filters that are out of the question start again, and the newborns whose life is over are born
@@ -401,28 +418,6 @@ fn shapes(basis: &Basis) -> Shapes {
         }
     }
     shapes_of(&shapes)
-}
-
-/// Makes the weights of each form's filters sum to one; returns the logarithms of what they summed to.
-/// Densities of zero by underflow say no more than very small ones.
-#[inline(always)]
-fn normalise(filters: &mut [Kalman; FILTERS]) -> Forms {
-    let mut highest = Forms::both(-1e300);
-    for filter in filters.iter() {
-        highest = filter.log_weight.at_least(highest);
-    }
-    let mut sum = Forms::ZERO;
-    for filter in filters.iter_mut() {
-        let log = (filter.log_weight - highest).at_least(Forms::both(LOWEST));
-        filter.weight = log.map(exp_within);
-        sum += filter.weight;
-    }
-    let (share, log_sum) = (Forms::both(1.0) / sum, highest + sum.map(ln_of_normal));
-    for filter in filters.iter_mut() {
-        filter.weight = filter.weight * share;
-        filter.log_weight -= log_sum;
-    }
-    log_sum
 }
 
 #[cfg(test)]
