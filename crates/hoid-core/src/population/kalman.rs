@@ -114,12 +114,6 @@ pub(super) struct Foretold {
 }
 
 impl Foretold {
-    pub const NOTHING: Self = Self {
-        eps: Forms::ZERO,
-        through: [Forms::ZERO; STATES],
-        spread: Forms::ZERO,
-    };
-
     /// How much the sample moves the filter, and the logarithm of its density, but for a constant.
     #[inline(always)]
     pub fn weighed(&self, seen: &Seen) -> (Move, Forms) {
@@ -155,17 +149,14 @@ impl Move {
     };
 }
 
-/// `a' b`, in two sums that do not wait for each other.
+/// `a' b`.
 #[inline(always)]
 fn product(a: [Forms; STATES], b: &[Forms; STATES]) -> Forms {
-    let (mut even, mut odd) = (a[0] * b[0], a[1] * b[1]);
-    for i in (2..STATES).step_by(2) {
-        even += a[i] * b[i];
+    let mut sum = a[0] * b[0];
+    for i in 1..STATES {
+        sum += a[i] * b[i];
     }
-    for i in (3..STATES).step_by(2) {
-        odd += a[i] * b[i];
-    }
-    even + odd
+    sum
 }
 
 /// A row of P times psi.
