@@ -7,6 +7,7 @@ const WIDE: usize = 4;
 
 /// U in the place of the upper triangle of A, n by n with rows of N; false where A is not positive
 /// definite. What is below the diagonal is zero next to it and else no result, nor is what is beyond n.
+#[inline(always)]
 pub(super) fn factor<const N: usize>(a: &mut [[f64; N]; N], n: usize) -> bool {
     for i in 0..n {
         let (above, below) = a.split_at_mut(i);
@@ -40,7 +41,23 @@ pub(super) fn factor<const N: usize>(a: &mut [[f64; N]; N], n: usize) -> bool {
     true
 }
 
+/// `a' b`, in some sums that do not wait for one another.
+#[inline(always)]
+fn product(a: &[f64], b: &[f64]) -> f64 {
+    let (blocks, rest) = a.as_chunks::<WIDE>();
+    let (of_blocks, of_rest) = b.as_chunks::<WIDE>();
+    let mut sums = [0.0; WIDE];
+    for (a, b) in blocks.iter().zip(of_blocks) {
+        for i in 0..WIDE {
+            sums[i] += a[i] * b[i];
+        }
+    }
+    let rest: f64 = rest.iter().zip(of_rest).map(|(a, b)| a * b).sum();
+    rest + (sums[0] + sums[1]) + (sums[2] + sums[3])
+}
+
 /// The solution in the place of b, with U of [`factor`].
+#[inline(always)]
 pub(super) fn solve<const N: usize>(u: &[[f64; N]; N], n: usize, b: &mut [f64; N]) {
     for (i, row) in u.iter().enumerate().take(n) {
         let x = b[i] / row[i];
@@ -58,11 +75,7 @@ pub(super) fn solve<const N: usize>(u: &[[f64; N]; N], n: usize, b: &mut [f64; N
         b[i] = x;
     }
     for (i, row) in u.iter().enumerate().take(n).rev() {
-        let mut sum = b[i];
-        for (b, u) in b[i + 1..n].iter().zip(&row[i + 1..n]) {
-            sum -= u * b;
-        }
-        b[i] = sum / row[i];
+        b[i] = (b[i] - product(&row[i + 1..n], &b[i + 1..n])) / row[i];
     }
 }
 

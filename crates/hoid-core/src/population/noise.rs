@@ -155,9 +155,8 @@ impl NoiseModel {
     }
 
     /// Cholesky factor of the sums over the lags.
-    fn factor(&self) -> Option<[[f64; LARGEST_ORDER]; LARGEST_ORDER]> {
-        let p = self.order;
-        let mut matrix = [[0.0; LARGEST_ORDER]; LARGEST_ORDER];
+    #[inline(always)]
+    fn factor<const N: usize>(&self, matrix: &mut [[f64; N]; N], p: usize) -> bool {
         for i in 0..p {
             let sums = &self.products[(i + 1) / 2][(i + 1) % 2];
             for (j, to) in matrix[i][..p].iter_mut().enumerate() {
@@ -165,7 +164,7 @@ impl NoiseModel {
             }
             matrix[i][i] += self.ridge();
         }
-        cholesky::factor(&mut matrix, p).then_some(matrix)
+        cholesky::factor(matrix, p)
     }
 
     /// Covariance of d: `S^-1 (sum mu_k^2 w v v') S^-1`, S the sums with the weights `mu_k w` of
@@ -173,7 +172,10 @@ impl NoiseModel {
     /// .5 for a memory that fades evenly, .6 while it grows as half of the time since the start; .6
     /// here. `None` before the sums determine it.
     pub fn covariance(&self) -> Option<[[f64; LARGEST_ORDER]; LARGEST_ORDER]> {
-        let matrix = self.factor().filter(|_| self.samples > self.order as f64)?;
+        let mut matrix = [[0.0; LARGEST_ORDER]; LARGEST_ORDER];
+        if self.samples <= self.order as f64 || !self.factor(&mut matrix, self.order) {
+            return None;
+        }
         let mut covariance = [[0.0; LARGEST_ORDER]; LARGEST_ORDER];
         for (i, row) in covariance.iter_mut().enumerate().take(self.order) {
             row[i] = 0.6;
@@ -184,16 +186,26 @@ impl NoiseModel {
 
     /// D of what was taken so far. It stays where the sums do not determine it.
     pub fn solve(&mut self) {
-        let p = self.order;
+        match self.order {
+            ORDER => self.solve_of::<ORDER>(ORDER),
+            order => self.solve_of::<LARGEST_ORDER>(order),
+        }
+    }
+
+    #[inline(always)]
+    fn solve_of<const N: usize>(&mut self, p: usize) {
         let ridge = self.ridge();
-        let mut d = [0.0; LARGEST_ORDER];
+        let mut d = [0.0; N];
         for (i, d) in d.iter_mut().enumerate().take(p) {
             *d = ridge * self.supposed.get(i).copied().unwrap_or(0.0) - self.product(0, i + 1);
         }
-        let Some(matrix) = self.factor() else { return };
+        let mut matrix = [[0.0; N]; N];
+        if !self.factor(&mut matrix, p) {
+            return;
+        }
         cholesky::solve(&matrix, p, &mut d);
         if d.iter().all(|d| d.is_finite()) {
-            self.d = d;
+            self.d[..N].copy_from_slice(&d);
         }
     }
 }
