@@ -422,3 +422,5 @@ fn shapes(basis: &Basis) -> Shapes {
 
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod twin;

@@ -21,7 +21,7 @@ use super::{
     basis::{Point, Regressors},
     sizes::{FORMS, GAINS, HELD, LINEAR, STATES},
 };
-use crate::adaptive::elementary::ln_of_normal;
+use crate::adaptive::elementary::{ln_1p, ln_of_normal};
 
 /// A number of each form. A filter does the same with the numbers of both.
 pub(super) use super::pair::Pair as Forms;
@@ -29,6 +29,8 @@ const _: () = assert!(FORMS == 2);
 
 /// Largest correction of omega and zeta, as a share of theirs, and of tau, s.
 const FARTHEST: [[f64; 2]; HELD] = [[-0.5, 0.6], [-0.8, 1.5], [-0.1, 0.1]];
+/// What `eps^2/(nu S)` counts for at most, and where it is no number.
+const LARGEST: f64 = 1e300;
 /// Entries of the lower triangle, row by row, and those of the gains among them, which are the first.
 const ENTRIES: usize = STATES * (STATES + 1) / 2;
 const SHAPE: usize = GAINS * (GAINS + 1) / 2;
@@ -129,7 +131,7 @@ impl Foretold {
             let most = total.map(|total| seen.limit * libm::sqrt(total));
             limited = eps.at_least(Forms::ZERO - most).at_most(most);
         }
-        let tails = (one + square * seen.per_nu).map(ln_of_normal);
+        let tails = (square * seen.per_nu).at_most(Forms::both(LARGEST)).map(ln_1p);
         let log_density = Forms::both(-0.5) * (total.map(ln_of_normal) + Forms::both(seen.nu + 1.0) * tails);
         (Move { back, limited }, log_density)
     }
