@@ -36,6 +36,11 @@ pub(super) const LATEST_S: f64 = 0.9;
 const LOOK_S: f64 = 1.0;
 const MOVE_S: f64 = 4.0;
 
+/// A time in samples, at least one.
+fn samples_of(seconds: f64, sample_time: f64) -> u64 {
+    libm::round(seconds / sample_time).max(1.0) as u64
+}
+
 /// What was, for all: errors with the newest, and outputs, the newest first.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Past<'a> {
@@ -88,6 +93,9 @@ pub(super) struct Follower {
     pub reopened: bool,
     /// True where a fit stood at the beginning.
     known: bool,
+    /// Samples between two solutions of the noise model, and between two looks at the place.
+    solve_every: u64,
+    look_every: u64,
     powers: [f64; 2],
     pub variance: [f64; 2],
     pub unit: f64,
@@ -98,7 +106,10 @@ crate::state!([] Follower { place, noise, gains, samples, began, reopened, known
 impl Follower {
     /// At rest; `None` for numbers that make no sense.
     pub fn new(basis: Basis, prior: &PopulationPrior) -> Option<Self> {
+        let ts = prior.gains.sample_time;
         Some(Self {
+            solve_every: samples_of(SOLVE_S, ts),
+            look_every: samples_of(LOOK_S, ts),
             noise: NoiseModel::new(prior.order, prior.noise_memory, prior.gains.sample_time)?,
             gains: Gains::new(prior.gains, &basis)?,
             place: Place::new(basis),
@@ -242,15 +253,14 @@ impl Follower {
         }
         let state = self.gains.state();
         self.follow_noise(past, u, eps, &state);
-        let every = |seconds: f64| libm::round(seconds / ts).max(1.0) as u64;
-        if self.samples.is_multiple_of(every(SOLVE_S)) {
+        if self.is_renewed() {
             self.noise.solve();
             let [re, im] = self.response(REFERENCE);
-            let share = (every(SOLVE_S) as f64 * ts / UNIT_S).min(1.0);
+            let share = (self.solve_every as f64 * ts / UNIT_S).min(1.0);
             self.unit += share * (libm::hypot(re, im) - self.unit);
         }
-        if self.reopened && self.samples.is_multiple_of(every(LOOK_S)) {
-            self.look(past, &state, every(MOVE_S));
+        if self.reopened && self.samples.is_multiple_of(self.look_every) {
+            self.look(past, &state, samples_of(MOVE_S, ts));
         }
         Learnt {
             white,
@@ -261,8 +271,8 @@ impl Follower {
     }
 
     /// True at the samples at which the noise model is solved anew.
-    pub fn is_renewed(&self, ts: f64) -> bool {
-        self.samples.is_multiple_of(libm::round(SOLVE_S / ts).max(1.0) as u64)
+    pub fn is_renewed(&self) -> bool {
+        self.samples.is_multiple_of(self.solve_every)
     }
 
     /// v with all its lags by the gains of now.

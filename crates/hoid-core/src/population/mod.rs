@@ -50,6 +50,7 @@ pub mod usual;
 
 mod cholesky;
 mod contest;
+mod elimination;
 mod ends;
 mod filter;
 mod follower;

@@ -9,7 +9,7 @@
 //!
 //! D is only ever used as a filter of finite length: it need not be stable.
 
-use super::{cholesky, pair::Pair, sizes::LARGEST_ORDER, usual::ORDER};
+use super::{cholesky, elimination, pair::Pair, sizes::LARGEST_ORDER, usual::ORDER};
 
 const WIDTH: usize = LARGEST_ORDER + 1;
 /// The same in pairs, a whole number of them.
@@ -154,17 +154,18 @@ impl NoiseModel {
         self.prior * self.product(0, 0) / self.weight.max(1.0) * SUPPOSED + 1e-12
     }
 
-    /// Cholesky factor of the sums over the lags.
+    /// The sums over the lags, and what is supposed: the upper triangle.
     #[inline(always)]
-    fn factor<const N: usize>(&self, matrix: &mut [[f64; N]; N], p: usize) -> bool {
+    fn sums<const N: usize>(&self, p: usize) -> [[f64; N]; N] {
+        let (mut matrix, ridge) = ([[0.0; N]; N], self.ridge());
         for i in 0..p {
             let sums = &self.products[(i + 1) / 2][(i + 1) % 2];
             for (j, to) in matrix[i][..p].iter_mut().enumerate() {
                 *to = self.fade * sums[(j + 1) / 2].0[(j + 1) % 2];
             }
-            matrix[i][i] += self.ridge();
+            matrix[i][i] += ridge;
         }
-        cholesky::factor(matrix, p)
+        matrix
     }
 
     /// Covariance of d: `S^-1 (sum mu_k^2 w v v') S^-1`, S the sums with the weights `mu_k w` of
@@ -172,8 +173,9 @@ impl NoiseModel {
     /// .5 for a memory that fades evenly, .6 while it grows as half of the time since the start; .6
     /// here. `None` before the sums determine it.
     pub fn covariance(&self) -> Option<[[f64; LARGEST_ORDER]; LARGEST_ORDER]> {
-        let mut matrix = [[0.0; LARGEST_ORDER]; LARGEST_ORDER];
-        if self.samples <= self.order as f64 || !self.factor(&mut matrix, self.order) {
+        let upper = self.sums::<LARGEST_ORDER>(self.order);
+        let mut matrix = core::array::from_fn(|i| core::array::from_fn(|j| upper[i.min(j)][i.max(j)]));
+        if self.samples <= self.order as f64 || !cholesky::factor(&mut matrix, self.order) {
             return None;
         }
         let mut covariance = [[0.0; LARGEST_ORDER]; LARGEST_ORDER];
@@ -199,12 +201,8 @@ impl NoiseModel {
         for (i, d) in d.iter_mut().enumerate().take(p) {
             *d = ridge * self.supposed.get(i).copied().unwrap_or(0.0) - self.product(0, i + 1);
         }
-        let mut matrix = [[0.0; N]; N];
-        if !self.factor(&mut matrix, p) {
-            return;
-        }
-        cholesky::solve(&matrix, p, &mut d);
-        if d.iter().all(|d| d.is_finite()) {
+        let solved = elimination::solve(&mut self.sums(p), p, &mut d);
+        if solved && d.iter().all(|d| d.is_finite()) {
             self.d[..N].copy_from_slice(&d);
         }
     }
