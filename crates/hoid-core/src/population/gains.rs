@@ -372,16 +372,15 @@ impl Gains {
     /// Mean of gains, level and corrections.
     #[inline]
     pub fn state(&self) -> [f64; STATES] {
-        let (mut mean, mut total) = ([Forms::ZERO; STATES], Forms::ZERO);
-        for filter in &self.filters {
-            let weight = self.weight_in_means(filter);
-            total += weight;
-            for (m, s) in mean.iter_mut().zip(filter.state) {
-                *m += weight * s;
+        let weights = self.filters.each_ref().map(|filter| self.weight_in_means(filter));
+        let share = 1.0 / weights.iter().fold(Forms::ZERO, |sum, weight| sum + *weight).sum();
+        core::array::from_fn(|i| {
+            let mut mean = Forms::ZERO;
+            for (filter, weight) in self.filters.iter().zip(&weights) {
+                mean += *weight * filter.state[i];
             }
-        }
-        let share = 1.0 / total.sum();
-        mean.map(|m| m.sum() * share)
+            mean.sum() * share
+        })
     }
 
     /// Covariance of the mixture: the differences between the filters are part of it.
