@@ -124,7 +124,7 @@ fn ln_of_parts(k: f64, f: f64) -> f64 {
     let s = f / (2.0 + f);
     let square = s * s;
     let fourth = square * square;
-    let even = ((1.479_819_860_511_658_6e-1 * fourth + 1.818_357_216_161_805e-1) * fourth + 2.857_142_874_366_239_2e-1)
+    let even = ((1.479_819_860_511_658_6e-1 * fourth + 1.818_357_216_161_805e-1) * fourth + 2.857_142_874_366_239e-1)
         * fourth
         + 6.666_666_666_666_735e-1;
     let odd = (1.531_383_769_920_937_3e-1 * fourth + 2.222_219_843_214_978_4e-1) * fourth + 3.999_999_999_940_942e-1;
@@ -144,7 +144,10 @@ mod tests {
                 let e = libm::exp(x);
                 assert!((super::exp(x) - e).abs() <= 4e-16 * e, "{x}");
                 let within = x.max(-700.0);
-                assert!((super::exp_within(within) - libm::exp(within)).abs() <= 4e-16 * e.max(1e-304), "{x}");
+                assert!(
+                    (super::exp_within(within) - libm::exp(within)).abs() <= 4e-16 * e.max(1e-304),
+                    "{x}"
+                );
             }
         }
         for i in -3000..3000 {

@@ -168,7 +168,9 @@ impl Basis {
             first[i][N] * (1.0 - part) + first[i][N + 1] / ts
         }));
         let late = through(core::array::from_fn(|i| first[i][N] * part - first[i][N + 1] / ts));
-        let column = |of: &dyn Fn(usize) -> f64| -> Paired { paired(&core::array::from_fn(|i| if i < N { of(i) } else { 0.0 })) };
+        let column = |of: &dyn Fn(usize) -> f64| -> Paired {
+            paired(&core::array::from_fn(|i| if i < N { of(i) } else { 0.0 }))
+        };
         self.columns = core::array::from_fn(|j| column(&|i| phi[i][j]));
         self.taps = [
             column(&|i| second[i][N + 1] / ts),

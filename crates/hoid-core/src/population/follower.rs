@@ -167,7 +167,10 @@ impl Follower {
         }
         Whitened {
             y,
-            regressors: self.place.basis().regressors(&core::array::from_fn(|i| z[i / 2].0[i % 2])),
+            regressors: self
+                .place
+                .basis()
+                .regressors(&core::array::from_fn(|i| z[i / 2].0[i % 2])),
             level: self.noise.sum(),
         }
     }

@@ -17,10 +17,14 @@
 //! constant: short among the drifts, for a person's gains may be steady or not from one moment to the
 //! next; long among the forms. (D. T. Magill, IEEE Trans. Automatic Control 10 (1965) 434-439; P. Andersson,
 //! Int. J. Control 42 (1985) 1175-1193, of filters that are born where a change is supposed.)
+//!
+//! The filters of both forms stand side by side (`kalman`), and a sample is taken step by step: all
+//! foretell it, all are weighed, all learn. A weight is kept as it is beside its logarithm, so that means
+//! need no exponential.
 
 use super::{
     basis::{Basis, Point, Regressors},
-    kalman::{Forms, Foretold, Kalman, Move, Seen, Shapes, shapes_of},
+    kalman::{Foretold, Forms, Kalman, Move, Seen, Shapes, shapes_of},
     sizes::{DRIFTS, FILTERS, FORMS, GAINS, HELD, LINEAR, NEWBORNS, STATES},
 };
 use crate::adaptive::elementary::{exp_within, ln_of_normal};
@@ -131,7 +135,7 @@ impl Gains {
         let mut gains = Self {
             prior,
             shapes: shapes(basis),
-            supposed: core::array::from_fn(|k| libm::log(prior.shares.get(k).copied().unwrap_or(newborn))),
+            supposed: core::array::from_fn(|k| libm::log(prior.shares.get(k).copied().unwrap_or(newborn)).max(LOWEST)),
             filters: [Kalman::ZERO; FILTERS],
             weights: Forms::ZERO,
             log_weights: Forms::ZERO,
@@ -298,7 +302,10 @@ impl Gains {
             }
         }
         let out = |weight: f64| weight < LEAST;
-        if self.filters[..DRIFTS].iter().any(|f| f.log_weight.0.into_iter().any(out)) {
+        if self.filters[..DRIFTS]
+            .iter()
+            .any(|f| f.log_weight.0.into_iter().any(out))
+        {
             (0..FORMS).for_each(|form| self.restart(form));
         }
         let phase = self.samples % self.life;
@@ -347,7 +354,12 @@ impl Gains {
     /// The innovation of the mixture, without an update.
     pub fn innovation(&self, y: f64, regressors: &Regressors, level: f64) -> f64 {
         // Variance, point and tails are none of the prediction.
-        let nowhere = Point { tau: 0.0, omega: 0.0, zeta: 0.0, lag: 0.0 };
+        let nowhere = Point {
+            tau: 0.0,
+            omega: 0.0,
+            zeta: 0.0,
+            lag: 0.0,
+        };
         let seen = Seen::new(y, regressors, level, 0.0, nowhere, [1.0; 2]);
         let (mut innovation, mut total) = (Forms::ZERO, Forms::ZERO);
         for filter in &self.filters {

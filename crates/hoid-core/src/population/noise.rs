@@ -33,8 +33,8 @@ pub struct NoiseModel {
     prior: f64,
     longest: f64,
     shortest: f64,
-    /// Upper triangle of the sums over `fade`, in pairs of rows and of columns. A sample leaves the sums of before as they
-    /// are and counts for more, until the digits would be lost.
+    /// Upper triangle of the sums over `fade`, in pairs of rows and of columns: a sample leaves those of
+    /// before as they are and counts for more.
     products: [[[Pair; PAIRS]; 2]; PAIRS],
     fade: f64,
     weight: f64,
@@ -119,7 +119,11 @@ impl NoiseModel {
         self.fade *= lambda;
         if self.fade < FADED {
             let fade = Pair::both(self.fade);
-            self.products.as_flattened_mut().as_flattened_mut().iter_mut().for_each(|p| *p = *p * fade);
+            self.products
+                .as_flattened_mut()
+                .as_flattened_mut()
+                .iter_mut()
+                .for_each(|p| *p = *p * fade);
             self.fade = 1.0;
         }
         let weight = weight / self.fade;
@@ -159,9 +163,11 @@ impl NoiseModel {
     fn sums<const N: usize>(&self, p: usize) -> [[f64; N]; N] {
         let (mut matrix, ridge) = ([[0.0; N]; N], self.ridge());
         for i in 0..p {
-            let sums = &self.products[(i + 1) / 2][(i + 1) % 2];
-            for (j, to) in matrix[i][..p].iter_mut().enumerate() {
-                *to = self.fade * sums[(j + 1) / 2].0[(j + 1) % 2];
+            let lag = i + 1;
+            let sums = &self.products[lag / 2][lag % 2];
+            for (lag, to) in (1..).zip(&mut matrix[i][..p]) {
+                let pair: usize = lag / 2;
+                *to = self.fade * sums[pair].0[lag % 2];
             }
             matrix[i][i] += ridge;
         }

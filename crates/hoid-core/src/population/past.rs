@@ -36,7 +36,9 @@ impl PastSignals {
     /// The newest first.
     #[inline(always)]
     pub fn newest_first(&self) -> &[Paired] {
-        self.twice[self.newest..].first_chunk::<LARGEST_ORDER>().map_or(&[], |past| past)
+        self.twice[self.newest..]
+            .first_chunk::<LARGEST_ORDER>()
+            .map_or(&[], |past| past)
     }
 
     /// Takes the signals of a sample in the place of the oldest.

@@ -278,9 +278,17 @@ fn what_cannot_be_does_little_harm() {
         let mut gains = Gains::new(prior, &basis()).unwrap();
         gains.begin(2.0, 0.5);
         take(&mut gains, far);
-        assert!(gains.state().iter().all(|s| s.abs() < 10.0), "{far}: {:?}", gains.state());
+        assert!(
+            gains.state().iter().all(|s| s.abs() < 10.0),
+            "{far}: {:?}",
+            gains.state()
+        );
         assert!((gains.weights.sum() - 1.0).abs() < 1e-12, "{far}");
-        let mut logs = gains.filters.iter().flat_map(|f| f.log_weight.0).chain(gains.log_weights.0);
+        let mut logs = gains
+            .filters
+            .iter()
+            .flat_map(|f| f.log_weight.0)
+            .chain(gains.log_weights.0);
         assert!(logs.all(f64::is_finite), "{far}");
         let covariance = gains.covariance();
         assert!((0..STATES).all(|i| covariance[i][i] >= 0.0), "{far}");
