@@ -231,13 +231,13 @@ impl Gains {
         let [among_forms, among_drifts] = prior.forgotten;
         let (mut innovation, mut total) = (Forms::ZERO, Forms::ZERO);
         // Each step for all filters before the next: they do not wait for one another, the steps do.
-        let foretold: [Foretold; FILTERS] = core::array::from_fn(|k| {
-            let filter = &mut self.filters[k];
+        let mut foretold = [Foretold::NOTHING; FILTERS];
+        for (k, (filter, foretold)) in self.filters.iter_mut().zip(&mut foretold).enumerate() {
             let walk = prior.drifts.get(k).copied().unwrap_or(prior.newborn[0]) * around.unit;
             filter.open_gains(&self.shapes, walk * walk * ts);
             filter.open(GAINS, around.level[usize::from(k > 0)] * ts);
-            filter.foretold(&seen)
-        });
+            *foretold = filter.foretold(&seen);
+        }
         let mut moves = [Move::NONE; FILTERS];
         for (k, (filter, own)) in self.filters.iter_mut().zip(&foretold).enumerate() {
             innovation += filter.weight * own.eps;

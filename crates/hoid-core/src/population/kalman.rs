@@ -116,6 +116,12 @@ pub(super) struct Foretold {
 }
 
 impl Foretold {
+    pub const NOTHING: Self = Self {
+        eps: Forms::ZERO,
+        through: [Forms::ZERO; STATES],
+        spread: Forms::ZERO,
+    };
+
     /// How much the sample moves the filter, and the logarithm of its density, but for a constant.
     #[inline(always)]
     pub fn weighed(&self, seen: &Seen) -> (Move, Forms) {
