@@ -28,7 +28,11 @@
 //!
 //! Each x_i is divided by its gain at [`REFERENCE`], so that all gains are in units of |Y| there.
 
-use super::sizes::{GAINS, HELD, SIGNALS, STATES};
+use super::{
+    pair::Pair,
+    past::{Paired, paired},
+    sizes::{GAINS, HELD, SIGNALS, STATES},
+};
 
 /// Frequency at which each response has a gain of one, rad/s.
 pub const REFERENCE: f64 = 2.0;
@@ -86,8 +90,9 @@ pub struct Regressors {
 pub struct Basis {
     point: Point,
     sample_time: f64,
-    phi: [[f64; N]; N],
-    taps: [[f64; N]; 3],
+    /// Columns of Phi, and T_0 to T_2, each with a zero behind, so that they are as long as the signals.
+    columns: [Paired; N],
+    taps: [Paired; 3],
     monic: [f64; N],
     delay: usize,
     part: f64,
@@ -95,7 +100,7 @@ pub struct Basis {
     z: [f64; N],
 }
 
-crate::state!([] Basis { point, phi, taps, monic, delay, part, z });
+crate::state!([] Basis { point, columns, taps, monic, delay, part, z });
 
 impl Basis {
     /// At rest. Ts in s. `None` for numbers that are not positive (the delay: negative), or not
@@ -109,8 +114,8 @@ impl Basis {
         let mut basis = Self {
             point,
             sample_time,
-            phi: [[0.0; N]; N],
-            taps: [[0.0; N]; 3],
+            columns: [[Pair::ZERO; SIGNALS / 2]; N],
+            taps: [[Pair::ZERO; SIGNALS / 2]; 3],
             monic: [0.0; N],
             delay: 0,
             part: 0.0,
@@ -123,7 +128,7 @@ impl Basis {
         let sound = basis
             .scale
             .iter()
-            .chain(basis.phi.iter().flatten())
+            .chain(basis.columns.iter().flatten().flat_map(|pair| &pair.0))
             .all(|s| s.is_finite());
         sound.then_some(basis)
     }
@@ -163,11 +168,14 @@ impl Basis {
             first[i][N] * (1.0 - part) + first[i][N + 1] / ts
         }));
         let late = through(core::array::from_fn(|i| first[i][N] * part - first[i][N + 1] / ts));
-        self.phi = core::array::from_fn(|i| core::array::from_fn(|j| phi[i][j]));
+        let column = |of: &dyn Fn(usize) -> f64| -> Paired {
+            paired(&core::array::from_fn(|i| if i < N { of(i) } else { 0.0 }))
+        };
+        self.columns = core::array::from_fn(|j| column(&|i| phi[i][j]));
         self.taps = [
-            core::array::from_fn(|i| second[i][N + 1] / ts),
-            core::array::from_fn(|i| early[i] + second[i][N] - second[i][N + 1] / ts),
-            late,
+            column(&|i| second[i][N + 1] / ts),
+            column(&|i| early[i] + second[i][N] - second[i][N + 1] / ts),
+            column(&|i| late[i]),
         ];
         (self.delay, self.part) = (whole as usize, part);
     }
@@ -197,9 +205,10 @@ impl Basis {
             z *= -a;
         }
         other
-            .phi
+            .columns
             .iter()
             .flatten()
+            .flat_map(|pair| &pair.0)
             .chain(&other.z)
             .all(|x| x.is_finite())
             .then_some(other)
@@ -230,20 +239,20 @@ impl Basis {
     /// The signals of a sample from the errors of `delay`, `delay + 1` and `delay + 2` samples ago.
     #[inline(always)]
     pub fn step(&mut self, errors: [f64; 3]) -> Signals {
-        let z = self.z;
-        let mut last = self.delayed([errors[0], errors[1]]);
-        let mut signals = [0.0; SIGNALS];
-        for i in 0..N {
-            let mut sum = 0.0;
+        let mut sums = [Pair::ZERO; SIGNALS / 2];
+        for i in 0..sums.len() {
             for j in 0..N {
-                sum += self.phi[i][j] * z[j];
+                sums[i] += self.columns[j][i] * Pair::both(self.z[j]);
             }
             for j in 0..3 {
-                sum += self.taps[j][i] * errors[j];
+                sums[i] += self.taps[j][i] * Pair::both(errors[j]);
             }
-            self.z[i] = sum;
-            signals[i] = sum;
-            last -= self.monic[i] * sum;
+        }
+        let mut signals: Signals = core::array::from_fn(|i| sums[i / 2].0[i % 2]);
+        let mut last = self.delayed([errors[0], errors[1]]);
+        for i in 0..N {
+            self.z[i] = signals[i];
+            last -= self.monic[i] * signals[i];
         }
         signals[N] = last;
         signals

@@ -237,7 +237,7 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> PopulationFilter<E> {
         let Learnt {
             white, innovation: eps, ..
         } = learnt;
-        if believed.is_renewed(p.gains.sample_time) {
+        if believed.is_renewed() {
             self.detector.look_at(believed.responses(p.detection.frequency));
         }
         if (believed.samples as f64) * p.gains.sample_time < SETTLED_S {

@@ -2,10 +2,12 @@
 //! the past are shared with others who are followed beside ([`super::contest`]).
 
 use super::{
-    basis::{Basis, Complex, Point, REFERENCE, Regressors, Signals},
+    basis::{Basis, Complex, Point, REFERENCE, Regressors},
     gains::{Around, Gains},
     known::Known,
     noise::NoiseModel,
+    pair::Pair,
+    past::{Paired, paired},
     place::Place,
     prior::PopulationPrior,
     sizes::{GAINS, HELD, LARGEST_ORDER, LINEAR, STATES},
@@ -33,6 +35,11 @@ pub(super) const LATEST_S: f64 = 0.9;
 /// Time between two looks at whether it should, and time that a move takes, s.
 const LOOK_S: f64 = 1.0;
 const MOVE_S: f64 = 4.0;
+
+/// A time in samples, at least one.
+fn samples_of(seconds: f64, sample_time: f64) -> u64 {
+    libm::round(seconds / sample_time).max(1.0) as u64
+}
 
 /// What was, for all: errors with the newest, and outputs, the newest first.
 #[derive(Debug, Clone, Copy)]
@@ -86,6 +93,9 @@ pub(super) struct Follower {
     pub reopened: bool,
     /// True where a fit stood at the beginning.
     known: bool,
+    /// Samples between two solutions of the noise model, and between two looks at the place.
+    solve_every: u64,
+    look_every: u64,
     powers: [f64; 2],
     pub variance: [f64; 2],
     pub unit: f64,
@@ -96,7 +106,10 @@ crate::state!([] Follower { place, noise, gains, samples, began, reopened, known
 impl Follower {
     /// At rest; `None` for numbers that make no sense.
     pub fn new(basis: Basis, prior: &PopulationPrior) -> Option<Self> {
+        let ts = prior.gains.sample_time;
         Some(Self {
+            solve_every: samples_of(SOLVE_S, ts),
+            look_every: samples_of(LOOK_S, ts),
             noise: NoiseModel::new(prior.order, prior.noise_memory, prior.gains.sample_time)?,
             gains: Gains::new(prior.gains, &basis)?,
             place: Place::new(basis),
@@ -140,16 +153,24 @@ impl Follower {
     /// `D u`, D times the responses, and D at zero.
     #[inline(always)]
     pub fn whitened(&self, past: &Past, u: f64) -> Whitened {
-        let (mut y, mut z): (f64, Signals) = (u, *self.place.signals());
-        for ((d, u), past) in self.noise.d().iter().zip(past.u).zip(self.place.past()) {
-            y += d * u;
-            for (z, past) in z.iter_mut().zip(past) {
-                *z += d * past;
+        let (mut y, mut z) = (u, paired(self.place.signals()));
+        let (d, u, before) = (self.noise.padded_d(), past.u, self.place.past());
+        // Four lags at a time.
+        let (d, u, before) = (d.as_chunks::<4>().0, u.as_chunks::<4>().0, before.as_chunks::<4>().0);
+        for ((d, u), before) in d.iter().zip(u).zip(before) {
+            for k in 0..4 {
+                y += d[k] * u[k];
+                for (z, before) in z.iter_mut().zip(before[k]) {
+                    *z += Pair::both(d[k]) * before;
+                }
             }
         }
         Whitened {
             y,
-            regressors: self.place.basis().regressors(&z),
+            regressors: self
+                .place
+                .basis()
+                .regressors(&core::array::from_fn(|i| z[i / 2].0[i % 2])),
             level: self.noise.sum(),
         }
     }
@@ -235,15 +256,14 @@ impl Follower {
         }
         let state = self.gains.state();
         self.follow_noise(past, u, eps, &state);
-        let every = |seconds: f64| libm::round(seconds / ts).max(1.0) as u64;
-        if self.samples.is_multiple_of(every(SOLVE_S)) {
+        if self.is_renewed() {
             self.noise.solve();
             let [re, im] = self.response(REFERENCE);
-            let share = (every(SOLVE_S) as f64 * ts / UNIT_S).min(1.0);
+            let share = (self.solve_every as f64 * ts / UNIT_S).min(1.0);
             self.unit += share * (libm::hypot(re, im) - self.unit);
         }
-        if self.reopened && self.samples.is_multiple_of(every(LOOK_S)) {
-            self.look(past, &state, every(MOVE_S));
+        if self.reopened && self.samples.is_multiple_of(self.look_every) {
+            self.look(past, &state, samples_of(MOVE_S, ts));
         }
         Learnt {
             white,
@@ -254,8 +274,8 @@ impl Follower {
     }
 
     /// True at the samples at which the noise model is solved anew.
-    pub fn is_renewed(&self, ts: f64) -> bool {
-        self.samples.is_multiple_of(libm::round(SOLVE_S / ts).max(1.0) as u64)
+    pub fn is_renewed(&self) -> bool {
+        self.samples.is_multiple_of(self.solve_every)
     }
 
     /// v with all its lags by the gains of now.
@@ -264,13 +284,13 @@ impl Follower {
         if self.samples <= order as u64 {
             return;
         }
-        let weights = self.place.basis().weights(state);
-        let left = |u: f64, z: &Signals| {
-            let response: f64 = weights.iter().zip(z).map(|(w, z)| w * z).sum();
-            u - state[GAINS] - response
+        let weights = paired(&self.place.basis().weights(state));
+        let left = |u: f64, z: &Paired| {
+            let response = weights[0] * z[0] + weights[1] * z[1] + weights[2] * z[2];
+            u - state[GAINS] - response.sum()
         };
         let mut v = [0.0; LARGEST_ORDER + 1];
-        v[0] = left(u, self.place.signals());
+        v[0] = left(u, &paired(self.place.signals()));
         for ((v, u), z) in v[1..=order].iter_mut().zip(past.u).zip(self.place.past()) {
             *v = left(*u, z);
         }

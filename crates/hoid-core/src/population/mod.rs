@@ -50,11 +50,14 @@ pub mod usual;
 
 mod cholesky;
 mod contest;
+mod elimination;
 mod ends;
 mod filter;
 mod follower;
 mod kalman;
 mod operator;
+mod pair;
+mod past;
 mod place;
 mod prior;
 mod sizes;

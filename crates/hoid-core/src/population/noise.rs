@@ -9,15 +9,20 @@
 //!
 //! D is only ever used as a filter of finite length: it need not be stable.
 
-use super::{cholesky, sizes::LARGEST_ORDER};
+use super::{cholesky, elimination, pair::Pair, sizes::LARGEST_ORDER, usual::ORDER};
 
 const WIDTH: usize = LARGEST_ORDER + 1;
+/// The same in pairs, a whole number of them.
+const PAIRS: usize = WIDTH.div_ceil(2);
 /// A number for each lag from zero on.
 pub type Lags = [f64; WIDTH];
 /// Time constants of the remnant that is supposed before anything is known, s.
 const USUAL: [f64; 2] = [0.3, 0.06];
 /// Weight of that supposition: a share of the power of v, in samples.
 const SUPPOSED: f64 = 1e-4;
+
+/// Share of the sums from which on they are scaled anew.
+const FADED: f64 = 0.5;
 
 /// The sums and D.
 #[derive(Debug, Clone, PartialEq)]
@@ -28,13 +33,16 @@ pub struct NoiseModel {
     prior: f64,
     longest: f64,
     shortest: f64,
-    products: [[f64; WIDTH]; WIDTH],
+    /// Upper triangle of the sums over `fade`, in pairs of rows and of columns: a sample leaves those of
+    /// before as they are and counts for more.
+    products: [[[Pair; PAIRS]; 2]; PAIRS],
+    fade: f64,
     weight: f64,
     samples: f64,
     d: [f64; LARGEST_ORDER],
 }
 
-crate::state!([] NoiseModel { products, weight, samples, d });
+crate::state!([] NoiseModel { products, fade, weight, samples, d });
 
 impl NoiseModel {
     /// Before anything is known. Ts and memory in s. `None` for an order below 2 or above
@@ -53,7 +61,8 @@ impl NoiseModel {
             prior: 1.0 / ts,
             longest: memory / ts,
             shortest: (3.0 / ts).min(memory / ts).max(2.0 * order as f64),
-            products: [[0.0; WIDTH]; WIDTH],
+            products: [[[Pair::ZERO; PAIRS]; 2]; PAIRS],
+            fade: 1.0,
             weight: 0.0,
             samples: 0.0,
             d,
@@ -69,10 +78,10 @@ impl NoiseModel {
         // The memory is half of the samples that were taken.
         let weight = samples.min(self.longest);
         self.samples = 2.0 * weight;
-        self.weight = weight;
+        (self.weight, self.fade) = (weight, 1.0);
         for i in 0..=self.order {
             for j in i..=self.order {
-                self.products[i][j] = weight * lags[j - i];
+                self.products[i / 2][i % 2][j / 2].0[j % 2] = weight * lags[j - i];
             }
         }
         self.solve();
@@ -82,6 +91,12 @@ impl NoiseModel {
     /// Coefficients behind the 1.
     pub fn d(&self) -> &[f64] {
         &self.d[..self.order]
+    }
+
+    /// The same with zeros behind, up to a multiple of four.
+    #[inline(always)]
+    pub(super) fn padded_d(&self) -> &[f64] {
+        &self.d[..self.order.next_multiple_of(4).min(LARGEST_ORDER)]
     }
 
     /// Largest lag.
@@ -101,31 +116,62 @@ impl NoiseModel {
         let memory = (0.5 * self.samples).clamp(self.shortest, self.longest.max(self.shortest));
         let lambda = 1.0 - 1.0 / memory;
         self.weight = lambda * self.weight + 1.0;
-        let n = self.order + 1;
-        for i in 0..n {
-            let a = weight * v[i];
-            for (product, v) in self.products[i][i..n].iter_mut().zip(&v[i..n]) {
-                *product = lambda * *product + a * v;
+        self.fade *= lambda;
+        if self.fade < FADED {
+            let fade = Pair::both(self.fade);
+            self.products
+                .as_flattened_mut()
+                .as_flattened_mut()
+                .iter_mut()
+                .for_each(|p| *p = *p * fade);
+            self.fade = 1.0;
+        }
+        let weight = weight / self.fade;
+        // As a constant the usual order makes loops of known length.
+        match self.order {
+            ORDER => self.add(v, weight, ORDER),
+            order => self.add(v, weight, order),
+        }
+    }
+
+    #[inline(always)]
+    fn add(&mut self, v: &Lags, weight: f64, order: usize) {
+        let pairs = (order / 2 + 1).min(PAIRS);
+        let v: [Pair; PAIRS] = core::array::from_fn(|i| Pair([v[2 * i], v.get(2 * i + 1).copied().unwrap_or(0.0)]));
+        for first in 0..pairs {
+            let [above, below] = &mut self.products[first];
+            let [a, b] = v[first].0.map(|v| Pair::both(weight * v));
+            for k in first..pairs {
+                above[k] += a * v[k];
+                below[k] += b * v[k];
             }
         }
+    }
+
+    /// The sum of the products of two lags, the first not the larger.
+    fn product(&self, i: usize, j: usize) -> f64 {
+        self.fade * self.products[i / 2][i % 2][j / 2].0[j % 2]
     }
 
     /// Weight of what is supposed, in the unit of the sums.
     fn ridge(&self) -> f64 {
-        self.prior * self.products[0][0] / self.weight.max(1.0) * SUPPOSED + 1e-12
+        self.prior * self.product(0, 0) / self.weight.max(1.0) * SUPPOSED + 1e-12
     }
 
-    /// Cholesky factor of the sums over the lags.
-    fn factor(&self) -> Option<[[f64; LARGEST_ORDER]; LARGEST_ORDER]> {
-        let p = self.order;
-        let mut matrix = [[0.0; LARGEST_ORDER]; LARGEST_ORDER];
+    /// The sums over the lags, and what is supposed: the upper triangle.
+    #[inline(always)]
+    fn sums<const N: usize>(&self, p: usize) -> [[f64; N]; N] {
+        let (mut matrix, ridge) = ([[0.0; N]; N], self.ridge());
         for i in 0..p {
-            for j in 0..=i {
-                matrix[i][j] = self.products[j + 1][i + 1];
+            let lag = i + 1;
+            let sums = &self.products[lag / 2][lag % 2];
+            for (lag, to) in (1..).zip(&mut matrix[i][..p]) {
+                let pair: usize = lag / 2;
+                *to = self.fade * sums[pair].0[lag % 2];
             }
-            matrix[i][i] += self.ridge();
+            matrix[i][i] += ridge;
         }
-        cholesky::factor(&mut matrix, p).then_some(matrix)
+        matrix
     }
 
     /// Covariance of d: `S^-1 (sum mu_k^2 w v v') S^-1`, S the sums with the weights `mu_k w` of
@@ -133,7 +179,11 @@ impl NoiseModel {
     /// .5 for a memory that fades evenly, .6 while it grows as half of the time since the start; .6
     /// here. `None` before the sums determine it.
     pub fn covariance(&self) -> Option<[[f64; LARGEST_ORDER]; LARGEST_ORDER]> {
-        let matrix = self.factor().filter(|_| self.samples > self.order as f64)?;
+        let upper = self.sums::<LARGEST_ORDER>(self.order);
+        let mut matrix = core::array::from_fn(|i| core::array::from_fn(|j| upper[i.min(j)][i.max(j)]));
+        if self.samples <= self.order as f64 || !cholesky::factor(&mut matrix, self.order) {
+            return None;
+        }
         let mut covariance = [[0.0; LARGEST_ORDER]; LARGEST_ORDER];
         for (i, row) in covariance.iter_mut().enumerate().take(self.order) {
             row[i] = 0.6;
@@ -144,16 +194,22 @@ impl NoiseModel {
 
     /// D of what was taken so far. It stays where the sums do not determine it.
     pub fn solve(&mut self) {
-        let p = self.order;
-        let ridge = self.ridge();
-        let mut d = [0.0; LARGEST_ORDER];
-        for (i, d) in d.iter_mut().enumerate().take(p) {
-            *d = ridge * self.supposed.get(i).copied().unwrap_or(0.0) - self.products[0][i + 1];
+        match self.order {
+            ORDER => self.solve_of::<ORDER>(ORDER),
+            order => self.solve_of::<LARGEST_ORDER>(order),
         }
-        let Some(matrix) = self.factor() else { return };
-        cholesky::solve(&matrix, p, &mut d);
-        if d.iter().all(|d| d.is_finite()) {
-            self.d = d;
+    }
+
+    #[inline(always)]
+    fn solve_of<const N: usize>(&mut self, p: usize) {
+        let ridge = self.ridge();
+        let mut d = [0.0; N];
+        for (i, d) in d.iter_mut().enumerate().take(p) {
+            *d = ridge * self.supposed.get(i).copied().unwrap_or(0.0) - self.product(0, i + 1);
+        }
+        let solved = elimination::solve(&mut self.sums(p), p, &mut d);
+        if solved && d.iter().all(|d| d.is_finite()) {
+            self.d[..N].copy_from_slice(&d);
         }
     }
 }

@@ -7,7 +7,8 @@
 
 use super::{
     basis::{Basis, Point, Signals},
-    sizes::{HELD, LARGEST_ORDER, SIGNALS},
+    past::{Paired, PastSignals},
+    sizes::{HELD, SIGNALS},
 };
 use crate::state::{State, visit_all};
 
@@ -16,15 +17,14 @@ use crate::state::{State, visit_all};
 struct Run {
     basis: Basis,
     now: Signals,
-    past: [Signals; LARGEST_ORDER],
+    past: PastSignals,
 }
 
 crate::state!([] Run { basis, now, past });
 
 impl Run {
     fn remember(&mut self) {
-        self.past.copy_within(0..LARGEST_ORDER - 1, 1);
-        self.past[0] = self.now;
+        self.past.push(&self.now);
     }
 }
 
@@ -48,7 +48,7 @@ impl Place {
         let run = Run {
             basis,
             now: [0.0; SIGNALS],
-            past: [[0.0; SIGNALS]; LARGEST_ORDER],
+            past: PastSignals::ZERO,
         };
         Self {
             now: run.clone(),
@@ -67,8 +67,9 @@ impl Place {
     }
 
     /// Those before it, the newest first.
-    pub fn past(&self) -> &[Signals; LARGEST_ORDER] {
-        &self.now.past
+    #[inline(always)]
+    pub fn past(&self) -> &[Paired] {
+        self.now.past.newest_first()
     }
 
     /// Moves on by a sample; `error` is that of so many samples ago.
@@ -126,7 +127,7 @@ impl Place {
         for run in [&mut self.now, &mut self.next] {
             run.basis.reset();
             run.now = [0.0; SIGNALS];
-            run.past = [[0.0; SIGNALS]; LARGEST_ORDER];
+            run.past = PastSignals::ZERO;
         }
         self.left = 0;
     }

@@ -76,19 +76,20 @@ fn without_drift_and_corrections_it_is_weighted_least_squares() {
     }
     assert!(cholesky::factor(&mut a, LINEAR));
     cholesky::solve(&a, LINEAR, &mut b);
-    let free = &gains.filters[0][0];
+    let free = &gains.filters[0];
+    let state = free.state_of(0);
     for i in 0..LINEAR {
-        assert!((free.state[i] - b[i]).abs() < 1e-9, "{i}");
+        assert!((state[i] - b[i]).abs() < 1e-9, "{i}");
         let mut column = [0.0; LINEAR];
         column[i] = 1.0;
         cholesky::solve(&a, LINEAR, &mut column);
         for (j, c) in column.iter().enumerate() {
-            assert!((free.covariance[i][j] - c).abs() < 1e-9 * column[i].abs());
+            assert!((free.covariance_of(0, i, j) - c).abs() < 1e-9 * column[i].abs());
         }
     }
     // Those are not the gains of a gain with a lead, and the weights say so.
     assert!(gains.probability(0) > 0.999 && gains.probability(FORMS) == 0.0);
-    for (mean, free) in gains.state().iter().zip(free.state) {
+    for (mean, free) in gains.state().iter().zip(state) {
         assert!((mean - free).abs() < 1e-3 * free.abs().max(0.1));
     }
 }
@@ -249,5 +250,49 @@ fn what_makes_no_sense_is_refused() {
         },
     ] {
         assert!(Gains::new(wrong, &basis()).is_none(), "{wrong:?}");
+    }
+}
+
+#[test]
+fn the_weight_of_who_starts_again_is_that_of_its_logarithm() {
+    assert!((WEIGHT_AGAIN - libm::exp(AGAIN)).abs() < 1e-16);
+    assert!((EVEN + libm::log(FORMS as f64)).abs() < 1e-16);
+}
+
+/// A sample says nothing where everything is known, and hardly anything where it cannot be; one that is no
+/// number moves a state no farther than the limit, as one that is far out does.
+#[test]
+fn what_cannot_be_does_little_harm() {
+    let prior = GainPrior {
+        freedom: 5.0,
+        limit: 3.5,
+        ..prior()
+    };
+    let (y, regressors) = sample(3);
+    let take = |gains: &mut Gains, y: f64| gains.update(y, &regressors, 0.3, basis().point(), &AROUND);
+    let mut gains = Gains::new(prior, &basis()).unwrap();
+    gains.begin(0.0, 0.0);
+    let (eps, log_density) = take(&mut gains, y);
+    assert!(eps == y && log_density.is_finite() && gains.state() == [0.0; STATES]);
+    for far in [1e100, -1e100, f64::INFINITY, f64::NAN] {
+        let mut gains = Gains::new(prior, &basis()).unwrap();
+        gains.begin(2.0, 0.5);
+        take(&mut gains, far);
+        assert!(
+            gains.state().iter().all(|s| s.abs() < 10.0),
+            "{far}: {:?}",
+            gains.state()
+        );
+        assert!((gains.weights.sum() - 1.0).abs() < 1e-12, "{far}");
+        let mut logs = gains
+            .filters
+            .iter()
+            .flat_map(|f| f.log_weight.0)
+            .chain(gains.log_weights.0);
+        assert!(logs.all(f64::is_finite), "{far}");
+        let covariance = gains.covariance();
+        assert!((0..STATES).all(|i| covariance[i][i] >= 0.0), "{far}");
+        take(&mut gains, y);
+        assert!(gains.state().iter().all(|s| s.is_finite()), "{far}");
     }
 }

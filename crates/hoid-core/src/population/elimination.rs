@@ -1,0 +1,81 @@
+//! Solution of one positive definite system in place, by elimination without roots.
+//!
+//! With rows `u_k` and pivots `p_k = u_kk`, `A = sum_k u_k' u_k/p_k` (C. F. Gauss, 1810): the right side is
+//! taken along, and from the last unknown back each is taken out of all before it as soon as it is known,
+//! so that nothing waits for a whole sum. Where the factor itself is needed, `cholesky` has it.
+
+/// Columns that are made at a time.
+const WIDE: usize = 4;
+
+/// The solution in the place of b, of the first n of N unknowns; false where A is not positive definite.
+/// Only the upper triangle of A is read; what is left in it is no result. N is a multiple of four.
+#[inline(always)]
+pub(super) fn solve<const N: usize>(a: &mut [[f64; N]; N], n: usize, b: &mut [f64; N]) -> bool {
+    const { assert!(N.is_multiple_of(WIDE)) };
+    let mut inverse = [0.0; N];
+    for i in 0..n {
+        let (above, below) = a.split_at_mut(i);
+        let Some(row) = below.first_mut() else { return false };
+        let mut factors = [0.0; N];
+        let mut right = b[i];
+        for (k, other) in above.iter().enumerate() {
+            factors[k] = other[i] * inverse[k];
+            right -= factors[k] * b[k];
+        }
+        b[i] = right;
+        for (column, block) in row.as_chunks_mut::<WIDE>().0.iter_mut().enumerate().skip(i / WIDE) {
+            let mut sums = *block;
+            for (other, factor) in above.iter().zip(&factors) {
+                let other = &other.as_chunks::<WIDE>().0[column];
+                for (sum, u) in sums.iter_mut().zip(other) {
+                    *sum -= factor * u;
+                }
+            }
+            *block = sums;
+        }
+        if !(row[i] > 0.0 && row[i].is_finite()) {
+            return false;
+        }
+        inverse[i] = 1.0 / row[i];
+    }
+    for i in (0..n).rev() {
+        let x = b[i] * inverse[i];
+        b[i] = x;
+        for (right, row) in b[..i].iter_mut().zip(a.iter()) {
+            *right -= row[i] * x;
+        }
+    }
+    true
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::population::cholesky;
+
+    #[test]
+    fn it_is_the_solution_by_cholesky() {
+        // A Hilbert matrix and a ridge, of any size up to N.
+        for n in 1..=8 {
+            let mut a: [[f64; 8]; 8] = std::array::from_fn(|i| std::array::from_fn(|j| 1.0 / (i + j + 1) as f64));
+            (0..8).for_each(|i| a[i][i] += 0.1);
+            let b: [f64; 8] = std::array::from_fn(|i| i as f64 - 2.5);
+            let (mut l, mut expected, mut x) = (a, b, b);
+            assert!(cholesky::factor(&mut l, n));
+            cholesky::solve(&l, n, &mut expected);
+            assert!(solve(&mut a, n, &mut x));
+            for (x, e) in x.iter().zip(expected).take(n) {
+                assert!((x - e).abs() < 1e-13 * e.abs().max(1.0), "{n}: {x} {e}");
+            }
+        }
+    }
+
+    #[test]
+    fn what_has_no_solution_is_refused() {
+        let mut no = [[0.0; 4]; 4];
+        (no[0], no[1]) = ([1.0, 2.0, 0.0, 0.0], [2.0, 1.0, 0.0, 0.0]);
+        assert!(!solve(&mut no.clone(), 2, &mut [1.0; 4]));
+        no[0][0] = f64::NAN;
+        assert!(!solve(&mut no, 2, &mut [1.0; 4]) && !solve(&mut [[0.0; 4]; 4], 1, &mut [1.0; 4]));
+    }
+}

@@ -1,0 +1,102 @@
+//! Two numbers side by side.
+//!
+//! Every processor with vector registers takes two at a time, where they stand at a multiple of 16 bytes.
+//! What is done to one does not depend on what stands beside it: the digits are those of one alone, on
+//! every machine.
+
+use core::ops::{Add, AddAssign, Div, Mul, Sub, SubAssign};
+
+/// Two numbers.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[repr(align(16))]
+pub(super) struct Pair(pub [f64; 2]);
+
+impl crate::state::State for Pair {
+    fn visit(&mut self, each: &mut dyn FnMut(&mut f64)) {
+        self.0.visit(each);
+    }
+}
+
+impl Pair {
+    pub const ZERO: Self = Self::both(0.0);
+
+    /// One number twice.
+    #[inline(always)]
+    pub const fn both(x: f64) -> Self {
+        Self([x; 2])
+    }
+
+    #[inline(always)]
+    pub fn map(self, of: impl Fn(f64) -> f64) -> Self {
+        Self(self.0.map(of))
+    }
+
+    #[inline(always)]
+    fn with(self, other: Self, of: impl Fn(f64, f64) -> f64) -> Self {
+        Self(core::array::from_fn(|i| of(self.0[i], other.0[i])))
+    }
+
+    /// The larger; the bound where it is not a number.
+    #[inline(always)]
+    pub fn at_least(self, bound: Self) -> Self {
+        self.with(bound, |x, bound| if x > bound { x } else { bound })
+    }
+
+    /// The smaller; the bound where it is not a number.
+    #[inline(always)]
+    pub fn at_most(self, bound: Self) -> Self {
+        self.with(bound, |x, bound| if x < bound { x } else { bound })
+    }
+
+    /// Their sum.
+    #[inline(always)]
+    pub fn sum(self) -> f64 {
+        self.0.iter().sum()
+    }
+}
+
+impl Add for Pair {
+    type Output = Self;
+    #[inline(always)]
+    fn add(self, other: Self) -> Self {
+        self.with(other, |a, b| a + b)
+    }
+}
+
+impl Sub for Pair {
+    type Output = Self;
+    #[inline(always)]
+    fn sub(self, other: Self) -> Self {
+        self.with(other, |a, b| a - b)
+    }
+}
+
+impl Mul for Pair {
+    type Output = Self;
+    #[inline(always)]
+    fn mul(self, other: Self) -> Self {
+        self.with(other, |a, b| a * b)
+    }
+}
+
+impl Div for Pair {
+    type Output = Self;
+    #[inline(always)]
+    fn div(self, other: Self) -> Self {
+        self.with(other, |a, b| a / b)
+    }
+}
+
+impl AddAssign for Pair {
+    #[inline(always)]
+    fn add_assign(&mut self, other: Self) {
+        *self = *self + other;
+    }
+}
+
+impl SubAssign for Pair {
+    #[inline(always)]
+    fn sub_assign(&mut self, other: Self) {
+        *self = *self - other;
+    }
+}

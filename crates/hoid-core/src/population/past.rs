@@ -1,0 +1,96 @@
+//! The last signals of a basis, the newest first, without moving them at each sample.
+//!
+//! A ring that is kept twice, one copy behind the other: wherever it begins, its numbers stand one after
+//! another.
+
+use super::{
+    basis::Signals,
+    pair::Pair,
+    sizes::{LARGEST_ORDER, SIGNALS},
+};
+use crate::state::State;
+
+/// Signals in pairs.
+pub(super) type Paired = [Pair; SIGNALS / 2];
+
+/// In pairs.
+#[inline(always)]
+pub(super) fn paired(signals: &Signals) -> Paired {
+    core::array::from_fn(|i| Pair([signals[2 * i], signals[2 * i + 1]]))
+}
+
+/// The signals of the last samples.
+#[derive(Debug, Clone)]
+pub(super) struct PastSignals {
+    twice: [Paired; 2 * LARGEST_ORDER],
+    newest: usize,
+}
+
+impl PastSignals {
+    /// All zero.
+    pub const ZERO: Self = Self {
+        twice: [[Pair::ZERO; SIGNALS / 2]; 2 * LARGEST_ORDER],
+        newest: 0,
+    };
+
+    /// The newest first.
+    #[inline(always)]
+    pub fn newest_first(&self) -> &[Paired] {
+        self.twice[self.newest..]
+            .first_chunk::<LARGEST_ORDER>()
+            .map_or(&[], |past| past)
+    }
+
+    /// Takes the signals of a sample in the place of the oldest.
+    #[inline(always)]
+    pub fn push(&mut self, signals: &Signals) {
+        self.newest = self.newest.checked_sub(1).unwrap_or(LARGEST_ORDER - 1);
+        self.twice[self.newest] = paired(signals);
+        self.twice[self.newest + LARGEST_ORDER] = paired(signals);
+    }
+}
+
+impl PartialEq for PastSignals {
+    /// Wherever the ring begins.
+    fn eq(&self, other: &Self) -> bool {
+        self.newest_first() == other.newest_first()
+    }
+}
+
+impl State for PastSignals {
+    /// The newest first, wherever the ring begins: it is turned to its beginning.
+    fn visit(&mut self, each: &mut dyn FnMut(&mut f64)) {
+        self.twice[..LARGEST_ORDER].rotate_left(self.newest);
+        self.newest = 0;
+        let (first, second) = self.twice.split_at_mut(LARGEST_ORDER);
+        first.visit(each);
+        second.copy_from_slice(first);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_last_ones_stand_in_their_order_and_can_be_saved_anywhere() {
+        let mut past = PastSignals::ZERO;
+        for t in 0..100 {
+            past.push(&[f64::from(t); SIGNALS]);
+            let expected = |age: usize| (f64::from(t) - age as f64).max(0.0);
+            for (age, signals) in past.newest_first().iter().enumerate() {
+                assert_eq!(*signals, paired(&[expected(age); SIGNALS]));
+            }
+            assert_eq!(past.newest_first().len(), LARGEST_ORDER);
+            let (mut copy, mut age) = (past.clone(), 0);
+            copy.visit(&mut |number| {
+                assert_eq!(*number, expected(age / SIGNALS));
+                age += 1;
+            });
+            assert_eq!(copy, past);
+            copy.push(&[1.0; SIGNALS]);
+            past.clone().push(&[1.0; SIGNALS]);
+            assert_eq!(copy.newest_first()[1..], past.newest_first()[..LARGEST_ORDER - 1]);
+        }
+    }
+}
