@@ -23,7 +23,7 @@ mod filters;
 mod fits;
 mod initial_state_responses;
 mod lane_products;
-mod lanes;
+pub(crate) mod lanes;
 mod normal_equations;
 mod pass;
 mod rows;
