@@ -13,7 +13,6 @@
 //! **Noise models** of each system: C from a grid of its roots, D by least squares, and B once more
 //! with them. Those with the smallest loss are starts.
 
-use hoid_lanes::InstructionSet;
 use hoid_model::Orders;
 
 use super::pole_grid::{anywhere, noise_zeros};
@@ -21,9 +20,8 @@ use crate::{
     InitialState,
     criterion::{Block, Criterion, Workspace, first_residual},
     iv::refined_system,
-    multistart::{Completion, Start},
+    multistart::Start,
     optimize::Objective,
-    pem::batched::lanes::search,
 };
 
 /// Places of the grid of poles that are taken.
@@ -43,95 +41,31 @@ struct System {
     noise_models: usize,
 }
 
-/// The starts of each criterion, each start complete, the best first; beside it stands a minimum
-/// that is known. What is to be found of them is found side by side where registers are named: the
-/// criteria are then of one model, and their records of one length.
-pub(crate) fn broad_starts(
-    criteria: &[(&Criterion<'_>, &[f64])],
-    beside: Option<InstructionSet>,
-    workspace: &mut Workspace,
-) -> Vec<Vec<Start>> {
-    let places = best_places(criteria, beside, workspace);
-    let systems: Vec<Vec<System>> = (criteria.iter().zip(places))
-        .map(|(&(criterion, known), places)| {
-            let o = criterion.orders;
-            let fitted = |label, b: &[f64], f: &[f64]| System {
-                label,
-                b: b.to_vec(),
-                f: f.to_vec(),
-                noise_models: NOISE_MODELS.0,
-            };
-            let mut systems = vec![fitted("known system", &known[..o.nb], &known[o.parameters() - o.nf..])];
-            for nd in IV_NOISE {
-                if let Some(system) = refined_system(criterion, nd) {
-                    systems.push(fitted("refined instruments", &system[o.nf..], &system[..o.nf]));
-                }
-            }
-            systems.extend(places);
-            systems
-        })
-        .collect();
-    let candidates: Vec<Vec<Vec<Start>>> = (criteria.iter().zip(&systems))
-        .map(|((criterion, _), systems)| systems.iter().map(|system| noise_models(criterion, system)).collect())
-        .collect();
-    let mut completions: Vec<Completion<'_>> = (criteria.iter().zip(&candidates))
-        .map(|((criterion, _), candidates)| Completion::new(criterion, candidates.iter().flatten().cloned().collect()))
-        .collect();
-    complete_all(&mut completions, beside, workspace);
-    (criteria.iter().zip(systems).zip(candidates).zip(completions))
-        .map(|((((criterion, _), systems), candidates), completion)| {
-            let mut completed = completion.starts.into_iter();
-            let mut starts = Vec::new();
-            for (system, of_system) in systems.iter().zip(&candidates) {
-                let mut best: Vec<Start> = (completed.by_ref().take(of_system.len()))
-                    .filter(|start| start.value.is_finite() && criterion.is_feasible(&start.theta))
-                    .collect();
-                best.sort_by(|a, b| a.value.total_cmp(&b.value));
-                best.truncate(system.noise_models);
-                starts.extend(best);
-            }
-            starts.sort_by(|a, b| a.value.total_cmp(&b.value));
-            starts
-        })
-        .collect()
-}
-
-/// Of each criterion the places of the grid of poles with the smallest loss, each with an
-/// autoregression of its own.
-fn best_places(
-    criteria: &[(&Criterion<'_>, &[f64])],
-    beside: Option<InstructionSet>,
-    workspace: &mut Workspace,
-) -> Vec<Vec<System>> {
-    let rankings: Vec<Criterion<'_>> = criteria.iter().map(|(criterion, _)| ranking(criterion)).collect();
-    let mut completions: Vec<Completion<'_>> = (rankings.iter())
-        .map(|ranking| {
-            let needed = ranking.first + ranking.orders.parameters();
-            let short = ranking.data.iter().any(|d| d.u.len() <= needed);
-            let places = if short { Vec::new() } else { anywhere(ranking.orders.nf) };
-            let of_poles = |f: &Vec<f64>| Start::of_poles("pole grid", &ranking.orders, f);
-            Completion::new(ranking, places.iter().map(of_poles).collect())
-        })
-        .collect();
-    complete_all(&mut completions, beside, workspace);
-    let of_criterion = |(completion, ranking): (Completion<'_>, &Criterion<'_>)| {
-        let o = ranking.orders;
-        let mut places = completion.starts;
-        places.retain(|place| place.value.is_finite());
-        places.sort_by(|a, b| a.value.total_cmp(&b.value));
-        let system = |place: &Start| System {
-            label: "slow and fast poles",
-            b: place.theta[..o.nb].to_vec(),
-            f: place.theta[o.parameters() - o.nf..].to_vec(),
-            noise_models: NOISE_MODELS.1,
-        };
-        places.iter().take(PLACES).map(system).collect()
+/// The starts, each complete, the best first; `known` is a minimum.
+pub(crate) fn broad_starts(criterion: &Criterion<'_>, known: &[f64], workspace: &mut Workspace) -> Vec<Start> {
+    let o = criterion.orders;
+    let fitted = |label, b: &[f64], f: &[f64]| System {
+        label,
+        b: b.to_vec(),
+        f: f.to_vec(),
+        noise_models: NOISE_MODELS.0,
     };
-    completions.into_iter().zip(&rankings).map(of_criterion).collect()
+    let mut systems = vec![fitted("known system", &known[..o.nb], &known[o.parameters() - o.nf..])];
+    for nd in IV_NOISE {
+        if let Some(system) = refined_system(criterion, nd) {
+            systems.push(fitted("refined instruments", &system[o.nf..], &system[..o.nf]));
+        }
+    }
+    systems.extend(best_places(criterion, workspace));
+    let mut starts: Vec<Start> = (systems.iter())
+        .flat_map(|system| with_noise_models(criterion, system, workspace))
+        .collect();
+    starts.sort_by(|a, b| a.value.total_cmp(&b.value));
+    starts
 }
 
-/// The criterion by which the places of the grid are ranked.
-fn ranking<'a>(criterion: &Criterion<'a>) -> Criterion<'a> {
+/// The places of the grid of poles with the smallest loss, each with an autoregression of its own.
+fn best_places(criterion: &Criterion<'_>, workspace: &mut Workspace) -> Vec<System> {
     let o = criterion.orders;
     let coloured = o.nc + o.nd > 0;
     let orders = Orders {
@@ -139,33 +73,64 @@ fn ranking<'a>(criterion: &Criterion<'a>) -> Criterion<'a> {
         nd: if coloured { o.nc + o.nd + MORE_NOISE } else { 0 },
         ..o
     };
-    Criterion {
+    let ranking = Criterion {
         orders,
         initial: InitialState::Estimate,
         first: criterion.first.max(first_residual(&orders, InitialState::Estimate)),
         ..criterion.clone()
-    }
-}
-
-/// A system with each noise model of the grid, D and B still to be found.
-fn noise_models(criterion: &Criterion<'_>, system: &System) -> Vec<Start> {
-    let o = criterion.orders;
-    let left = if o.nd > 0 {
-        vec![Block::B, Block::D]
-    } else {
-        vec![Block::B]
     };
-    (noise_zeros(o.nc).iter())
-        .map(|c| [&system.b[..], c, &vec![0.0; o.nd], &system.f].concat())
-        .filter(|theta| criterion.is_feasible(theta))
-        .map(|theta| Start::to_be_found(system.label, theta, left.clone()))
-        .collect()
+    if ranking
+        .data
+        .iter()
+        .any(|d| d.u.len() <= ranking.first + orders.parameters())
+    {
+        return Vec::new();
+    }
+    let mut places: Vec<Start> = (anywhere(o.nf).iter())
+        .map(|f| {
+            let mut place = Start::of_poles("pole grid", &orders, f);
+            while let Some(block) = place.next_block() {
+                let there = ranking.linearise_block(&place.theta, block, workspace);
+                place.update(&orders, &there);
+            }
+            place
+        })
+        .filter(|place| place.value.is_finite())
+        .collect();
+    places.sort_by(|a, b| a.value.total_cmp(&b.value));
+    let system = |place: &Start| System {
+        label: "slow and fast poles",
+        b: place.theta[..o.nb].to_vec(),
+        f: place.theta[orders.parameters() - o.nf..].to_vec(),
+        noise_models: NOISE_MODELS.1,
+    };
+    places.iter().take(PLACES).map(system).collect()
 }
 
-/// Finds what is to be found of all starts.
-fn complete_all(all: &mut [Completion<'_>], beside: Option<InstructionSet>, workspace: &mut Workspace) {
-    match beside {
-        Some(path) => search(all.iter_mut().collect(), path, workspace),
-        None => all.iter_mut().for_each(|completion| completion.run(workspace)),
+/// A system with the noise models that suit it best.
+fn with_noise_models(criterion: &Criterion<'_>, system: &System, workspace: &mut Workspace) -> Vec<Start> {
+    let o = criterion.orders;
+    let mut starts = Vec::new();
+    for c in noise_zeros(o.nc) {
+        let theta = [&system.b[..], &c, &vec![0.0; o.nd], &system.f].concat();
+        if !criterion.is_feasible(&theta) {
+            continue;
+        }
+        let left = if o.nd > 0 {
+            vec![Block::B, Block::D]
+        } else {
+            vec![Block::B]
+        };
+        let mut start = Start::to_be_found(system.label, theta, left);
+        while let Some(block) = start.next_block().filter(|_| criterion.is_feasible(&start.theta)) {
+            let there = criterion.linearise_block(&start.theta, block, workspace);
+            start.update(&o, &there);
+        }
+        if start.value.is_finite() && criterion.is_feasible(&start.theta) {
+            starts.push(start);
+        }
     }
+    starts.sort_by(|a, b| a.value.total_cmp(&b.value));
+    starts.truncate(system.noise_models);
+    starts
 }

@@ -4,19 +4,13 @@
 //! | module | what it holds |
 //! |---|---|
 //! | `start` | a start of a search, and which of its polynomials are still to be found |
-//! | `completion` | many starts of which polynomials are still to be found |
-//! | `descents` | searches each of which is to end below a minimum that is known |
 //! | `searches` | the searches from the best starts, and the lowest minimum |
 //! | `linearisation_client` | what is driven: one theta after the other, and the linearisation there |
 
-mod completion;
-mod descents;
 mod linearisation_client;
 mod searches;
 mod start;
 
-pub(crate) use completion::Completion;
-pub(crate) use descents::Descents;
 pub(crate) use linearisation_client::LinearisationClient;
 pub(crate) use searches::MultiStart;
 pub(crate) use start::Start;

@@ -9,13 +9,8 @@ use crate::{
     initial_guess::c_drawn_inside::with_c_drawn_inside,
     linalg::information::inverse_of_free,
     multistart::{LinearisationClient, MultiStart, Start},
-    optimize::{Linearisation, Minimum, Objective, free_parameters, minimise},
-    pem::{
-        constraints::ConstrainedCriterion,
-        fit_settings::FitSettings,
-        lower_minimum::{Known, is_searched_widely, lower_minima},
-        robust,
-    },
+    optimize::{Linearisation, Objective, free_parameters, minimise},
+    pem::{constraints::ConstrainedCriterion, fit_settings::FitSettings, lower_minimum::lower_minimum, robust},
 };
 
 /// The searches of one fit.
@@ -53,75 +48,19 @@ impl<'q, 'a> FitProblem<'q, 'a> {
         })
     }
 
-    /// The lowest minimum, once all searches have ended.
-    ///
-    /// # Errors
-    /// [`IdentError::NoFiniteLoss`] where no search came anywhere.
-    pub fn lowest(self) -> Result<LowestMinimum<'q, 'a>, IdentError> {
-        let (start, minimum) = self.searches.lowest().ok_or(IdentError::NoFiniteLoss)?;
-        Ok(LowestMinimum {
-            settings: self.settings,
-            constrained: self.constrained,
-            sample_time: self.sample_time,
-            start,
-            minimum,
-        })
-    }
-
     /// The fit at the lowest minimum, once all searches have ended.
     ///
     /// # Errors
     /// [`IdentError::NoFiniteLoss`] where no search came anywhere,
     /// [`IdentError::SingularInformation`].
     pub fn fit(self, workspace: &mut Workspace) -> Result<Fit, IdentError> {
-        let mut lowest = self.lowest()?;
-        if lowest.is_searched_widely() {
-            let lower = lower_minima(lowest.settings, &[lowest.known()], None, workspace).pop();
-            lowest.replace(lower.flatten());
-        }
-        lowest.fit(workspace)
-    }
-}
-
-/// The lowest minimum of one fit.
-pub(crate) struct LowestMinimum<'q, 'a> {
-    settings: &'q FitSettings,
-    constrained: &'q ConstrainedCriterion<'q, 'a>,
-    sample_time: SampleTime,
-    start: String,
-    minimum: Minimum,
-}
-
-impl LowestMinimum<'_, '_> {
-    /// What the search for a lower one begins with.
-    pub fn known(&self) -> Known<'_> {
-        (self.constrained, &self.minimum)
-    }
-
-    /// True where there may be a lower one.
-    pub fn is_searched_widely(&self) -> bool {
-        is_searched_widely(self.settings, self.known())
-    }
-
-    /// Takes a lower one where one was found.
-    pub fn replace(&mut self, lower: Option<(String, Minimum)>) {
-        if let Some((start, minimum)) = lower {
-            (self.start, self.minimum) = (start, minimum);
-        }
-    }
-
-    /// The fit there.
-    ///
-    /// # Errors
-    /// [`IdentError::SingularInformation`].
-    pub fn fit(self, workspace: &mut Workspace) -> Result<Fit, IdentError> {
         let Self {
-            settings,
-            constrained,
-            mut start,
-            mut minimum,
-            ..
+            settings, constrained, ..
         } = self;
+        let (mut start, mut minimum) = self.searches.lowest().ok_or(IdentError::NoFiniteLoss)?;
+        if let Some((label, lower)) = lower_minimum(settings, constrained, &minimum, workspace) {
+            (start, minimum) = (label, lower);
+        }
         if settings.start.is_none() && matches!(minimum.termination.reason, Reason::Border | Reason::NoDescent) {
             // The loss often has a minimum on the border besides a lower one inside.
             let inside = with_c_drawn_inside(&settings.orders, &minimum.theta);

@@ -9,20 +9,13 @@
 //! **Where.** A record of some hundred samples has many minima, and a model with more coefficients
 //! than the operator's (nb, nf > 2, nc > 0, nd > 4) has them in longer records too. There the first few
 //! steps are taken on a part of the record, which costs the same however long the record is.
-//!
-//! **Many records** go side by side, a lane each, in all of that but the instrumental variables:
-//! what is found differs from what one finds alone by rounding, and where a search does not come to
-//! rest within its steps, by where it stands then.
 
-use hoid_lanes::InstructionSet;
-
-use super::{batched::lanes::search, constraints::ConstrainedCriterion, fit_settings::FitSettings};
+use super::{constraints::ConstrainedCriterion, fit_settings::FitSettings};
 use crate::{
     Reason, SearchOptions,
     criterion::{Criterion, Data, Workspace},
     initial_guess::broad::broad_starts,
-    multistart::Descents,
-    optimize::{Minimum, basin::lies_in_basin},
+    optimize::{Minimum, basin::lies_in_basin, minimise},
 };
 
 /// Residuals up to which every model is searched widely, and on which others take their first
@@ -41,83 +34,47 @@ const OF_LONG: [usize; 2] = [12, 3];
 /// Relative decrease of the loss from which on a minimum is another one.
 const LOWER: f64 = 1e-7;
 
-/// What is known of a fit: its criterion, and the lowest minimum from its usual starts.
-pub(crate) type Known<'k> = (&'k ConstrainedCriterion<'k, 'k>, &'k Minimum);
-
-/// True where others than the usual starts are tried. With a start that was given, or with a single
-/// start, none is.
-pub(crate) fn is_searched_widely(settings: &FitSettings, (constrained, minimum): Known<'_>) -> bool {
-    let exact = minimum.termination.reason == Reason::ExactFit;
-    settings.start.is_none() && settings.starts >= 2 && !exact && may_have_more_minima(constrained.criterion)
-}
-
-/// For each fit a lower minimum with the name of its start; none where nothing lower was found. The
-/// searches of records of one length go side by side where registers are named, else alone; what
-/// they find differs by rounding.
-pub(crate) fn lower_minima(
+/// A lower minimum with the name of its start. With a start that was given, or with a single start,
+/// no other is looked for.
+pub(crate) fn lower_minimum(
     settings: &FitSettings,
-    fits: &[Known<'_>],
-    beside: Option<InstructionSet>,
+    constrained: &ConstrainedCriterion<'_, '_>,
+    known: &Minimum,
     workspace: &mut Workspace,
-) -> Vec<Option<(String, Minimum)>> {
-    let parts: Vec<Criterion<'_>> = fits.iter().map(|(fit, _)| first_span(fit.criterion)).collect();
-    let on_parts: Vec<_> = parts.iter().map(|part| settings.constrained(part)).collect();
+) -> Option<(String, Minimum)> {
+    let criterion = constrained.criterion;
+    let exact = known.termination.reason == Reason::ExactFit;
+    if settings.start.is_some() || settings.starts < 2 || exact || !may_have_more_minima(criterion) {
+        return None;
+    }
+    let part = first_span(criterion);
+    let on_part = settings.constrained(&part);
+    let whole = part.residuals() == criterion.residuals();
     let few = SearchOptions {
         max_iterations: STEPS,
         ..settings.search
     };
-    let known: Vec<_> = (parts.iter().zip(fits))
-        .map(|(part, (_, minimum))| (part, minimum.theta.as_slice()))
+    let [most_tried, most_finished] = if whole { [TRIED, FINISHED] } else { OF_LONG };
+    let rival = whole.then_some(known.at.sum_of_squares);
+    let mut tried: Vec<(String, Minimum)> = broad_starts(&part, &known.theta, workspace)
+        .into_iter()
+        .filter(|start| !whole || !lies_in_basin(known, &start.theta, start.value))
+        .take(most_tried)
+        .filter_map(|start| Some((start.label, minimise(&on_part, start.theta, &few, rival, workspace)?)))
         .collect();
-    let starts = broad_starts(&known, beside, workspace);
-
-    let is_whole = |part: &Criterion<'_>, fit: &Known<'_>| part.residuals() == fit.0.criterion.residuals();
-    let mut first_steps: Vec<Descents<'_>> = (starts.into_iter().zip(&on_parts).zip(fits))
-        .map(|((starts, on_part), fit)| {
-            let whole = is_whole(on_part.criterion, fit);
-            let rival = whole.then_some(fit.1.at.sum_of_squares);
-            let tried = starts
-                .into_iter()
-                .filter(|start| !whole || !lies_in_basin(fit.1, &start.theta, start.value))
-                .take(if whole { TRIED } else { OF_LONG[0] })
-                .map(|start| (start.label, start.theta, 0))
-                .collect();
-            Descents::new(on_part.criterion, on_part, &few, rival, None, tried)
-        })
-        .collect();
-    run_all(&mut first_steps, beside, workspace);
-
-    let mut to_the_end: Vec<Descents<'_>> = (first_steps.into_iter().zip(&parts).zip(fits))
-        .map(|((tried, part), fit)| {
-            let mut best = tried.found;
-            best.sort_by(|(_, a), (_, b)| a.at.sum_of_squares.total_cmp(&b.at.sum_of_squares));
-            best.truncate(if is_whole(part, fit) { FINISHED } else { OF_LONG[1] });
-            let near = best
-                .into_iter()
-                .map(|(label, near)| (label, near.theta, near.termination.iterations));
-            let rival = Some(fit.1.at.sum_of_squares);
-            Descents::new(
-                fit.0.criterion,
-                fit.0,
-                &settings.search,
-                rival,
-                Some(LOWER),
-                near.collect(),
-            )
-        })
-        .collect();
-    run_all(&mut to_the_end, beside, workspace);
-    (to_the_end.into_iter())
-        .map(|mut descents| descents.found.pop())
-        .collect()
-}
-
-/// Runs all searches to their end.
-fn run_all(all: &mut [Descents<'_>], beside: Option<InstructionSet>, workspace: &mut Workspace) {
-    match beside {
-        Some(path) => search(all.iter_mut().collect(), path, workspace),
-        None => all.iter_mut().for_each(|descents| descents.run(workspace)),
+    tried.sort_by(|(_, a), (_, b)| a.at.sum_of_squares.total_cmp(&b.at.sum_of_squares));
+    tried.truncate(most_finished);
+    let mut lowest: Option<(String, Minimum)> = None;
+    for (label, near) in tried {
+        let rival = lowest.as_ref().map_or(known, |(_, minimum)| minimum).at.sum_of_squares;
+        if let Some(mut end) = minimise(constrained, near.theta, &settings.search, Some(rival), workspace)
+            && end.at.sum_of_squares < rival * (1.0 - LOWER)
+        {
+            end.termination.iterations += near.termination.iterations;
+            lowest = Some((label, end));
+        }
     }
+    lowest
 }
 
 /// True for models with F and without A whose records are short, or which have more coefficients

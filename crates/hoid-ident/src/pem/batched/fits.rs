@@ -10,9 +10,8 @@ use crate::{
     initial_guess::continuation::{AveragedRecords, Continuation, SlowPoles},
     initial_guess::guesses::initial_guesses_beside,
     pem::constraints::ConstrainedCriterion,
-    pem::fit_problem::{FitProblem, LowestMinimum},
+    pem::fit_problem::FitProblem,
     pem::fit_settings::FitSettings,
-    pem::lower_minimum::lower_minima,
 };
 
 /// A fit to each record; `None` for what is not searched side by side: anything but Box-Jenkins
@@ -59,16 +58,12 @@ pub(crate) fn fit_each(
         })
         .collect();
     search(problems.iter_mut().flatten().collect(), path, &mut workspace);
-    let mut lowest: Vec<_> = problems.into_iter().map(|problem| problem?.lowest()).collect();
-    let mut open: Vec<&mut LowestMinimum<'_, '_>> = (lowest.iter_mut().flatten())
-        .filter(|lowest| lowest.is_searched_widely())
-        .collect();
-    let known: Vec<_> = open.iter().map(|lowest| lowest.known()).collect();
-    let lower = lower_minima(settings, &known, Some(path), &mut workspace);
-    for (lowest, lower) in open.iter_mut().zip(lower) {
-        lowest.replace(lower);
-    }
-    Some(lowest.into_iter().map(|lowest| lowest?.fit(&mut workspace)).collect())
+    Some(
+        problems
+            .into_iter()
+            .map(|problem| problem?.fit(&mut workspace))
+            .collect(),
+    )
 }
 
 /// What the averages of each record propose.

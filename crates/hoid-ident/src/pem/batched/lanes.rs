@@ -15,7 +15,7 @@ use crate::{
 
 /// Runs all searches to their end, side by side; the records are of one length and the orders the
 /// same.
-pub(crate) fn search(open: Vec<&mut impl LinearisationClient>, path: InstructionSet, workspace: &mut Workspace) {
+pub(super) fn search(open: Vec<&mut impl LinearisationClient>, path: InstructionSet, workspace: &mut Workspace) {
     let first = open.first().map(|client| client.criterion());
     let lanes = first.and_then(|c| Some(Lanes::new(c.orders, c.first, c.data.first()?.u.len(), path.lanes()?)));
     if let Some(mut lanes) = lanes {

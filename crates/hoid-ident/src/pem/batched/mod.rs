@@ -23,7 +23,7 @@ mod filters;
 mod fits;
 mod initial_state_responses;
 mod lane_products;
-pub(crate) mod lanes;
+mod lanes;
 mod normal_equations;
 mod pass;
 mod rows;
