@@ -50,6 +50,14 @@ impl ExperimentPlan {
         Condition::C6,
     ];
 
+    /// Estimates that it makes: of each run and structure the fits of two spans with every delay and
+    /// with the best one, and a recursive one.
+    pub fn estimates(&self) -> u64 {
+        let delays = (self.delays.1 + 1).saturating_sub(self.delays.0) as u64;
+        let of_run = 2 * (2 * delays + 2 + 1);
+        self.subjects * Self::CONDITIONS.len() as u64 * self.evaluated * of_run
+    }
+
     /// Reads and checks the text of a plan.
     ///
     /// # Errors

@@ -1,6 +1,6 @@
 //! The experiment with virtual people: Table 3, Figs. 13, 14 and I.1 to I.18.
 //!
-//! All of them show the same runs, which are made once, when the first is asked for.
+//! All of them show the same runs, which are made once, before the first is drawn.
 
 use std::sync::{Arc, OnceLock};
 
@@ -8,7 +8,7 @@ use hoid_model::scenario::Condition;
 use hoid_study::statistics::median;
 
 use super::{
-    item::{Item, ItemOutput},
+    item::{Item, ItemOutput, SharedRuns},
     table_builder::TableBuilder,
 };
 use crate::experiment::{
@@ -20,7 +20,7 @@ use hoid_report::figures::{CurveKind, Ordinate, TraceCurve, TraceGrid, TracePane
 const CAPTION: &str = "Three virtual subjects, mean (dark) and median (light) over the last five of seven runs at each time; the text has the mean. Dashed \
                        in colour: batch fits of [0, 30.72] and [51.20, 81.92] s, the mean; dashed black: the simulated operator, the mean over the runs.";
 
-/// Runs of the experiment, made when they are first asked for.
+/// Runs of the experiment, made once.
 type Runs = Arc<OnceLock<Result<Vec<EvaluatedRun>, String>>>;
 
 /// What a panel shows.
@@ -74,17 +74,29 @@ impl Shown {
 
 pub(super) fn items() -> Vec<Item> {
     let runs: Runs = Arc::default();
+    let shared = SharedRuns {
+        name: "experiment",
+        title: "The experiment with virtual people",
+        estimates: ExperimentPlan::parse(EXPERIMENT).map_or(0, |plan| plan.estimates()),
+        make: {
+            let runs = Arc::clone(&runs);
+            Arc::new(move || {
+                runs.get_or_init(made);
+            })
+        },
+    };
     let mut all = vec![Item::new(
         "table-3",
         "Model parameters n_k* and T_n* used in each run and model structure (virtual people)",
         "Mean of those of the best fits of [0, 30.72] and [51.20, 81.92] s, condition C4; the true n_k of the subject beside.",
         None,
         with(&runs, table),
-    )];
+    )
+    .sharing(&shared)];
     let mut figure = |name: String, condition: Condition, rows: &'static [Row], what: &str| {
         let title = format!("{what}, condition {condition} (virtual people)");
         let make = move |item: &Item, runs: &[EvaluatedRun]| draw(item, runs, condition, rows);
-        all.push(Item::new(name, title, CAPTION, None, with(&runs, make)));
+        all.push(Item::new(name, title, CAPTION, None, with(&runs, make)).sharing(&shared));
     };
     let [discrete, operator, variances] = [
         "Recursive ARX and Box-Jenkins (m* = 1) estimates, discrete parameters",
@@ -101,21 +113,21 @@ pub(super) fn items() -> Vec<Item> {
     all
 }
 
+/// Makes the runs.
+fn made() -> Result<Vec<EvaluatedRun>, String> {
+    let plan = ExperimentPlan::parse(EXPERIMENT).map_err(|error| error.to_string())?;
+    experiment(&plan).map_err(|error| error.to_string())
+}
+
 /// Makes an item of the runs; the reason where there are none.
 fn with(
     runs: &Runs,
     make: impl Fn(&Item, &[EvaluatedRun]) -> ItemOutput + Send + Sync + 'static,
 ) -> impl Fn(&Item, Option<&hoid_study::Results>) -> ItemOutput + Send + Sync + 'static {
     let runs = Arc::clone(runs);
-    move |item, _| {
-        let made = runs.get_or_init(|| {
-            let plan = ExperimentPlan::parse(EXPERIMENT).map_err(|error| error.to_string())?;
-            experiment(&plan).map_err(|error| error.to_string())
-        });
-        match made {
-            Ok(runs) => make(item, runs),
-            Err(reason) => TableBuilder::new(&[], &[]).table(reason).into(),
-        }
+    move |item, _| match runs.get_or_init(made) {
+        Ok(runs) => make(item, runs),
+        Err(reason) => TableBuilder::new(&[], &[]).table(reason).into(),
     }
 }
 

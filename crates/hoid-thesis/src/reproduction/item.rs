@@ -1,6 +1,6 @@
 //! A table or figure of the text, and how it is made from the results of its study.
 
-use std::collections::BTreeMap;
+use std::{collections::BTreeMap, sync::Arc};
 
 use hoid_io::OutputTable;
 use hoid_study::Results;
@@ -16,6 +16,20 @@ pub type Studies = BTreeMap<String, Results>;
 /// Makes an item from the results of its plan.
 type Maker = Box<dyn Fn(&Item, Option<&Results>) -> ItemOutput + Send + Sync>;
 
+/// Runs that several items show and no plan describes. They are made before the items are drawn: a
+/// thread that draws one of them and makes the runs could be handed, while it waits for a part of
+/// them, another item that waits for all of them.
+#[derive(Clone)]
+pub(super) struct SharedRuns {
+    /// Their name and title.
+    pub name: &'static str,
+    pub title: &'static str,
+    /// Estimates that are made.
+    pub estimates: u64,
+    /// Makes them.
+    pub make: Arc<dyn Fn() + Send + Sync>,
+}
+
 /// One table or figure.
 pub struct Item {
     /// Its name, as `fig-5`, `C.1` or `table-2`.
@@ -26,6 +40,7 @@ pub struct Item {
     pub caption: String,
     /// The plan whose results it shows; none where nothing is simulated.
     pub plan: Option<&'static str>,
+    pub(super) shared: Option<SharedRuns>,
     make: Maker,
 }
 
@@ -67,8 +82,16 @@ impl Item {
             title: title.into(),
             caption: caption.into(),
             plan,
+            shared: None,
             make: Box::new(make),
         }
+    }
+
+    /// With runs that it shares with other items.
+    #[must_use]
+    pub(super) fn sharing(mut self, runs: &SharedRuns) -> Self {
+        self.shared = Some(runs.clone());
+        self
     }
 
     /// A figure of a study.

@@ -105,6 +105,26 @@ pub fn reproduce(
         index.add_study(&entry);
         studies.insert(named.name.to_owned(), results);
     }
+    let mut shared_runs = BTreeSet::new();
+    for shared in chosen.iter().filter_map(|item| item.shared.as_ref()) {
+        if !shared_runs.insert(shared.name) {
+            continue;
+        }
+        if !goes_on() {
+            return Ok(None);
+        }
+        let begin = Instant::now();
+        (shared.make)();
+        let entry = StudyEntry {
+            name: shared.name.to_owned(),
+            title: shared.title.to_owned(),
+            directory: String::new(),
+            estimates: shared.estimates,
+            seconds: Some(begin.elapsed().as_secs_f64()),
+        };
+        notify(ReproductionEvent::Study(&entry));
+        index.add_study(&entry);
+    }
     let simulated_s = begin.elapsed().as_secs_f64();
     for name in ["figures", "tables"] {
         make_directory(&directory.join(name))?;
