@@ -5,8 +5,9 @@
 //!
 //! Error: mean of `|dH|/|H|` over seven lines of the disturbance against the describing function of
 //! the person's ten trials of that element, `mean(U/D)/mean(E/D)`. The start span of methods that
-//! have one is 5 to 30 s. A seam without a change is no change, but no person makes its jump: alarms
-//! within 12 s of it do not count among those without a change.
+//! have one is 5 to 30 s. No person makes the jump of a seam: the filters take the ramp before the second
+//! trial there, without an update. A seam without a change is none, but alarms within 12 s of it do not count
+//! among those without a change.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 #[allow(dead_code, reason = "scenarios are for the other examples")]
@@ -30,8 +31,11 @@ const AT_S: [usize; 6] = [2, 4, 8, 13, 18, 28];
 const NK: usize = 13;
 const SETTLING_S: f64 = 12.0;
 
-/// Error, output, disturbance of a trial.
-type Trial = [Vec<f64>; 3];
+/// Error, output, disturbance of a trial, and error and output of its ramp, which goes before.
+struct Trial {
+    signals: [Vec<f64>; 3],
+    ramp: [Vec<f64>; 2],
+}
 
 fn read(folder: &PathBuf, person: &str, element: &str) -> Vec<Trial> {
     let start = format!("{person}_{element}_");
@@ -47,19 +51,21 @@ fn read(folder: &PathBuf, person: &str, element: &str) -> Vec<Trial> {
         let header: Vec<&str> = lines.next().unwrap().split(',').collect();
         let place = |name: &str| header.iter().position(|h| *h == name).unwrap();
         let places = ["r", "y", "u", "d"].map(place);
-        let mut trial: Trial = Default::default();
+        let mut all: [Vec<f64>; 3] = Default::default();
         for line in lines {
             let cells: Vec<&str> = line.split(',').collect();
             let [r, y, u, d] = places.map(|p| cells[p].parse::<f64>().unwrap());
-            trial[0].push(r - y);
-            trial[1].push(u);
-            trial[2].push(d);
+            all[0].push(r - y);
+            all[1].push(u);
+            all[2].push(d);
         }
         // u of a row was read one tick before.
-        trial[0] = trial[0][FROM..FROM + ROWS].to_vec();
-        trial[1] = trial[1][FROM + 1..FROM + 1 + ROWS].to_vec();
-        trial[2] = trial[2][FROM..FROM + ROWS].to_vec();
-        trial
+        let later = [0, 1, 0];
+        let of = |c: usize, from: usize, rows: usize| all[c][from + later[c]..from + later[c] + rows].to_vec();
+        Trial {
+            signals: [0, 1, 2].map(|c| of(c, FROM, ROWS)),
+            ramp: [0, 1].map(|c| of(c, 0, FROM)),
+        }
     };
     files.iter().map(of).collect()
 }
@@ -87,7 +93,7 @@ fn describing(trials: &[Trial]) -> [[f64; 2]; 7] {
     LINES.map(|line| {
         let mean = |channel: usize| {
             trials.iter().fold([0.0; 2], |[re, im], t| {
-                let [a, b] = over(coefficient(&t[channel], line), coefficient(&t[2], line));
+                let [a, b] = over(coefficient(&t.signals[channel], line), coefficient(&t.signals[2], line));
                 [re + a, im + b]
             })
         };
@@ -124,7 +130,7 @@ fn run(method: &str, first: &Trial, second: &Trial, truths: [&[[f64; 2]; 7]; 2],
     let ts = SampleTime::new(1.0 / RATE_HZ).unwrap();
     let mut options = TrackOptions::usual(method, NK);
     options.start = StartAt::Span(Some((5.0, 30.0)));
-    let joined = |c: usize| [first[c].clone(), second[c].clone()].concat();
+    let joined = |c: usize| [first.signals[c].clone(), second.signals[c].clone()].concat();
     let record = Record::new(ts, Channel::new("e", "", joined(0)), Channel::new("u", "", joined(1))).unwrap();
     let starts_itself = options.method.starts_itself();
     let span = record.span(5.0, 30.0).unwrap();
@@ -142,6 +148,16 @@ fn run(method: &str, first: &Trial, second: &Trial, truths: [&[[f64; 2]; 7]; 2],
             u: record.output()[k],
             reference: None,
         };
+        if k == ROWS {
+            for (e, u) in second.ramp[0].iter().zip(&second.ramp[1]) {
+                let sample = hoid_track::Sample {
+                    e: *e,
+                    u: *u,
+                    reference: None,
+                };
+                tracker.update(sample, false);
+            }
+        }
         tracker.update(sample, starts_itself || t >= 30.0);
         if tracker.change().is_some() {
             run.alarms_s.push(t);

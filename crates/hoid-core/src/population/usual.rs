@@ -34,13 +34,13 @@ pub const HOLD_S: f64 = 1.0;
 const DRIFT: [f64; DRIFTS] = [0.0005, 0.07, 0.3];
 const SHARES: [f64; DRIFTS] = [0.9, 0.05, 0.05];
 /// Those who have just changed: their drift, the size of the change, their odds, and their life, s.
-const NEWBORN: [f64; 2] = [0.1, 0.5];
+const NEWBORN: [f64; 2] = [0.1, 1.0];
 const ODDS: f64 = 0.01;
 const LIFE_S: f64 = 2.0;
 /// Degrees of freedom of the innovations.
 const FREEDOM: f64 = 5.0;
 /// Time constants with which the weights of forms and of drifts are forgotten, s.
-const FORM_MEMORY_S: f64 = 60.0;
+const FORM_MEMORY_S: f64 = 5.0;
 const DRIFT_MEMORY_S: f64 = 5.0;
 /// Memory of the noise model, s.
 const NOISE_MEMORY_S: f64 = 40.0;
