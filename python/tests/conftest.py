@@ -16,6 +16,15 @@ import pyhoid
 os.environ.setdefault("MPLBACKEND", "Agg")
 
 
+#: Modules with the longest tests. They begin first: at the end a processor would wait for them.
+LONGEST = ("test_stubs.py", "test_book.py", "test_pages.py")
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    place = {name: number for number, name in enumerate(LONGEST)}
+    items.sort(key=lambda item: place.get(item.path.name, len(place)))
+
+
 @pytest.fixture(scope="session")
 def c1() -> pyhoid.Record:
     return pyhoid.simulate("C1", seed=1)

@@ -17,6 +17,8 @@ import pyhoid
 import pyhoid.dask
 
 pytestmark = [
+    # One cluster for all, also where tests are spread over processes.
+    pytest.mark.xdist_group("dask"),
     # The cluster itself causes these as it starts and stops.
     pytest.mark.filterwarnings("ignore::ResourceWarning"),
     pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning"),

@@ -17,6 +17,8 @@ import pyhoid.lsl
 import xdf
 
 pylsl = pytest.importorskip("pylsl")
+# One at a time: each finds its streams by asking whoever is there.
+pytestmark = pytest.mark.xdist_group("lsl")
 
 ELEMENT = "90/(s(s+6))"
 STEP = 0.01

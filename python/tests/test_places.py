@@ -30,7 +30,13 @@ def traces(tools: Tools, run: Run) -> dict[tuple[str, ...], dict[str, list[float
     }
 
 
-@pytest.mark.parametrize("place", PLACES, ids=lambda place: place.name)
+def parameter(place: Place) -> Any:
+    """A place as a test of its name; with its streams not beside those of ``test_lsl.py``."""
+    group = [pytest.mark.xdist_group("lsl")] if "LabStreamingLayer" in place.name else []
+    return pytest.param(place, id=place.name, marks=group)
+
+
+@pytest.mark.parametrize("place", [parameter(place) for place in PLACES])
 def test_the_digits_are_those_of_track(place: Place, tools: Tools, run: Run, traces: Any) -> None:
     try:
         told = place.run(run, tools)

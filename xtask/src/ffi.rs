@@ -90,7 +90,7 @@ fn build(profile: &str, out: &Path) -> Result<(), String> {
     } else {
         cargo(&["build", "--profile", profile, "-p", "hoid-ffi"], &[])?;
     }
-    let built = target_directory().join(if profile == "dev" { "debug" } else { profile });
+    let built = target_directory().join(if profile == "dev" { "debug/deps" } else { profile });
     let version = env!("CARGO_PKG_VERSION");
     let _ = fs::remove_dir_all(out);
     let write = |place: &str, text: String| {

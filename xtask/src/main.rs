@@ -20,6 +20,7 @@
 #![allow(clippy::print_stdout, clippy::print_stderr)]
 
 mod bench;
+mod beside;
 mod counts;
 mod crates;
 mod embedded;
@@ -37,6 +38,7 @@ use std::{
     process::{Command, ExitCode},
 };
 
+use beside::Beside;
 use counts::Counts;
 use process::{SHIPPED, cargo, cargo_command, each_line, run};
 
@@ -47,6 +49,8 @@ fn main() -> ExitCode {
     let outcome = match arguments.next().as_deref() {
         Some("test") => test(&arguments.collect::<Vec<_>>()),
         Some("python") => python::test(&arguments.collect::<Vec<_>>()).and_then(|counts| counts.verdict()),
+        Some(python::REQUIRE) => python::require(),
+        Some(python::BUILD) => python::build(),
         Some("check") => check(),
         Some("crates") => crates::check(),
         Some("book") => book(),
@@ -77,10 +81,24 @@ fn test(arguments: &[String]) -> Result<(), String> {
     command.args(["test", "--workspace", "--no-fail-fast"]).args(arguments);
     let shown = format!("{command:?}");
     let mut total = Counts::default();
-    let status = each_line(&mut command, |line| total.add(line))?;
-    if arguments.is_empty() {
-        total.join(&python::test(&[])?);
-    }
+    let status = if arguments.is_empty() {
+        let required = Beside::begin(python::REQUIRE)?;
+        cargo(&["test", "--workspace", "--no-run"], &[])?;
+        let mut required = Some(required.end());
+        let mut built = Ok(None);
+        let status = each_line(&mut command, |line| {
+            // Not before the first test runs: until then cargo keeps other builds waiting, and they it.
+            if let Some(required) = required.take() {
+                built = required.and_then(|()| Beside::begin(python::BUILD).map(Some));
+            }
+            total.add(line);
+        })?;
+        built?.map_or(Ok(()), Beside::end)?;
+        total.join(&python::pytest(&[])?);
+        status
+    } else {
+        each_line(&mut command, |line| total.add(line))?
+    };
     println!(
         "\n{} passed, {} failed, {} skipped",
         total.passed, total.failed, total.ignored

@@ -3,6 +3,9 @@
 //! The wheel is built with the profile of the tests and in their target folder, so that what they
 //! have compiled is not compiled again; the test requirements come from PyPI. `HOID_PYTHON` names
 //! another interpreter than `python3`.
+//!
+//! `cargo xtask test` does the first two steps beside those of Rust (module `beside`): what they need is not what
+//! compiles and tests Rust, and both leave a processor idle at times.
 
 use std::{
     env, fs,
@@ -16,27 +19,49 @@ use crate::{
     processors::{BUILT, other_processors},
 };
 
+/// Names of the chores that `cargo xtask test` begins beside itself.
+pub const REQUIRE: &str = "python-require";
+pub const BUILD: &str = "python-build";
+
 /// Oldest Python that the package supports.
 const OLDEST: (u32, u32) = (3, 10);
 
 /// Builds and installs the wheel, and runs pytest with these arguments.
 pub fn test(arguments: &[String]) -> Result<Counts, String> {
-    let target = target_directory();
+    require()?;
+    build()?;
+    pytest(arguments)
+}
+
+/// A fresh environment with all that the tests require but the wheel: needs nothing of Rust.
+pub fn require() -> Result<(), String> {
+    begin(Wheel::OfTests).map(|_| ())
+}
+
+/// Builds the wheel and all that its tests run, and installs it where `require` has been.
+pub fn build() -> Result<(), String> {
     // The same command line as the tests', to compare with, and the examples that the book runs.
     cargo(&[&AS_TESTS[..], &["--quiet"]].concat(), &[])?;
     other_processors("dev")?;
-    let python = environment(Wheel::OfTests)?;
+    install(Wheel::OfTests)
+}
+
+/// Runs the tests where `build` has been.
+pub fn pytest(arguments: &[String]) -> Result<Counts, String> {
     let mut counts = Counts::default();
-    let mut command = Command::new(&python);
+    let mut command = Command::new(Wheel::OfTests.python());
     command
         .args(["-W", "error", "-m", "pytest", "--color=no", "--durations=5"])
+        .args(["--numprocesses=logical", "--dist=loadgroup"])
         .args(arguments)
         .current_dir(package()?)
         .env("MPLBACKEND", "Agg")
         .env(BUILT, "1")
         .env(
             "HOID_BINARY",
-            target.join("debug").join(format!("hoid{}", env::consts::EXE_SUFFIX)),
+            target_directory()
+                .join("debug")
+                .join(format!("hoid{}", env::consts::EXE_SUFFIX)),
         );
     let shown = format!("{command:?}");
     let status = each_line(&mut command, |line| counts.add_pytest(line))?;
@@ -55,23 +80,82 @@ pub enum Wheel {
     Shipped,
 }
 
+impl Wheel {
+    /// Where its environment is.
+    fn folder(self) -> PathBuf {
+        target_directory().join("python").join(match self {
+            Self::OfTests => "venv",
+            Self::Shipped => "venv-shipped",
+        })
+    }
+
+    fn python(self) -> PathBuf {
+        self.folder().join(if cfg!(windows) {
+            "Scripts/python.exe"
+        } else {
+            "bin/python"
+        })
+    }
+
+    /// The requirements of the package (`[project.optional-dependencies]`) that come with it.
+    const fn extra(self) -> &'static str {
+        match self {
+            Self::OfTests => "test",
+            Self::Shipped => "lsl",
+        }
+    }
+}
+
 /// A fresh environment with the package in it; its interpreter. For that of the tests the workspace is built before.
 pub fn environment(wheel: Wheel) -> Result<PathBuf, String> {
-    let target = target_directory();
-    let work = target.join("python");
-    let (place, extra, others, profile) = match wheel {
-        Wheel::OfTests => (
-            "venv",
-            "test",
-            &[][..],
-            &["--profile", "dev", "--features", "as-in-workspace"][..],
-        ),
-        Wheel::Shipped => ("venv-shipped", "lsl", &["fmpy"][..], &["--profile", SHIPPED][..]),
+    begin(wheel)?;
+    install(wheel)?;
+    Ok(wheel.python())
+}
+
+/// A fresh environment with what the wheel and its tests require.
+fn begin(wheel: Wheel) -> Result<(), String> {
+    fresh_environment(&wheel.folder())?;
+    let project = package()?.join("pyproject.toml");
+    let text = fs::read_to_string(&project).map_err(|e| format!("{}: {e}", project.display()))?;
+    let required = requirements(&text, wheel.extra());
+    let others = match wheel {
+        Wheel::OfTests => &["maturin>=1.9.4,<2"][..],
+        Wheel::Shipped => &["maturin>=1.9.4,<2", "fmpy"],
     };
-    let python = fresh_environment(&work.join(place))?;
-    let wheels = work.join("wheels");
+    pip(&wheel.python(), &[others, &required].concat())
+}
+
+/// The requirements that an extra of a project names, as pip takes them.
+fn requirements<'a>(project: &'a str, extra: &str) -> Vec<&'a str> {
+    let extras = project
+        .split_once("[project.optional-dependencies]")
+        .map_or("", |(_, rest)| rest);
+    let list = extras
+        .split_once(&format!("\n{extra} = ["))
+        .map_or("", |(_, rest)| rest);
+    let mut found = Vec::new();
+    // Every other part is within quotes, where brackets are of a requirement: `dask[distributed]`.
+    for (number, part) in list.split('"').enumerate() {
+        match number % 2 {
+            1 => found.push(part),
+            _ if part.contains(']') => break,
+            _ => {}
+        }
+    }
+    found
+}
+
+/// Builds the wheel and installs it.
+fn install(wheel: Wheel) -> Result<(), String> {
+    let target = target_directory();
+    let python = wheel.python();
+    let profile = match wheel {
+        Wheel::OfTests => &["--profile", "dev", "--features", "as-in-workspace"][..],
+        Wheel::Shipped => &["--profile", SHIPPED],
+    };
+    let wheels = target.join("python").join("wheels");
     let _ = fs::remove_dir_all(&wheels);
-    pip(&python, &["maturin>=1.9.4,<2"])?;
     run(Command::new(&python)
         .args(["-m", "maturin", "build"])
         .args(profile)
@@ -85,9 +169,7 @@ pub fn environment(wheel: Wheel) -> Result<PathBuf, String> {
         .map(|entry| entry.path())
         .find(|path| path.extension().is_some_and(|e| e == "whl"))
         .ok_or_else(|| format!("maturin has left no wheel in {}", wheels.display()))?;
-    let with_extra = format!("{}[{extra}]", built.display());
-    pip(&python, &[&[with_extra.as_str()], others].concat())?;
-    Ok(python)
+    pip(&python, &[&format!("{}[{}]", built.display(), wheel.extra())])
 }
 
 /// The folder of the package.
@@ -96,19 +178,14 @@ pub fn package() -> Result<PathBuf, String> {
     Ok(root.ok_or("the folder of xtask has no parent")?.join("python"))
 }
 
-/// A virtual environment with nothing in it; returns its interpreter.
-fn fresh_environment(directory: &Path) -> Result<PathBuf, String> {
+/// A virtual environment with nothing in it.
+fn fresh_environment(directory: &Path) -> Result<(), String> {
     let base = interpreter()?;
     let _ = fs::remove_dir_all(directory);
     run(Command::new(&base).args(["-m", "venv"]).arg(directory)).map_err(|e| {
         format!(
             "{e}\nthe tests of the Python package need the module venv; on Debian and Ubuntu: apt install python3-venv"
         )
-    })?;
-    Ok(if cfg!(windows) {
-        directory.join("Scripts").join("python.exe")
-    } else {
-        directory.join("bin").join("python")
     })
 }
 
@@ -159,4 +236,24 @@ fn pip(python: &Path, packages: &[&str]) -> Result<(), String> {
     run(Command::new(python)
         .args(["-m", "pip", "install", "--quiet", "--disable-pip-version-check"])
         .args(packages))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_requirements_of_an_extra_are_found() {
+        let project = "[project]\ntest = [\"no\"]\n\n[project.optional-dependencies]\nlsl = [\"pylsl\"]\n\
+                       test = [\n    \"pytest\",\n    \"matplotlib>=3.7\",\n    \"dask[distributed]\",\n    \"pyxdf\",\n]\n\
+                       last = [\"other\"]\n";
+        let found = |extra| requirements(project, extra);
+        assert_eq!(
+            found("test"),
+            ["pytest", "matplotlib>=3.7", "dask[distributed]", "pyxdf"]
+        );
+        assert_eq!(found("lsl"), ["pylsl"]);
+        assert_eq!(found("last"), ["other"]);
+        assert!(found("none").is_empty());
+    }
 }

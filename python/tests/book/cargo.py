@@ -41,7 +41,8 @@ def command(arguments: list[str]) -> list[str]:
             crate = words.index("-p")
             words[crate : crate + 2] = ["--workspace"]
         if "--test" not in words:
-            words.insert(2, "--lib")
+            # Not `--lib`, which means the module of Python too.
+            words.insert(2, "--tests")
         # Where the configuration of cargo is.
         os.chdir(ROOT)
         target = ["--target-dir", target_folder(program)]
