@@ -95,6 +95,7 @@ pub use preparation::{NewRate, Offset, Preparation, Scaling, Step};
 pub use read_options::{ReadOptions, Repair};
 pub use record_file::{read, read_prepared, read_record, write_record, write_record_csv};
 pub use record_from_table::ReadRecord;
+pub use sampling::even_times;
 pub use scenario_file::{
     AnyScenario, ScenarioFileError, family_scenario_schema, parse_any_scenario, parse_scenario, read_any_scenario,
     read_scenario, scenario_schema,
