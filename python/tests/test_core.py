@@ -294,7 +294,9 @@ def test_a_person_is_tracked_from_an_earlier_fit(c1: pyhoid.Record, tmp_path: Pa
     # Before the first sample it is the fit.
     tracker = pyhoid.Tracker(prior=str(file), at=[2.5], sample_time=0.01)
     gain, _ = tracker.responses[2.5]
-    assert gain.value == pytest.approx(float(fit.fit.frequency_response([2.5]).magnitude_db[0]), abs=0.2)
+    assert gain.value == pytest.approx(
+        float(fit.fit.frequency_response([2.5]).magnitude_db[0]), abs=0.2
+    )
     assert tracker.settings["prior"] == str(file)
     file.unlink()
     assert pickle.loads(pickle.dumps(tracker)).responses == tracker.responses
@@ -319,9 +321,7 @@ def test_units_of_gains_are_those_of_the_record(c1: pyhoid.Record) -> None:
     bare = pyhoid.Record(e=c1.e, u=c1.u, sample_time=c1.sample_time)
     fit = pyhoid.identify(bare, nk=29, nd=1)
     assert "deg/deg" not in fit.summary() and fit.to_pandas().loc["K_e", "unit"] == ""
-    mixed = pyhoid.Record(
-        e=c1.e, u=c1.u, sample_time=c1.sample_time, units={"e": "mm", "u": "N"}
-    )
+    mixed = pyhoid.Record(e=c1.e, u=c1.u, sample_time=c1.sample_time, units={"e": "mm", "u": "N"})
     assert pyhoid.estimates.unit_of("K_e", [mixed]) == "N/mm"
     assert pyhoid.estimates.unit_of("K_e_dot", [mixed]) == "N s/mm"
     assert pyhoid.estimates.unit_of("K_over_T_I", [mixed], "1/s") == "N/(mm s)"
@@ -332,7 +332,7 @@ def test_units_of_gains_are_those_of_the_record(c1: pyhoid.Record) -> None:
 
 
 def test_units_of_columns_with_other_names(tmp_path: Path, c1: pyhoid.Record) -> None:
-    rows = "\n".join(f"{t},{e},{u}" for t, e, u in zip(c1.t, c1.e, c1.u))
+    rows = "\n".join(f"{k / 100},{e},{u}" for k, (e, u) in enumerate(zip(c1.e, c1.u)))
     (tmp_path / "own.csv").write_text(f"# units: error mm, stick N\nt,error,stick\n{rows}\n")
     own = pyhoid.read(tmp_path / "own.csv", input="error", output="stick")
     assert pyhoid.estimates.unit_of("K_e", [own]) == "N/mm"

@@ -62,8 +62,9 @@ def _seconds(times: npt.NDArray[Any]) -> npt.NDArray[Any]:
         row = int(np.flatnonzero(np.isnat(times))[0])
         raise DataError(f"the time of row {row} is missing; fill it, or give sample_time")
     elapsed = times - times[0] if times.dtype.kind == "M" else times
-    # Divided, so that whole tenths of ms stay what they print as.
-    return np.asarray(elapsed.astype("timedelta64[ns]").astype(np.int64) / 1e9, dtype=np.float64)
+    nanoseconds = elapsed.astype("timedelta64[ns]").astype(np.int64)
+    # What makes times out of decimals cuts at a ns; whole tenths of ms are to stay what they are.
+    return np.asarray(np.round(nanoseconds / 1e9, 8), dtype=np.float64)
 
 
 def _own(array: FloatArray) -> FloatArray:

@@ -11,8 +11,10 @@ use hoid::report::numbers;
 
 use crate::{error::CliError, text};
 
-/// Parameters that are shown, where the table has them.
+/// Parameters that are shown, the first that the table has.
 const PARAMETERS: [&str; 7] = ["K_e", "K_over_T_I", "K", "T_L", "T_I", "omega_nm", "zeta_nm"];
+/// Columns of a screen that is 80 wide.
+const MOST_PARAMETERS: usize = 3;
 /// Rows of one screen.
 const MOST_ROWS: usize = 24;
 
@@ -46,6 +48,7 @@ fn words(summary: &OutputTable) -> String {
     let shown: Vec<&str> = PARAMETERS
         .into_iter()
         .filter(|name| quantity.contains(&bias(name)))
+        .take(MOST_PARAMETERS)
         .collect();
     let mut rows: Vec<Row> = Vec::new();
     for i in 0..quantity.len() {
@@ -81,10 +84,11 @@ fn words(summary: &OutputTable) -> String {
     }
     let more = match rows.len().checked_sub(MOST_ROWS) {
         None | Some(0) => String::new(),
-        Some(more) => format!("{more} more rows are in the table summary.\n"),
+        Some(more) => format!("and {more} rows more\n"),
     };
     format!(
-        "{table}\n{more}Relative bias in %: median over the fits that are an operator (of all) ± its Monte Carlo error. `hoid study check` names the cells.\n"
+        "{table}\n{more}Relative bias in %: median over the fits that are an operator (of all), and its Monte Carlo error. \
+         Other parameters and their spread: table summary. Cells by number: hoid study check.\n"
     )
 }
 
