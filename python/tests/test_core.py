@@ -94,7 +94,7 @@ def test_tables(fit: pyhoid.Fit, c1: pyhoid.Record, c4: pyhoid.Record) -> None:
     assert trace.to_xarray().K_e.attrs["units"] == "deg/deg"
 
 
-def test_tables_with_instants_and_durations(c1: pyhoid.Record) -> None:
+def test_tables_with_instants_and_durations(c1: pyhoid.Record, tmp_path: Path) -> None:
     pd = pytest.importorskip("pandas")
     pl = pytest.importorskip("polars")
     short = c1.span(0, 5)
@@ -114,6 +114,16 @@ def test_tables_with_instants_and_durations(c1: pyhoid.Record) -> None:
         pyhoid.Record.from_pandas(
             uneven.set_index(pd.to_datetime(np.asarray(uneven.index), unit="s"))
         )
+    # What a recorder rounds is the same record from the file and from the table.
+    rounded = pd.DataFrame({"t": np.arange(3000) / 60, "e": 0.5, "u": np.arange(3000.0)}).round(4)
+    rounded["e"] = np.sin(rounded.u)
+    rounded.to_csv(tmp_path / "run.csv", index=False)
+    of_file, of_table = pyhoid.read(tmp_path / "run.csv"), pyhoid.Record.from_pandas(rounded)
+    assert of_table.sample_time == of_file.sample_time == 1 / 60
+    dated = rounded.assign(t=pd.Timestamp("2026-03-01") + pd.to_timedelta(rounded.t, unit="s"))
+    assert pyhoid.Record.from_pandas(dated).sample_time == 1 / 60
+    with pytest.raises(pyhoid.DataError, match="no numbers"):
+        pyhoid.Record.from_pandas(dated.assign(t=dated.t.astype(str)))
     table = short.to_polars()
     assert table.columns[:3] == ["t", "e", "u"]
     made = pyhoid.Record.from_polars(table)
@@ -284,7 +294,9 @@ def test_a_person_is_tracked_from_an_earlier_fit(c1: pyhoid.Record, tmp_path: Pa
     # Before the first sample it is the fit.
     tracker = pyhoid.Tracker(prior=str(file), at=[2.5], sample_time=0.01)
     gain, _ = tracker.responses[2.5]
-    assert gain.value == pytest.approx(float(fit.fit.frequency_response([2.5]).magnitude_db[0]), abs=0.2)
+    assert gain.value == pytest.approx(
+        float(fit.fit.frequency_response([2.5]).magnitude_db[0]), abs=0.2
+    )
     assert tracker.settings["prior"] == str(file)
     file.unlink()
     assert pickle.loads(pickle.dumps(tracker)).responses == tracker.responses
@@ -309,11 +321,21 @@ def test_units_of_gains_are_those_of_the_record(c1: pyhoid.Record) -> None:
     bare = pyhoid.Record(e=c1.e, u=c1.u, sample_time=c1.sample_time)
     fit = pyhoid.identify(bare, nk=29, nd=1)
     assert "deg/deg" not in fit.summary() and fit.to_pandas().loc["K_e", "unit"] == ""
-    mixed = pyhoid.Record(
-        e=c1.e, u=c1.u, sample_time=c1.sample_time, units={"e": "mm", "u": "N"}
-    )
+    mixed = pyhoid.Record(e=c1.e, u=c1.u, sample_time=c1.sample_time, units={"e": "mm", "u": "N"})
     assert pyhoid.estimates.unit_of("K_e", [mixed]) == "N/mm"
     assert pyhoid.estimates.unit_of("K_e_dot", [mixed]) == "N s/mm"
+    assert pyhoid.estimates.unit_of("K_over_T_I", [mixed], "1/s") == "N/(mm s)"
+    assert pyhoid.estimates.unit_of("c_2", [bare], "s^2") == "s^2"
+    for record, unit in ((bare, ""), (mixed, "N/mm")):
+        person = pyhoid.identify_operator(record, form="lead", excitation="none")
+        assert person.parameters.K_e.unit == unit and person.parameters.tau_e.unit == "s"
+
+
+def test_units_of_columns_with_other_names(tmp_path: Path, c1: pyhoid.Record) -> None:
+    rows = "\n".join(f"{k / 100},{e},{u}" for k, (e, u) in enumerate(zip(c1.e, c1.u)))
+    (tmp_path / "own.csv").write_text(f"# units: error mm, stick N\nt,error,stick\n{rows}\n")
+    own = pyhoid.read(tmp_path / "own.csv", input="error", output="stick")
+    assert pyhoid.estimates.unit_of("K_e", [own]) == "N/mm"
 
 
 def test_a_description_with_its_verdict(c1: pyhoid.Record) -> None:

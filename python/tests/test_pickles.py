@@ -32,6 +32,16 @@ def test_a_fit_comes_back_with_its_digits(fit: pyhoid.Fit, c1: pyhoid.Record) ->
     assert copy.deepcopy(fit).parameters == fit.parameters
 
 
+def test_a_fit_of_a_recording_with_a_level_comes_back(c1: pyhoid.Record) -> None:
+    """A recording has a level of u; taken out twice it leaves another rest of rounding."""
+    recorded = pyhoid.Record(e=c1.e + 0.02, u=c1.u + 0.7, sample_time=c1.sample_time)
+    for structure in ("bj", "arx"):
+        fit = pyhoid.identify(recorded, structure, nk=29)
+        assert not np.array_equal(fit.records[0].u, recorded.u), "the level is out of the data"
+        back = again(fit)
+        assert np.array_equal(back.predict(recorded).values, fit.predict(recorded).values)
+
+
 def test_a_trace_and_its_start_come_back(c4: pyhoid.Record) -> None:
     trace = pyhoid.track(c4, "physical", nk=29, nd=1, every=16)
     back = again(trace)

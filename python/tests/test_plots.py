@@ -54,6 +54,18 @@ def test_bode_and_describing_function(fit: pyhoid.Fit, c1: pyhoid.Record, tmp_pa
         plots.bode(fit, axes=[magnitude])
 
 
+def test_an_operator_is_drawn_as_a_fit_is(fit: pyhoid.Fit, c1: pyhoid.Record) -> None:
+    person = pyhoid.identify_operator(c1, form="lead", nd=2, excitation="none")
+    magnitude, _ = pyhoid.plots.bode([person, fit])
+    assert [line.get_label() for line in magnitude.lines] == ["lead", fit._native.title]
+    alone, _ = pyhoid.plots.bode(person)
+    response = person.fit.frequency_response(None).magnitude_db
+    assert np.array_equal(alone.lines[0].get_ydata(), response)
+    bare = pyhoid.Record(e=c1.e, u=c1.u, sample_time=0.01, d=c1["f_t"])
+    with pytest.raises(pyhoid.OptionError, match="channel is f_t, and the records have d"):
+        pyhoid.describing_function(bare)
+
+
 def test_residuals(fit: pyhoid.Fit, tmp_path: Path) -> None:
     axes = plots.residual_tests(fit)
     assert "Ljung-Box" in axes[0].get_title(loc="left")

@@ -151,7 +151,7 @@ pub fn search(fit: &Fit) -> String {
     format!(
         "Search: {}, {}, start: {}.\n",
         t.reason,
-        steps(t.iterations),
+        counted(t.iterations as u64, "step"),
         fit.start()
     )
 }
@@ -165,12 +165,11 @@ pub fn instability(fit: &Fit) -> &'static str {
     }
 }
 
-/// A number of steps in words.
-pub fn steps(n: usize) -> String {
-    if n == 1 {
-        "1 step".to_owned()
-    } else {
-        format!("{n} steps")
+/// A number of something in words: "1 step", "2 steps".
+pub fn counted(n: u64, what: &str) -> String {
+    match n {
+        1 => format!("1 {what}"),
+        n => format!("{n} {what}s"),
     }
 }
 

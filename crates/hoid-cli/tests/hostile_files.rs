@@ -25,7 +25,7 @@ fn run(directory: &Path) -> String {
 fn a_decimal_comma_is_explained_wherever_the_file_is_read() {
     let directory = TempDir::new().unwrap();
     let d = directory.path();
-    fs::write(d.join("comma.csv"), "t;e;u\n0,00;1,5;2,5\n0,01;1,6;2,6\n").unwrap();
+    fs::write(d.join("comma.csv"), "t,e,u\n0.00,\"1,5\",2.5\n0.01,\"1,6\",2.6\n").unwrap();
     let told = good(d, &["info", "comma.csv"]);
     assert!(told.contains("decimal point instead of a comma"), "{told}");
     assert!(

@@ -75,6 +75,21 @@ fn pages_keep_to_the_width_of_the_screen() {
         let widest = text.lines().map(|line| line.chars().count()).max().unwrap();
         assert!(widest <= columns, "{widest} columns on a screen of {columns}:\n{text}");
     }
+    for arguments in [
+        &["info", "1.csv"][..],
+        &["study", "plans"],
+        &["study", "check", "bias"],
+        &["margins", "--condition", "C1"],
+        &[
+            "convert",
+            "--operator",
+            "K_e=.09,T_L=.4,omega_nm=11.25,zeta_nm=.35,tau_e=.28",
+        ],
+    ] {
+        let text = at_width(directory.path(), "60", arguments);
+        let widest = text.lines().map(|line| line.chars().count()).max().unwrap();
+        assert!(widest <= 60, "{arguments:?}, {widest} columns:\n{text}");
+    }
 }
 
 #[test]
@@ -132,6 +147,72 @@ fn mistakes_are_answered_with_what_was_meant() {
             "{arguments:?}: {message}"
         );
     }
+}
+
+/// Files as people have them: other names, decimal commas, no units, t in ms.
+#[test]
+fn files_of_a_newcomer_are_read_or_answered_with_what_to_do() {
+    let directory = simulated();
+    let d = directory.path();
+    let simulated = fs::read_to_string(d.join("1.csv")).unwrap();
+    let rows: Vec<Vec<&str>> = simulated
+        .lines()
+        .filter(|line| !line.starts_with('#'))
+        .map(|line| line.split(',').collect())
+        .collect();
+    let header = &rows[0];
+    let at = |name: &str| header.iter().position(|known| *known == name).unwrap();
+    let (t, f_t, e, u) = (at("t"), at("f_t"), at("e"), at("u"));
+    let written = |file: &str, names: &str, row: &dyn Fn(&[&str]) -> String| {
+        let lines: Vec<String> = rows[1..].iter().map(|cells| row(cells)).collect();
+        fs::write(d.join(file), format!("{names}\n{}\n", lines.join("\n"))).unwrap();
+    };
+    let plain = |cells: &[&str]| [cells[t], cells[f_t], cells[u], cells[e]].join(",");
+    written("mine.csv", "Time (s),Disturbance,Stick,Tracking error", &plain);
+    written("comma.csv", "Time (s);Disturbance;Stick;Tracking error", &|cells| {
+        plain(cells).replace(',', ";").replace('.', ",")
+    });
+    written("ms.csv", "t,e,u", &|cells| {
+        format!(
+            "{},{},{}",
+            1000.0 * cells[t].parse::<f64>().unwrap(),
+            cells[e],
+            cells[u]
+        )
+    });
+
+    let (_, message) = bad(d, &["identify", "mine.csv"]);
+    assert!(message.contains("did you mean \"Tracking error\"?"), "{message}");
+    let own = [
+        "--input",
+        "Tracking error",
+        "--output",
+        "Stick",
+        "--structure",
+        "arx",
+        "--nk",
+        "29",
+    ];
+    let page = |file: &str, more: &[&str]| {
+        let page = good(d, &[&["identify", file], &own[..], more].concat());
+        page.replace(file, "FILE")
+    };
+    let usual = page("mine.csv", &[]);
+    assert_eq!(page("comma.csv", &[]), usual);
+    assert!(!usual.contains("deg"), "no file says a unit: {usual}");
+    assert_eq!(
+        page("mine.csv", &["--unit", "e=degrees,u=radians"]),
+        page("mine.csv", &["--unit", "e=deg,u=rad"])
+    );
+    // Other columns than e and u, and no units: six columns on 80.
+    let info = at_width(d, "80", &["info", "mine.csv"]);
+    assert!(info.contains(" column") && !info.contains("unit"), "{info}");
+    assert!(info.lines().all(|line| line.chars().count() <= 80), "{info}");
+
+    let reasons = at_width(d, "110", &["identify", "ms.csv"]);
+    let first = reasons.lines().nth(1).unwrap();
+    assert!(first.contains("a sample time of 10 s"), "{reasons}");
+    assert!(!reasons.contains("nothing happens"), "{reasons}");
 }
 
 #[test]

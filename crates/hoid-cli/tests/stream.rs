@@ -337,7 +337,7 @@ fn a_wild_value_and_a_hostile_span_are_told_in_their_lines() {
         (&1.into(), &"trustworthy".into()),
         "{last}"
     );
-    assert!(said.contains("begun again 1 times"), "{said}");
+    assert!(said.contains("begun again 1 time."), "{said}");
 }
 
 #[test]

@@ -74,7 +74,7 @@ pub enum IoError {
         file: String,
     },
     /// An extension that stands for no format.
-    #[error("{file}: {found}, which names no format of a record; expected {expected}")]
+    #[error("{file}: {found}, which names no format of a record; expected {expected}{remedy}")]
     UnknownFormat {
         /// The file.
         file: String,
@@ -82,6 +82,8 @@ pub enum IoError {
         found: String,
         /// The extensions that are known.
         expected: String,
+        /// "; unpack it", empty where the format is unknown.
+        remedy: String,
     },
     /// Bytes that are no text.
     #[error("{file}, {place}: {found}, expected text in UTF-8; save the table as CSV in UTF-8")]
@@ -116,6 +118,16 @@ pub enum IoError {
         place: String,
         /// The first cells.
         found: String,
+    },
+    /// Cells between blanks.
+    #[error(
+        "{file}: {found} numbers between blanks stand in a line, expected commas, semicolons or tabs between them; save the table so, with a header such as t,e,u"
+    )]
+    Blanks {
+        /// The file.
+        file: String,
+        /// The numbers in its first line.
+        found: usize,
     },
     /// A table without end to the side.
     #[error(

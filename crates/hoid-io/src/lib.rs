@@ -35,6 +35,7 @@
 //! | `formats`, `format` | the formats, and what each says of itself |
 //! | `arrays` | files of named arrays: paths, and the columns among them |
 //! | `time_column` | the time under another name |
+//! | `usual_names` | [`error_among`], [`control_among`]: columns by the names that people give them |
 //! | `table`, `table_reader`, `time_grid`, `record_from_table` | the columns of any format, and the record made of them |
 //! | `column_expression`, `read_options` | [`ColumnExpression`], [`ReadOptions`]: what is read and how |
 //! | `preparation` | [`Preparation`]: scale, offset, rate, run-in and trend of channels, and the account of it |
@@ -77,6 +78,7 @@ mod table_reader;
 mod table_writer;
 mod time_column;
 mod time_grid;
+mod usual_names;
 mod wording;
 
 pub use atomic::{file_names, make_directory, read_bytes, read_text, write_atomically};
@@ -93,6 +95,7 @@ pub use preparation::{NewRate, Offset, Preparation, Scaling, Step};
 pub use read_options::{ReadOptions, Repair};
 pub use record_file::{read, read_prepared, read_record, write_record, write_record_csv};
 pub use record_from_table::ReadRecord;
+pub use sampling::even_times;
 pub use scenario_file::{
     AnyScenario, ScenarioFileError, family_scenario_schema, parse_any_scenario, parse_scenario, read_any_scenario,
     read_scenario, scenario_schema,
@@ -101,4 +104,5 @@ pub use segments::read_segments;
 pub use survey::{ColumnSurvey, FileSurvey, SamplingSurvey, ValueSurvey, survey};
 pub use table_file::{check_table_path, read_table, write_table};
 pub use table_writer::TableWriter;
+pub use usual_names::{control_among, error_among};
 pub use wording::printable;

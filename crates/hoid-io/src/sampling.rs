@@ -41,6 +41,20 @@ pub(crate) struct Sampling {
     pub(crate) note: Option<String>,
 }
 
+/// The sample time in s of even times that come from no file, by the rules of files: their rounding is
+/// found in them.
+///
+/// # Errors
+/// The row, counted from 0, at which they are not even.
+pub fn even_times(t: &[f64]) -> Result<f64, usize> {
+    match even(t, Precision::of_times(t, false), None) {
+        Ok(sampling) => Ok(sampling.sample_time_s),
+        Err(Uneven::TooFew) => Err(0),
+        Err(Uneven::Gap { row, .. }) => Err(row + 1),
+        Err(Uneven::NotIncreasing { row } | Uneven::Jitter { row, .. }) => Err(row),
+    }
+}
+
 /// The sample time of an even t. A sample time that the file states beside its columns counts when
 /// t agrees with it.
 pub(crate) fn even(t: &[f64], precision: Precision, stated_s: Option<f64>) -> Result<Sampling, Uneven> {
@@ -186,6 +200,19 @@ fn whole_hz(ts: f64, slack_s: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn times_in_memory_are_judged_as_those_of_files() {
+        let rounded: Vec<f64> = (0..2702).map(|k| (f64::from(k) / 60.0 * 1e4).round() / 1e4).collect();
+        assert_eq!(even_times(&rounded), Ok(1.0 / 60.0));
+        let mut missing = rounded.clone();
+        missing.drain(100..140);
+        assert_eq!(even_times(&missing), Err(100));
+        let mut back = rounded;
+        back[7] = back[5];
+        assert_eq!(even_times(&back), Err(7));
+        assert_eq!(even_times(&[0.0]), Err(0));
+    }
 
     /// Times as a file with so many decimals prints them.
     fn printed(times: impl Iterator<Item = f64>, decimals: usize) -> (Vec<f64>, Precision) {

@@ -14,7 +14,7 @@ use crate::data_quality::{
 };
 use crate::format::Reading;
 use crate::formats::bytes_of;
-use crate::table::{Column, DECIMAL_COMMA, Precision, Table, has_decimal_comma};
+use crate::table::{Column, DECIMAL_COMMA, Precision, Table, UNITS_ROW, has_decimal_comma};
 use crate::time_column::with_time;
 use crate::wording::named;
 
@@ -152,6 +152,10 @@ fn of_table(mut table: Table<'_>) -> (Vec<Read>, Vec<String>) {
     let rows = table.rows;
     let commas = decimal_commas(&table);
     table.notes.extend(commas);
+    if rows > 1 && table.has_no_number_in(0) {
+        let place = table.source.place(0);
+        table.notes.push(format!("{place}: {UNITS_ROW}"));
+    }
     let read = |column: Column| {
         let text = column.texts.len() == rows;
         Read {
@@ -184,18 +188,22 @@ fn decimal_commas(table: &Table<'_>) -> Vec<String> {
 
 fn of_arrays(contents: &Contents) -> (Vec<Read>, Vec<String>) {
     let column_paths = contents.column_paths();
-    let read = |column_path: ColumnPath| Read {
-        parent: column_path.parent.clone(),
-        name: column_path.name().to_owned(),
-        unit: column_path.unit.clone(),
-        kind: column_path.what(),
-        rows: column_path.len(),
-        values: match &column_path.holds {
-            Holds::Numbers(numbers) => Some(numbers.values()),
-            Holds::Texts(_) | Holds::Unread(_) => None,
-        },
-        path: column_path.path,
-        precision: Precision::default(),
+    let read = |column_path: ColumnPath| {
+        let (values, single) = match &column_path.holds {
+            Holds::Numbers(numbers) => (Some(numbers.values()), numbers.kind().is_single()),
+            Holds::Texts(_) | Holds::Unread(_) => (None, false),
+        };
+        let times = values.as_deref().filter(|_| TIMES.contains(&column_path.name()));
+        Read {
+            parent: column_path.parent.clone(),
+            name: column_path.name().to_owned(),
+            unit: column_path.unit.clone(),
+            kind: column_path.what(),
+            rows: column_path.len(),
+            precision: times.map_or_else(Precision::default, |t| Precision::of_times(t, single)),
+            values,
+            path: column_path.path,
+        }
     };
     (column_paths.into_iter().map(read).collect(), contents.notes.clone())
 }

@@ -4,6 +4,7 @@
 //! same for all formats. A value that is missing or no number is NaN here; the file is asked again
 //! what stood there only when an error has to say so, which keeps a million rows cheap.
 
+use std::borrow::Cow;
 use std::collections::HashMap;
 use std::ops::Range;
 
@@ -40,6 +41,9 @@ impl Cell {
     }
 }
 
+/// Most decimals of rounded times that are looked for: a µs.
+const MOST_DECIMALS: i32 = 6;
+
 /// How exactly a column of decimal numbers is printed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) struct Precision {
@@ -55,6 +59,25 @@ impl Precision {
         Self {
             decimals: Some(45),
             significant: 7,
+        }
+    }
+
+    /// That of times in a file of binary numbers. A recorder that rounds what it saves, as to tenths of
+    /// a ms, leaves times that are all whole multiples of its last digit, and is known by that. The rest
+    /// of a rounded number is below two units of its last binary digit; as many digits as are looked
+    /// for here leave no such rest by chance.
+    pub(crate) fn of_times(values: &[f64], single: bool) -> Self {
+        if single {
+            return Self::single();
+        }
+        let is_multiple = |value: f64, decimals: i32| {
+            let scaled = value * 10_f64.powi(decimals);
+            (scaled - scaled.round()).abs() <= 2.0 * f64::EPSILON * scaled.abs()
+        };
+        let finite = || values.iter().copied().filter(|value| value.is_finite());
+        Self {
+            decimals: (0..=MOST_DECIMALS).find(|decimals| finite().all(|value| is_multiple(value, *decimals))),
+            significant: 0,
         }
     }
 
@@ -141,6 +164,12 @@ impl Table<'_> {
         self.columns.iter().map(|c| c.name.as_str()).collect()
     }
 
+    /// Whether no column has a number in a row, as in one of units.
+    pub(crate) fn has_no_number_in(&self, row: usize) -> bool {
+        let has_none = |column: &Column| column.values.get(row).is_none_or(|value| value.is_nan());
+        self.columns.iter().all(has_none)
+    }
+
     /// Why the value at `row` of a column, which is not finite, cannot be used. `rows` are the rows
     /// in use.
     pub(crate) fn bad_value(&self, column: usize, row: usize, rows: Range<usize>) -> IoError {
@@ -155,6 +184,10 @@ impl Table<'_> {
         if texts.binary_search(&row).is_ok() {
             let remedy = if has_decimal_comma(&found) {
                 DECIMAL_COMMA
+            } else if is_moment(&found) {
+                "dates and times of a clock are not read: give t as a number of s, or --fs HZ where the samples are even"
+            } else if row == 0 && self.rows > 1 && self.has_no_number_in(row) {
+                UNITS_ROW
             } else if is_last_cell && self.source.is_open(row) {
                 "the file is cut there, in the middle of its last line: copy or record it again, or remove that line"
             } else {
@@ -191,12 +224,35 @@ impl Table<'_> {
     }
 }
 
+/// The remedy for a first row without numbers.
+pub(crate) const UNITS_ROW: &str =
+    "no column has a number there: where that line names the units, remove it and say them with --unit e=deg,u=deg";
+
 /// The remedy for [`has_decimal_comma`].
 pub(crate) const DECIMAL_COMMA: &str = "write the numbers with a decimal point instead of a comma";
 
 /// Whether a cell that is text would be a number with a point in the place of its comma.
 pub(crate) fn has_decimal_comma(cell: &str) -> bool {
     cell.contains(',') && matches!(Cell::parse(&cell.replacen(',', ".", 1)), Cell::Number(_))
+}
+
+/// A number as it is written with a decimal point; any other cell as it is.
+pub(crate) fn with_decimal_point(cell: &str, commas: bool) -> Cow<'_, str> {
+    if commas && has_decimal_comma(cell) {
+        Cow::Owned(cell.replacen(',', ".", 1))
+    } else {
+        Cow::Borrowed(cell)
+    }
+}
+
+/// Whether a cell looks like a date or the time of a clock: `2024-03-01 10:00:00.5`, `10:00:00,5`.
+fn is_moment(cell: &str) -> bool {
+    let parts = |marks: &[char]| {
+        cell.split(marks)
+            .filter(|part| part.starts_with(|c: char| c.is_ascii_digit()))
+            .count()
+    };
+    cell.starts_with(|c: char| c.is_ascii_digit()) && (parts(&[':']) > 1 || parts(&['-', '/', '.']) > 2)
 }
 
 /// Checks that the names differ, and notes the columns without one.
@@ -301,6 +357,40 @@ mod tests {
         assert_eq!(Precision::default().unit(3.0), 0.0);
         // Nothing that can stand in a file gives anything but a number of s.
         assert!(precision(&["1e-99999999999", ".", "-", "e"]).unit(1e300) >= 0.0);
+    }
+
+    #[test]
+    fn times_that_were_rounded_are_known_as_such() {
+        let times = |rate_hz: f64| (0..5000).map(move |k| f64::from(k) / rate_hz);
+        let rounded: Vec<f64> = times(60.0).map(|t| (t * 1e4).round() / 1e4).collect();
+        assert!((Precision::of_times(&rounded, false).unit(45.0) - 1e-4).abs() < 1e-18);
+        let hundredths: Vec<f64> = (0..5000).map(|k| f64::from(k) * 0.01).collect();
+        assert!((Precision::of_times(&hundredths, false).unit(45.0) - 1e-2).abs() < 1e-16);
+        let exact: Vec<f64> = times(60.0).collect();
+        assert_eq!(Precision::of_times(&exact, false).unit(45.0), 0.0);
+        assert_eq!(Precision::of_times(&exact, true), Precision::single());
+        // A t with NaN is judged elsewhere.
+        assert_eq!(Precision::of_times(&[f64::NAN, 0.5], false).unit(1.0), 0.1);
+    }
+
+    #[test]
+    fn decimal_commas_and_moments() {
+        assert_eq!(with_decimal_point("-1,5e-3", true), "-1.5e-3");
+        for cell in ["1,5", "a,b", "1,234,567", "1.5"] {
+            assert_eq!(with_decimal_point(cell, cell != "1,5"), cell);
+        }
+        for moment in [
+            "2024-03-01 10:00:00.000",
+            "2024-03-01T10:00:00Z",
+            "10:00:00,5",
+            "01.03.2024",
+            "3/1/2024",
+        ] {
+            assert!(is_moment(moment), "{moment}");
+        }
+        for other in ["abc", "s", "1.5.", "-1", "1-2", "a:b:c", ""] {
+            assert!(!is_moment(other), "{other}");
+        }
     }
 
     #[test]

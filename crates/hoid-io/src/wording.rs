@@ -2,6 +2,8 @@
 
 use std::borrow::Cow;
 
+use crate::usual_names::{control_among, error_among};
+
 /// A cell in a message is cut to this many characters.
 const SHOWN: usize = 40;
 
@@ -61,7 +63,7 @@ const NEAR: f64 = 0.7;
 
 /// "; did you mean "u"?" for names that are not there: of each the one that differs in capitals
 /// alone, else the nearest by Jaro's measure (M. A. Jaro, J. Am. Stat. Assoc. 84 (1989) 414-420).
-/// Empty where none is near.
+/// Of e and u it may be the column that has the usual name of what they are. Empty where none is near.
 pub(crate) fn did_you_mean(unknown: &[&str], names: &[&str]) -> String {
     let of = |asked: &&str| {
         let asked = asked.trim().to_lowercase();
@@ -73,8 +75,9 @@ pub(crate) fn did_you_mean(unknown: &[&str], names: &[&str]) -> String {
             .filter(|name| !name.is_empty())
             .filter(is_near)
             .map(|name| score(name));
-        let best = known.max_by(|a, b| a.0.total_cmp(&b.0))?;
-        (best.0 > NEAR).then(|| format!("\"{}\"", named(&best.1)))
+        let best = known.max_by(|a, b| a.0.total_cmp(&b.0)).filter(|best| best.0 > NEAR);
+        let meant = best.map(|best| best.1).or_else(|| by_what_it_is(&asked, names))?;
+        Some(format!("\"{}\"", named(&meant)))
     };
     let near: Vec<String> = unknown.iter().filter_map(of).collect();
     if near.is_empty() {
@@ -82,6 +85,17 @@ pub(crate) fn did_you_mean(unknown: &[&str], names: &[&str]) -> String {
     } else {
         format!("; did you mean {}?", near.join(" and "))
     }
+}
+
+/// The column that is what was asked for by another name: the error for `e` or `error`, the control
+/// for `u` or `stick`.
+fn by_what_it_is(asked: &str, names: &[&str]) -> Option<String> {
+    let usual = match (error_among(&[asked]), control_among(&[asked])) {
+        (Some(_), _) => error_among(names),
+        (_, Some(_)) => control_among(names),
+        _ => None,
+    };
+    usual.map(str::to_owned)
 }
 
 /// Names for a message: all of them, unless there are very many.
@@ -139,5 +153,9 @@ mod tests {
         assert_eq!(did_you_mean(&["q"], &names), "");
         assert_eq!(did_you_mean(&["e"], &["Time [ms]"]), "");
         assert_eq!(did_you_mean(&["q"], &[]), "");
+        let own = ["t", "Target", "Stick", "Tracking error"];
+        assert_eq!(did_you_mean(&["e"], &own), "; did you mean \"Tracking error\"?");
+        assert_eq!(did_you_mean(&["Error"], &own), "; did you mean \"Tracking error\"?");
+        assert_eq!(did_you_mean(&["u"], &own), "; did you mean \"Stick\"?");
     }
 }

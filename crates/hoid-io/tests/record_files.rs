@@ -175,6 +175,22 @@ fn expressions_choose_and_combine() {
     );
 }
 
+/// What a spreadsheet saves where decimals have commas: semicolons or tabs, a byte order mark, CRLF.
+#[test]
+fn decimal_commas_give_the_same_record() {
+    let desk = Desk::new();
+    let of = |text: &str| desk.read(text, &defaults()).unwrap();
+    let point = of("t,e,u\n0.00,-1.5,2e-3\n0.01,1.25,0\n0.02,1,5\n");
+    for text in [
+        "\u{feff}t;e;u\r\n0,00;-1,5;2e-3\r\n0,01;1,25;0\r\n0,02;1;5\r\n",
+        "t\te\tu\n0,00\t-1,5\t2e-3\n0,01\t1,25\t0\n0,02\t1\t5\n",
+    ] {
+        let comma = of(text);
+        assert_eq!(comma.record, point.record);
+        assert_eq!(comma.notes, ["the commas in its numbers are taken as decimal commas"]);
+    }
+}
+
 #[test]
 fn errors_name_line_column_and_remedy() {
     let desk = Desk::new();
@@ -190,8 +206,24 @@ fn errors_name_line_column_and_remedy() {
         &["line 3, column e: found \"abc\", expected a number", "--fill"],
     );
     says(
-        "t;e;u\n0;1,5;2\n1;1,6;2\n",
+        "t;e;u\n0;1,5;2\n1;1.6;2\n",
         &["line 2, column e", "decimal point instead of a comma"],
+    );
+    says(
+        "t,e,u\n0,\"1,5\",2\n1,\"1,6\",2\n",
+        &["line 2, column e", "decimal point instead of a comma"],
+    );
+    says(
+        "t,e,u\ns,deg,deg\n0,1,2\n1,1,2\n",
+        &["line 2, column t: found \"s\"", "remove it and say them with --unit"],
+    );
+    says(
+        "t,e,u\n2024-03-01 10:00:00.00,1,2\n2024-03-01 10:00:00.02,1,2\n",
+        &["line 2, column t", "dates and times of a clock are not read", "--fs HZ"],
+    );
+    says(
+        "t e u\n0.00 1.5 2\n0.01 1.6 2\n",
+        &["3 numbers between blanks", "expected commas, semicolons or tabs"],
     );
     says(
         "t,e,u\n0,1,2\n#\n1,NaN,2\n2,,2\n",

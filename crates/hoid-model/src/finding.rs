@@ -110,6 +110,11 @@ impl Verdict {
         Self::of(self.findings.into_iter().chain(more).collect())
     }
 
+    /// The verdict of these findings behind others, from which they may follow.
+    pub fn behind(self, first: impl IntoIterator<Item = Finding>) -> Self {
+        Self::of(first.into_iter().chain(self.findings).collect())
+    }
+
     /// All findings, the gravest first.
     pub fn findings(&self) -> &[Finding] {
         &self.findings
@@ -160,7 +165,10 @@ mod tests {
         assert_eq!(doubtful.level, VerdictLevel::Doubtful);
         assert_eq!(doubtful.reasons().collect::<Vec<_>>(), ["the search did not converge"]);
         let all = Verdict::of(vec![note.clone(), doubt.clone(), open.clone()]);
-        assert_eq!(Verdict::of(vec![note]).and([doubt, open]), all);
+        assert_eq!(Verdict::of(vec![note.clone()]).and([doubt.clone(), open.clone()]), all);
+        let second = Finding::doubt("second", "what follows from it");
+        let led = Verdict::of(vec![note, second.clone()]).behind([doubt.clone()]);
+        assert_eq!(led.findings()[..2], [doubt, second]);
         assert_eq!(all.level, VerdictLevel::NotDetermined);
         assert_eq!(
             all.to_string(),

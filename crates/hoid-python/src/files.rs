@@ -3,7 +3,7 @@
 use std::{collections::BTreeMap, path::PathBuf, str::FromStr};
 
 use hoid_io::{ColumnValues, IoError, NewRate, Preparation, ReadOptions, Repair, read_segments, write_record};
-use numpy::PyArray1;
+use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::{prelude::*, types::PyDict};
 
 use crate::{
@@ -101,6 +101,16 @@ pub fn write(py: Python<'_>, path: PathBuf, record: &Bound<'_, PyAny>) -> Outcom
 #[pyo3(signature = (record))]
 pub fn check_record(record: &Bound<'_, PyAny>) -> Outcome<()> {
     arrays::check(record)
+}
+
+/// The sample time of even times in s, or the row at which they are not even.
+#[pyfunction]
+#[pyo3(signature = (times))]
+pub fn even_times(times: PyReadonlyArray1<'_, f64>) -> (Option<f64>, usize) {
+    match hoid_io::even_times(&times.as_array().to_vec()) {
+        Ok(sample_time_s) => (Some(sample_time_s), 0),
+        Err(row) => (None, row),
+    }
 }
 
 /// The record without the mean or the linear trend of input and output.

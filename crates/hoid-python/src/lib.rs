@@ -66,6 +66,7 @@ fn _pyhoid(module: &Bound<'_, PyModule>) -> PyResult<()> {
         wrap_pyfunction!(faults::without_level, module)?,
         wrap_pyfunction!(files::check_record, module)?,
         wrap_pyfunction!(files::detrended, module)?,
+        wrap_pyfunction!(files::even_times, module)?,
         wrap_pyfunction!(files::read, module)?,
         wrap_pyfunction!(files::read_table, module)?,
         wrap_pyfunction!(files::write, module)?,

@@ -29,6 +29,9 @@ def mended(
 
 
 def joined(one: Verdict, other: Verdict) -> Verdict:
-    """Both verdicts in one: the graver level, and all that speaks for it."""
+    """Both verdicts in one: the graver level, and all that speaks for it.
+
+    What is wrong with a record stands before what follows from it, in the fit.
+    """
     level = max(one.level, other.level, key=_LEVELS.index)
     return Verdict(level, [*one.reasons, *other.reasons], [*one.notes, *other.notes])

@@ -23,20 +23,6 @@ __all__ = ["readable"]
 #: Largest file that a packed one may become: a gigabyte of text is 10 million samples.
 _MOST_BYTES = 1 << 30
 
-#: What to do about formats that neither reads.
-_ADVICE = {
-    "mcap": "read its topics by the package mcap and make a pyhoid.Record of them",
-    "bag": "read its topics by the package rosbags and make a pyhoid.Record of them",
-    "edf": "read it by the package pyedflib or mne and make a pyhoid.Record of it",
-    "bdf": "read it by the package mne and make a pyhoid.Record of it",
-    "c3d": "read it by the package ezc3d and make a pyhoid.Record of it",
-    "tdms": "read it by the package nptdms and make a pyhoid.Record of it",
-    "mf4": "read it by the package asammdf and make a pyhoid.Record of it",
-    "sav": "read it by pandas.read_spss and give the table to Record.from_pandas",
-    "rds": "write it as CSV or Parquet in R",
-    "mlx": "save the variables in MATLAB: save run1.mat e u t",
-}
-
 
 def _unpacked(path: Path, place: Path) -> Path:
     made = place / path.stem
@@ -110,8 +96,6 @@ _READERS: dict[str, Callable[[Path, Path], Path]] = {
 def readable(path: str | PathLike[str]) -> Iterator[str | PathLike[str]]:
     """The file, or one with the same content that hoid reads, for as long as it is needed."""
     ending = Path(fspath(path)).suffix.lower().lstrip(".")
-    if ending in _ADVICE:
-        raise FormatError(f"{path}: .{ending} is not read by hoid: {_ADVICE[ending]}")
     reader = _READERS.get(ending)
     if reader is None:
         yield path

@@ -11,6 +11,7 @@ import numpy.typing as npt
 from . import _options, _pyhoid, _text
 from ._arrays import FloatArray
 from ._pickling import Call, recalled, state_of
+from .errors import OptionError
 from .estimates import Estimate, estimates
 from .record import Record
 
@@ -215,6 +216,13 @@ def describing_function(
     settings = {name: value for name, value in locals().items() if name != "records"}
     given = harmonics is not None or omega is not None
     several = tuple(_options.as_records(records))
+    there = list(several[0].channels) if several else []
+    signals = (several[0].input_name, several[0].output_name) if several else ()
+    if not given and several and channel is not None and channel not in (*there, *signals):
+        raise OptionError(
+            f"channel is {channel}, and the records have {', '.join(there) or 'no others than e and u'};"
+            " name the recorded excitation, or take pyhoid.describe, which looks for it"
+        )
     return DescribingFunction(
         _pyhoid.describing_function(
             several,

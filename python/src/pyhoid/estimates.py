@@ -33,25 +33,37 @@ UNITS: Mapping[str, str] = {
 
 
 #: Parameters that are a ratio of u and e.
-_GAINS = ("K_e", "K_e_dot")
+_GAINS = ("K", "K_e", "K_e_dot", "K_over_T_I", "K_I")
 
 
-def unit_of(name: str, records: Sequence[Record] = ()) -> str:
+def unit_of(name: str, records: Sequence[Record] = (), own: str | None = None) -> str:
     """The unit of a parameter; of a gain only where the records declare those of e and u.
+
+    `own` is the unit that it has beside that of u/e; by default that of its name.
 
     >>> unit_of("T_L"), unit_of("K_e")
     ('s', '')
     """
-    own = UNITS.get(name, "")
-    if name not in _GAINS:
+    own = UNITS.get(name, "") if own is None else own
+    if name.rstrip("0123456789") not in _GAINS:
         return own
-    units = records[0].units if records else {}
-    e, u = units.get("e", "").strip(), units.get("u", "").strip()
+    e, u = channel_units(records[0]) if records else ("", "")
     if not e or not u:
         return ""
     if own and e == u:
         return own
+    if own == "1/s":
+        return f"{u}/({e} s)"
     return f"{u} {own}/{e}" if own else f"{u}/{e}"
+
+
+def channel_units(record: Record) -> tuple[str, str]:
+    """The units of input and output, whatever their columns are called; empty where none is said."""
+    units = record.units
+    return (
+        units.get(record.input_name or "", "").strip(),
+        units.get(record.output_name, "").strip(),
+    )
 
 
 class Estimate(NamedTuple):

@@ -306,7 +306,7 @@ class Fit:
             raise DataError("the fit has no records to be judged on; a fit by identify has them")
         if self._verdict is None:
             own = Verdict(*self._native.verdict(list(self.records)))
-            self._verdict = _faults.joined(own, self._of_faults)
+            self._verdict = _faults.joined(self._of_faults, own)
         return self._verdict
 
     @property

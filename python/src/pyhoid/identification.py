@@ -309,9 +309,10 @@ def identify(
         level=level,
         progress=_options.reporter(progress, "candidates"),
     )
-    # The records are mended already: what is looked for in them again is not taken out.
+    # The records are mended already: what is looked for in them again is not taken out. Their level is
+    # still in them: out of records without it a rest of rounding would be taken, and change the digits.
     again = settings | {"faults": "keep" if faults == "keep" else "report"}
-    call = Call("identify", several, again)
+    call = Call("identify", as_read, again)
     if isinstance(found, _pyhoid.TimeVaryingFit):
         change = TimeVaryingFit(found, several, settings, call)
         change.faults, change._of_faults = of_faults, says

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from . import _pyhoid, _text
 from ._arrays import FloatArray
 from ._pickling import Call, recalled, state_of
-from .estimates import Estimate, estimates
+from .estimates import Estimate, channel_units, estimates, unit_of
 from .fit import Fit
 from .operator_parameters import OperatorParameter, OperatorParameters
 from .record import Record
@@ -118,7 +118,9 @@ class OperatorFit:
         self.operators: tuple[OperatorParameters, ...] = tuple(
             OperatorParameters(
                 {
-                    name: OperatorParameter(value, error, interval, share, determined, unit)
+                    name: OperatorParameter(
+                        value, error, interval, share, determined, unit_of(name, self.records, unit)
+                    )
                     for name, unit, value, error, interval, share, determined in of
                 }
             )
@@ -212,7 +214,7 @@ class OperatorFit:
         >>> from pathlib import Path
         >>> Path("person.json").write_text(person.to_json())
         """
-        units = self.records[0].units if self.records else {}
+        input_unit, output_unit = channel_units(self.records[0]) if self.records else ("", "")
 
         def number(value: float | None) -> float | None:
             return value if value is not None and math.isfinite(value) else None
@@ -230,8 +232,8 @@ class OperatorFit:
                     {
                         "sample_time": self.sample_time,
                         "units": {
-                            "input": units.get("e", ""),
-                            "output": units.get("u", ""),
+                            "input": input_unit,
+                            "output": output_unit,
                         },
                     }
                 ],

@@ -190,5 +190,5 @@ def identify_operator(
     )
     again = settings | {"faults": "keep" if faults == "keep" else "report"}
     fit = OperatorFit(found, several, settings, Call("identify_operator", several, again))
-    fit.faults, fit.verdict = of_faults, _faults.joined(fit.verdict, says)
+    fit.faults, fit.verdict = of_faults, _faults.joined(says, fit.verdict)
     return fit

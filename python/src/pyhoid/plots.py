@@ -11,7 +11,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -22,6 +22,7 @@ from .description import DescribingFunction
 from .errors import OptionError
 from .estimates import unit_of
 from .fit import Fit
+from .operator_fit import OperatorFit
 from .record import Record
 from .trace import Trace
 
@@ -121,12 +122,21 @@ def _label(name: str, unit: str | None = None) -> str:
     return f"{symbol} ({unit})" if unit else symbol
 
 
-def _fits(fits: Fit | Mapping[str, Fit] | Sequence[Fit]) -> dict[str, Fit]:
-    if isinstance(fits, Fit):
-        return {fits._native.title: fits}
-    if isinstance(fits, Mapping):
-        return dict(fits)
-    return {fit._native.title: fit for fit in fits}
+#: What is drawn as a model: a fit, or the operator of a person.
+Model: TypeAlias = Fit | OperatorFit
+
+
+def _fits(fits: Model | Mapping[str, Model] | Sequence[Model]) -> dict[str, Fit]:
+    if isinstance(fits, (Fit, OperatorFit)):
+        fits = [fits]
+    if not isinstance(fits, Mapping):
+        fits = {_title(fit): fit for fit in fits}
+    # An operator is drawn by its polynomials.
+    return {name: fit.fit if isinstance(fit, OperatorFit) else fit for name, fit in fits.items()}
+
+
+def _title(fit: Model) -> str:
+    return fit.form if isinstance(fit, OperatorFit) else fit._native.title
 
 
 def time_response(
@@ -190,7 +200,7 @@ def _unwrapped(phase_deg: Any) -> Any:
 
 
 def bode(
-    fits: Fit | Mapping[str, Fit] | Sequence[Fit],
+    fits: Model | Mapping[str, Model] | Sequence[Model],
     omega: Any = None,
     *,
     axes: Sequence[Axes] | None = None,
@@ -198,7 +208,7 @@ def bode(
 ) -> Sequence[Axes]:
     """Bode plot from e to u with bands of `deviations` standard errors.
 
-    `axes` are two, for magnitude and phase.
+    Models are fits, or operators of people. `axes` are two, for magnitude and phase.
 
     Examples
     --------
@@ -243,7 +253,7 @@ def _dress_bode(pair: Sequence[Axes]) -> None:
 
 def describing(
     found: DescribingFunction,
-    model: Fit | Mapping[str, Fit] | Sequence[Fit] | None = None,
+    model: Model | Mapping[str, Model] | Sequence[Model] | None = None,
     *,
     axes: Sequence[Axes] | None = None,
 ) -> Sequence[Axes]:

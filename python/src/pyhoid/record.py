@@ -51,12 +51,20 @@ def _is_instant(times: npt.NDArray[Any] | None) -> bool:
 def _seconds(times: npt.NDArray[Any]) -> npt.NDArray[Any]:
     """Times in s: durations as they are, dates from the first on."""
     if times.dtype.kind not in "mM":
-        return times
+        try:
+            return np.asarray(times, dtype=np.float64)
+        except (TypeError, ValueError):
+            raise DataError(
+                f"the times are no numbers (the first is {times[0]!r}), expected s, dates or durations;"
+                " pandas.to_datetime makes dates of text"
+            ) from None
     if np.isnat(times).any():
         row = int(np.flatnonzero(np.isnat(times))[0])
         raise DataError(f"the time of row {row} is missing; fill it, or give sample_time")
     elapsed = times - times[0] if times.dtype.kind == "M" else times
-    return np.asarray(elapsed.astype("timedelta64[ns]").astype(np.int64) * 1e-9, dtype=np.float64)
+    nanoseconds = elapsed.astype("timedelta64[ns]").astype(np.int64)
+    # What makes times out of decimals cuts at a ns; whole tenths of ms are to stay what they are.
+    return np.asarray(np.round(nanoseconds / 1e9, 8), dtype=np.float64)
 
 
 def _own(array: FloatArray) -> FloatArray:
@@ -223,7 +231,8 @@ class Record:
                 near = get_close_matches(name, columns, 1, 0.6)
                 meant = f"; did you mean {near[0]}?" if near else ""
                 raise DataError(
-                    f"the table has no column {name}{meant}; it has {', '.join(columns)}"
+                    f"the table has no column {name}{meant}; it has {', '.join(columns)};"
+                    " choose by input and output"
                 )
         times = columns.pop("t", None)
         if times is None and (sample_time is None or _is_instant(index)):
@@ -233,16 +242,15 @@ class Record:
         if sample_time is None:
             if times is None or len(times) < 2:
                 raise OptionError("the table has no times: give sample_time in s, or a column t")
-            steps = np.diff(times)
-            sample_time = float((times[-1] - times[0]) / (len(times) - 1))
-            if not np.allclose(steps, sample_time, rtol=1e-3, atol=0):
-                row = int(np.argmax(np.abs(steps - sample_time)))
+            # By the rules of files, so that both give the same record.
+            sample_time, row = _pyhoid.even_times(times)
+            if sample_time is None:
+                steps = np.diff(times)
                 raise DataError(
-                    f"the sampling is uneven: row {row + 1} comes {steps[row]:g} s after the one"
-                    f" before, expected {sample_time:g} s;"
+                    f"the sampling is uneven: row {row} comes {steps[max(row, 1) - 1]:g} s after the"
+                    f" one before, expected {float(np.median(steps)):g} s;"
                     " write the table to a file and read it with resample=True, or give sample_time"
                 )
-            sample_time = float(f"{sample_time:.9g}")
         if times is not None:
             start = float(times[0])
         named = {

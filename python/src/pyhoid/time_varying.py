@@ -119,7 +119,7 @@ class TimeVaryingFit:
     def verdict(self) -> Verdict:
         """What the fit is worth on its records: `level`, `reasons` and `notes`."""
         own = Verdict(*self._native.verdict(list(self.records)))
-        return _faults.joined(own, self._of_faults)
+        return _faults.joined(self._of_faults, own)
 
     @property
     def change(self) -> dict[str, Any]:

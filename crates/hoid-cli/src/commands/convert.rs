@@ -89,7 +89,7 @@ pub fn run(args: &ConvertArgs) -> Result<(), CliError> {
         }
         Err(reason) => text.push_str(&format!("Operator parameters: not convertible: {reason}.\n")),
     }
-    output::print(&text)?;
+    output::show(&text)?;
     Ok(())
 }
 
@@ -110,7 +110,7 @@ fn to_family(args: &ConvertArgs, f: &[f64], b: &[f64], sample_time: SampleTime) 
             "operator": family_operator::to_json(&found),
         }))?;
     } else {
-        output::print(&family_operator::to_text(&found, &GainUnit::default()))?;
+        output::show(&family_operator::to_text(&found, &GainUnit::default()))?;
     }
     Ok(())
 }
@@ -125,7 +125,7 @@ fn discretised(args: &ConvertArgs, h: &ContinuousTransferFunction, sample_time: 
         return Ok(());
     }
     let row = |c: &[f64]| c.iter().map(|v| format!("{v:.10}")).collect::<Vec<_>>().join(", ");
-    output::print(&format!(
+    output::show(&format!(
         "By ascending powers of q^-1, Ts = {} s:\nnumerator    {}\ndenominator  {}\n",
         sample_time.s(),
         row(discrete.num()),

@@ -42,7 +42,7 @@ pub fn run(args: &DemoArgs) -> Result<(), CliError> {
     make_directory(&args.out)?;
     let path = args.out.join("c4.csv");
     write_record(&path, &record)?;
-    output::print(&format!(
+    output::show(&format!(
         "Simulated {}: {} samples of {} s; the controlled element changes at 40.96 s and the operator with it.\n\
          Record: {}\n\n",
         scenario.name,
@@ -59,7 +59,7 @@ pub fn run(args: &DemoArgs) -> Result<(), CliError> {
     output::print(&errors_over_time(&record, &traces))?;
     let page = report(args, &stages)?;
     let page_of_traces = report_of_traces(args, &record, &stages, &traces)?;
-    output::print(&format!(
+    output::show(&format!(
         "Report: {}\nTracking: {}\n",
         page.display(),
         page_of_traces.display()

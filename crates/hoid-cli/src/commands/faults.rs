@@ -58,8 +58,9 @@ pub fn findings(files: &[String], accounts: &[Account]) -> Vec<Finding> {
     .collect()
 }
 
-/// A verdict with what the faults of the records say.
+/// A verdict with what the faults of the records say: first, since a wrong recording is why a result is
+/// wrong.
 pub fn judged(verdict: Verdict, files: &[String], accounts: &[Account]) -> Verdict {
     let more = findings(files, accounts);
-    if more.is_empty() { verdict } else { verdict.and(more) }
+    if more.is_empty() { verdict } else { verdict.behind(more) }
 }

@@ -26,7 +26,7 @@ pub fn run(args: &InfoArgs) -> Result<(), CliError> {
         for fault in &faults {
             text.push_str(&format!("  {fault}\n"));
         }
-        output::print(&text)?;
+        output::show(&text)?;
     }
     Ok(())
 }
@@ -45,7 +45,11 @@ fn words(file: &str, found: &FileSurvey) -> String {
     for sampling in &found.samplings {
         text.push_str(&sampled(sampling));
     }
-    let mut table = text::table(&["column", "unit", "type", "rows", "min", "max", "mean", "deviation"]);
+    // Most files say no units, and an empty column makes a table too wide for a screen.
+    let has_units = found.columns.iter().any(|column| !column.unit.is_empty());
+    let mut headings = vec!["column", "unit", "type", "rows", "min", "max", "mean", "deviation"];
+    headings.retain(|heading| has_units || *heading != "unit");
+    let mut table = text::table(&headings);
     let mut sketches = Vec::new();
     for column in &found.columns {
         let rows = if column.rows == 0 {
@@ -53,7 +57,11 @@ fn words(file: &str, found: &FileSurvey) -> String {
         } else {
             column.rows.to_string()
         };
-        let mut cells = vec![column.path.clone(), column.unit.clone(), column.kind.clone(), rows];
+        let mut cells = vec![column.path.clone()];
+        if has_units {
+            cells.push(column.unit.clone());
+        }
+        cells.extend([column.kind.clone(), rows]);
         if let Some(v) = &column.values {
             cells.extend([v.min, v.max, v.mean, v.deviation].map(numbers::plain));
             sketches.push((column, v));

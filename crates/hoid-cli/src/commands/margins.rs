@@ -87,7 +87,7 @@ pub fn run(args: &MarginsArgs) -> Result<(), CliError> {
         NoiseDefinition::Remnant => "var(n)/var(u)",
     };
     let state_name = name_of(args.state);
-    output::print(&format!(
+    output::show(&format!(
         "{}, {state_name} state.\n{}\nRemnant gain K_n for P_n = {share}, T_n = {} s, Ts = {} s:\n{table}\n",
         scenario.name,
         text::margins(&found.into()),
@@ -128,7 +128,7 @@ fn of_family(scenario: &FamilyScenario, args: &MarginsArgs) -> Result<(), CliErr
     } else {
         format!("{table}\n")
     };
-    output::print(&format!(
+    output::show(&format!(
         "{}, {} state.\n{}\n{parts}",
         scenario.name,
         name_of(args.state),

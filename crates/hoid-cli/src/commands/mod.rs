@@ -19,4 +19,5 @@ pub mod shell;
 pub mod simulate;
 pub mod stream;
 pub mod study;
+mod study_answer;
 pub mod track;

@@ -54,7 +54,7 @@ pub fn run(args: &SimulateArgs) -> Result<(), CliError> {
     if piped {
         output::message(summary.trim_end());
     } else {
-        output::print(&summary)?;
+        output::show(&summary)?;
     }
     Ok(())
 }

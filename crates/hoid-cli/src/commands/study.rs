@@ -14,6 +14,7 @@ use serde_json::json;
 
 use crate::{
     args::{StudyCommand, StudyMergeArgs, StudyRunArgs},
+    commands::study_answer::answer,
     error::CliError,
     interrupt, output,
 };
@@ -23,7 +24,7 @@ pub fn run_command(command: &StudyCommand) -> Result<(), CliError> {
         StudyCommand::Run(args) => run_plan(args),
         StudyCommand::Merge(args) => merge_shards(args),
         StudyCommand::Check(args) => {
-            output::print(&description(&plan_of(&args.plan)?))?;
+            output::show(&description(&plan_of(&args.plan)?))?;
             Ok(())
         }
         StudyCommand::Plans(args) => list(args.name.as_deref()),
@@ -66,7 +67,8 @@ fn run_plan(args: &StudyRunArgs) -> Result<(), CliError> {
         output::print(&format!("{:#}\n", outcome_json(&plan, &outcome)))?;
         return Ok(());
     }
-    let mut text = format!("{}: {} estimates made\n", plan.name, outcome.estimates);
+    let mut text = answer(&outcome.tables)?;
+    text.push_str(&format!("{}: {} estimates made\n", plan.name, outcome.estimates));
     if let Some(shard) = args.shard {
         text.push_str(&format!(
             "shard {shard} is in {}; join all {} with `hoid study merge`\n",
@@ -75,7 +77,7 @@ fn run_plan(args: &StudyRunArgs) -> Result<(), CliError> {
         ));
     }
     text.push_str(&tables_text(&outcome));
-    output::print(&text)?;
+    output::show(&text)?;
     Ok(())
 }
 
@@ -140,7 +142,12 @@ fn merge_shards(args: &StudyMergeArgs) -> Result<(), CliError> {
         ))?;
         return Ok(());
     }
-    output::print(&format!("{} estimates\n{}", outcome.estimates, tables_text(&outcome)))?;
+    output::show(&format!(
+        "{}{} estimates\n{}",
+        answer(&outcome.tables)?,
+        outcome.estimates,
+        tables_text(&outcome)
+    ))?;
     Ok(())
 }
 
@@ -214,7 +221,7 @@ fn list(name: Option<&str>) -> Result<(), CliError> {
                 plan.estimates()
             ));
         }
-        output::print(&text)?;
+        output::show(&text)?;
         return Ok(());
     };
     let named = find_plan(name).ok_or_else(|| {

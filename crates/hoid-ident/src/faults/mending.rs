@@ -49,11 +49,15 @@ pub fn mend(record: &Record, handling: FaultHandling) -> Result<Mended, ModelErr
     if handling == FaultHandling::Keep {
         return Ok(untouched(Vec::new()));
     }
+    // Each of the other statistics counts in seconds, and would find a fault in every second one.
+    let ts = record.sample_time().s();
+    if ts > SLOWEST_S {
+        return Ok(untouched(vec![all_of_it(record, FaultKind::TimeUnit, ts)]));
+    }
     let (input, output, mut others) = record.clone().into_channels();
     let of_excitation = excitations(&mut others, record);
     let mut channels: Vec<Channel> = input.into_iter().chain([output]).collect();
     let mut values: Vec<Vec<f64>> = channels.iter().map(|c| c.values.clone()).collect();
-    let ts = record.sample_time().s();
     let places = search(&mut values, ts, handling == FaultHandling::Cut);
     let of = |place: &Place, action: FaultAction| Fault {
         kind: place.kind,
@@ -68,9 +72,6 @@ pub fn mend(record: &Record, handling: FaultHandling) -> Result<Mended, ModelErr
     let mut faults: Vec<Fault> = places.iter().map(|(place, action)| of(place, *action)).collect();
     faults.extend(of_excitation);
     faults.sort_by(|a, b| a.from_s.total_cmp(&b.from_s));
-    if ts > SLOWEST_S {
-        faults.insert(0, all_of_it(record, FaultKind::TimeUnit, ts));
-    }
     let mended = |fault: &Fault| fault.action != FaultAction::Reported;
     if handling == FaultHandling::Report || !faults.iter().any(mended) {
         faults.extend(wrong_direction(record).map(|(kind, size)| all_of_it(record, kind, size)));

@@ -164,6 +164,12 @@ fn time_in_milliseconds_is_not_determined() {
     .unwrap();
     let found = mended(&record);
     assert_eq!(kinds(&found.faults), [FaultKind::TimeUnit]);
+    // A person who waits for 50 samples has not been idle for 500 s.
+    let waits = with(&record, |e, u| {
+        e[400..450].fill(0.0);
+        u[400..450].fill(0.0);
+    });
+    assert_eq!(kinds(&mended(&waits).faults), [FaultKind::TimeUnit]);
     assert_eq!(found.findings[0].severity, Severity::Undetermined);
 }
 

@@ -15,6 +15,7 @@ use crate::IoError;
 use crate::column_expression::{ColumnExpression, Signal};
 use crate::read_options::ReadOptions;
 use crate::table::{Column, Precision, Source, Table, asides};
+use crate::time_column::is_time;
 use crate::wording::{list, shown};
 
 /// The names of the time, the first that is there.
@@ -156,17 +157,17 @@ fn common(known: Option<Range<usize>>, rows: Range<usize>) -> Range<usize> {
 }
 
 fn column(name: &str, column_path: &ColumnPath, numbers: &Numbers) -> Column {
-    let single = numbers.kind().is_single();
+    let values = numbers.values();
     Column {
         name: name.to_owned(),
         unit: column_path.unit.clone(),
-        values: numbers.values(),
-        texts: Vec::new(),
-        precision: if single {
-            Precision::single()
+        precision: if is_time(name) {
+            Precision::of_times(&values, numbers.kind().is_single())
         } else {
             Precision::default()
         },
+        values,
+        texts: Vec::new(),
     }
 }
 

@@ -37,20 +37,80 @@ fn endings(formats: &[&Format]) -> String {
     }
 }
 
-/// The format that the extension of a file stands for.
-fn format_of(path: &Path) -> Result<&'static Format, IoError> {
-    let extension = path.extension().map(|e| e.to_string_lossy().to_lowercase());
-    let known = |ending: &str| ALL.iter().copied().find(|format| format.endings.contains(&ending));
-    extension
-        .as_deref()
-        .and_then(known)
-        .ok_or_else(|| IoError::UnknownFormat {
-            file: path.display().to_string(),
-            found: extension.map_or(String::from("there is no extension"), |e| {
-                format!("the extension is .{e}")
-            }),
-            expected: readable_endings(),
-        })
+/// What to do about files that others read, by their ending. pyhoid reads those of `PYTHON` itself.
+const ELSEWHERE: [(&[&str], &str); 12] = [
+    (&["gz", "zip", "bz2", "xz", "zst"], "unpack it first"),
+    (&["arrow", "feather", "ipc", "xlsx", "xls", "ods"], PYTHON),
+    (
+        &["mcap"],
+        "read its topics by the Python package mcap and make a pyhoid.Record of them",
+    ),
+    (
+        &["bag", "db3"],
+        "read its topics by the Python package rosbags and make a pyhoid.Record of them",
+    ),
+    (
+        &["edf"],
+        "read it by the Python package pyedflib or mne and make a pyhoid.Record of it",
+    ),
+    (
+        &["bdf"],
+        "read it by the Python package mne and make a pyhoid.Record of it",
+    ),
+    (
+        &["c3d"],
+        "read it by the Python package ezc3d and make a pyhoid.Record of it",
+    ),
+    (
+        &["tdms"],
+        "read it by the Python package nptdms and make a pyhoid.Record of it",
+    ),
+    (
+        &["mf4"],
+        "read it by the Python package asammdf and make a pyhoid.Record of it",
+    ),
+    (
+        &["sav"],
+        "read it by pandas.read_spss and give the table to pyhoid.Record.from_pandas",
+    ),
+    (&["rds", "rda"], "write it as CSV or Parquet in R"),
+    (&["mlx", "slx"], "save the variables in MATLAB: save run1.mat e u t"),
+];
+/// The remedy for what pyhoid reads.
+const PYTHON: &str = "save it as CSV or Parquet, or read it in Python by pyhoid.read";
+
+/// The ending of a file, in small letters.
+fn ending_of(path: &Path) -> Option<String> {
+    path.extension().map(|ending| ending.to_string_lossy().to_lowercase())
+}
+
+/// The format that the ending of a file stands for.
+fn format_of(path: &Path) -> Option<&'static Format> {
+    let ending = ending_of(path)?;
+    ALL.iter()
+        .copied()
+        .find(|format| format.endings.contains(&ending.as_str()))
+}
+
+/// That an ending stands for no format, with what is `expected` and the remedy, if there is one.
+fn unknown(path: &Path, expected: String, remedy: Option<&str>) -> IoError {
+    IoError::UnknownFormat {
+        file: path.display().to_string(),
+        found: ending_of(path).map_or(String::from("there is no extension"), |ending| {
+            format!("the extension is .{ending}")
+        }),
+        expected,
+        remedy: remedy.map_or_else(String::new, |remedy| format!("; {remedy}")),
+    }
+}
+
+/// The format of a file to read.
+fn format_to_read(path: &Path) -> Result<&'static Format, IoError> {
+    format_of(path).ok_or_else(|| {
+        let ending = ending_of(path).unwrap_or_default();
+        let elsewhere = ELSEWHERE.iter().find(|(endings, _)| endings.contains(&ending.as_str()));
+        unknown(path, readable_endings(), elsewhere.map(|(_, remedy)| *remedy))
+    })
 }
 
 /// The format of a file to write, which is no directory. A pipe or a device takes CSV under any
@@ -62,7 +122,7 @@ pub(crate) fn format_to_write(path: &Path) -> Result<&'static Format, IoError> {
             file: path.display().to_string(),
         }),
         Some(known) if !known.is_file() => Ok(format_of(path).unwrap_or(&csv::CSV)),
-        _ => format_of(path),
+        _ => format_of(path).ok_or_else(|| unknown(path, writable_endings(), None)),
     }?;
     let Writing::ReadOnly(what) = format.writing else {
         return Ok(format);
@@ -71,6 +131,7 @@ pub(crate) fn format_to_write(path: &Path) -> Result<&'static Format, IoError> {
         file: path.display().to_string(),
         found: format!("the extension is .{}, {what}", format.endings[0]),
         expected: writable_endings(),
+        remedy: String::new(),
     })
 }
 
@@ -80,7 +141,7 @@ pub(crate) fn bytes_of(path: &Path) -> Result<(&'static Format, Vec<u8>), IoErro
     if path.is_dir() {
         return Err(IoError::Directory { file: file() });
     }
-    let format = format_of(path)?;
+    let format = format_to_read(path)?;
     let bytes = fs::read(path).map_err(|source| IoError::Unreadable { file: file(), source })?;
     Ok((format, bytes))
 }
@@ -97,6 +158,29 @@ mod tests {
         endings.dedup();
         assert_eq!(endings.len(), count);
         assert!(ALL.iter().all(|format| !format.endings.is_empty()));
+    }
+
+    #[test]
+    fn each_other_ending_has_one_remedy() {
+        let mut endings: Vec<&str> = ELSEWHERE.iter().flat_map(|(endings, _)| *endings).copied().collect();
+        assert!(
+            endings
+                .iter()
+                .all(|ending| format_of(Path::new(&format!("run.{ending}"))).is_none())
+        );
+        let count = endings.len();
+        endings.sort_unstable();
+        endings.dedup();
+        assert_eq!(endings.len(), count);
+        let message = |file: &str| {
+            format_to_read(Path::new(file))
+                .err()
+                .map(|error| error.to_string())
+                .unwrap_or_default()
+        };
+        assert!(message("run.csv.gz").ends_with("; unpack it first"));
+        assert!(message("run.TDMS").contains("package nptdms"));
+        assert!(message("run.abc").ends_with("or .xdf"));
     }
 
     #[test]

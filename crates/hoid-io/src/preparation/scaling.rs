@@ -35,6 +35,28 @@ const UNITS: [(&str, &str, f64); 18] = [
     ("mNm", "torque", 1e-3),
 ];
 
+/// Other names of known units, as people type them.
+const OTHER_NAMES: [(&[&str], &str); 9] = [
+    (&["degree", "degrees", "degs", "°"], "deg"),
+    (&["radian", "radians", "rads"], "rad"),
+    (&["meter", "metre", "meters", "metres"], "m"),
+    (&["centimeter", "centimetre", "centimeters", "centimetres"], "cm"),
+    (&["millimeter", "millimetre", "millimeters", "millimetres"], "mm"),
+    (&["inch", "inches"], "in"),
+    (&["foot", "feet"], "ft"),
+    (&["volt", "volts"], "V"),
+    (&["newton", "newtons"], "N"),
+];
+
+/// A unit by its usual name; one that is not known as it is.
+fn usual(unit: &str) -> &str {
+    let small = unit.to_lowercase();
+    let other = OTHER_NAMES
+        .into_iter()
+        .find(|(names, _)| names.contains(&small.as_str()));
+    other.map_or(unit, |(_, usual)| usual)
+}
+
 /// What a channel is multiplied by, and the unit that it has then.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Scaling {
@@ -61,7 +83,7 @@ impl Scaling {
         Ok(Self {
             factor,
             from: None,
-            to: unit.map(str::to_owned),
+            to: unit.map(usual).map(str::to_owned),
         })
     }
 
@@ -87,7 +109,7 @@ impl FromStr for Scaling {
             Some((left, right)) => (left.trim(), Some(right.trim())),
             None => (text.trim(), None),
         };
-        let known = |name: &str| UNITS.into_iter().find(|(unit, ..)| *unit == name);
+        let known = |name: &str| UNITS.into_iter().find(|(unit, ..)| *unit == usual(name));
         // A number is a number: "1:deg" names a unit and changes no value.
         if let Ok(factor) = left.parse::<f64>() {
             if right == Some("") {
@@ -140,8 +162,9 @@ impl RecordParts {
         const STEP: &str = "unit";
         let named = units.iter().map(|(name, unit)| (name.clone(), unit.as_str()));
         for (channel, unit) in self.find(STEP, named)? {
+            let unit = usual(unit);
             let known = self.channels[channel].unit.clone();
-            if !known.is_empty() && known != unit {
+            if !known.is_empty() && usual(&known) != unit {
                 let name = &self.channels[channel].name;
                 return Err(self.error(
                     STEP,
@@ -159,7 +182,7 @@ impl RecordParts {
         let named = scale.iter().map(|(name, scaling)| (name.clone(), scaling));
         for (channel, scaling) in self.find(STEP, named)? {
             let found = self.channels[channel].unit.clone();
-            if let Some(from) = scaling.from.filter(|from| !found.is_empty() && *from != found) {
+            if let Some(from) = scaling.from.filter(|from| !found.is_empty() && *from != usual(&found)) {
                 return Err(self.error(
                     STEP,
                     format!(

@@ -77,6 +77,17 @@ fn scales_and_units() {
         let back: Scaling = format!("{to}:{from}").parse().unwrap();
         assert!((there.factor() * back.factor() - 1.0).abs() < 1e-15, "{from} {to}");
     }
+    let typed: Scaling = "Radians:degrees".parse().unwrap();
+    assert_eq!(typed, "rad:deg".parse().unwrap());
+    let declared = with(|p| {
+        p.units.insert("e".into(), "degs".into());
+        p.units.insert("stick".into(), "counts".into());
+    });
+    let (found, _) = declared.apply(record(5, |_| PI, |_| 2.0)).unwrap();
+    assert_eq!(
+        found.channels().map(|c| c.unit.as_str()).take(2).collect::<Vec<_>>(),
+        ["deg", "counts"]
+    );
     for bad in [
         "0",
         "NaN",

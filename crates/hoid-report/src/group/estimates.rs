@@ -8,14 +8,15 @@ use super::{
 };
 use crate::numbers;
 
-/// Columns of the table of averages: parameter and heading.
+/// Columns of the table of averages: parameter and heading; what scales with u/e has no unit, as in the
+/// table of people.
 const AVERAGED: [(&str, &str); 10] = [
-    ("K_over_T_I", "K/T_I (1/s)"),
+    ("K_over_T_I", "K/T_I"),
     ("K", "K"),
     ("K_e", "K_e"),
     ("T_L", "T_L (s)"),
     ("T_I", "T_I (s)"),
-    ("K_e_dot", "K_e_dot (s)"),
+    ("K_e_dot", "K_e_dot"),
     ("omega_nm", "omega_nm (rad/s)"),
     ("zeta_nm", "zeta_nm"),
     ("tau_e", "tau_e (s)"),

@@ -63,7 +63,7 @@ impl GroupReport<'_> {
     }
 
     /// Bode points of the describing functions, a figure for each condition with a column for each
-    /// subject.
+    /// subject who tracked in it.
     pub(super) fn describing_functions(&self) -> Vec<Value> {
         let figures = self.describing_figures().into_iter();
         figures
@@ -110,13 +110,18 @@ impl GroupReport<'_> {
                 curves,
             }
         };
-        let shown = |condition: &&&str| texts(lines, "condition").iter().any(|c| c == **condition);
+        // Not every subject need have tracked in every condition.
+        let columns = |condition: &str| -> Vec<BodeColumn> {
+            let took_part = |subject: &&&str| !rows_of(lines, subject, condition).is_empty();
+            let there = subjects.iter().filter(took_part);
+            there.map(|subject| column(condition, subject)).collect()
+        };
         conditions
             .iter()
-            .filter(shown)
-            .map(|condition| {
+            .map(|condition| (condition, columns(condition)))
+            .filter(|(_, columns)| !columns.is_empty())
+            .map(|(condition, columns)| {
                 let id = id_of("describing", condition);
-                let columns = subjects.iter().map(|subject| column(condition, subject)).collect();
                 let figure = bode_grid(
                     &id,
                     &format!("Describing functions, condition {condition}"),

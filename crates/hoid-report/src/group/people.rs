@@ -12,14 +12,15 @@ use minijinja::{Value, context};
 use super::report::GroupReport;
 use crate::numbers;
 
-/// Names and headings of the parameters, in the order of the table.
+/// Names and headings of the parameters, in the order of the table. The runs of a group do not say the
+/// units of e and u, so that what scales with u/e has none.
 const COLUMNS: [(&str, &str); 13] = [
-    ("K_over_T_I", "K/T_I (1/s)"),
-    ("K_I", "K_I (1/s)"),
+    ("K_over_T_I", "K/T_I"),
+    ("K_I", "K_I"),
     ("K_e", "K_e"),
     ("K", "K"),
     ("T_L", "T_L (s)"),
-    ("K_e_dot", "K_e_dot (s)"),
+    ("K_e_dot", "K_e_dot"),
     ("T_I", "T_I (s)"),
     ("c_1", "c_1 (s)"),
     ("c_2", "c_2 (s^2)"),

@@ -36,7 +36,8 @@ impl Trace {
         let held = of(&|f| f.kind == GuardKind::Outlier);
         if !held.is_empty() {
             let count = samples(&held);
-            let words = format!("{count} samples held back as outliers ({})", named(&held));
+            let sample = if count == 1.0 { "sample" } else { "samples" };
+            let words = format!("{count} {sample} held back as outliers ({})", named(&held));
             all.push(match count > HELD * self.counts().samples as f64 {
                 true => Finding::doubt("held-back", words),
                 false => Finding::note("held-back", words),

@@ -235,7 +235,7 @@ impl Found<'_> {
         page.push_str(&format!(
             "\nSearch: {}, {}, start: {}.\n",
             t.reason,
-            text::steps(t.iterations),
+            text::counted(t.iterations as u64, "step"),
             fit.start()
         ));
         page.push_str(&format!(

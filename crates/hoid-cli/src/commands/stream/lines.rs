@@ -3,6 +3,7 @@
 
 use std::io::{self, BufRead, ErrorKind};
 
+use hoid::io::{control_among, error_among};
 use serde::de::IgnoredAny;
 use serde_json::{Map, Value};
 
@@ -246,11 +247,28 @@ impl Columns {
                 u,
                 reference: place("f_t"),
             }),
-            _ => Err(CliError::Stream(format!(
-                "the header has the columns {}, expected {}; choose by --input and --output",
+            (e, u) => Err(CliError::Stream(format!(
+                "the header has the columns {}, expected {}; choose by --input and --output{}",
                 cells.join(", "),
-                self.names()
+                self.names(),
+                self.meant(cells, (e.is_none(), u.is_none()))
             ))),
+        }
+    }
+
+    /// ", as --input err --output stick" for what is missing and there by another name.
+    fn meant(&self, cells: &[&str], (no_input, no_output): (bool, bool)) -> String {
+        let input = error_among(cells).filter(|_| no_input && self.with_input);
+        let output = control_among(cells).filter(|_| no_output);
+        let named = [("--input", input), ("--output", output)];
+        let words: Vec<String> = named
+            .into_iter()
+            .filter_map(|(option, name)| Some(format!("{option} \"{}\"", name?)))
+            .collect();
+        if words.is_empty() {
+            String::new()
+        } else {
+            format!(", as {}", words.join(" "))
         }
     }
 
@@ -410,7 +428,10 @@ mod tests {
             (read.t, read.reference, read.e, read.u),
             (Some(1.0), Some(2.0), 3.0, 4.0)
         );
-        assert!(usual().read("t,y,z").is_err());
+        let message = |header: &str| usual().read(header).unwrap_err().to_string();
+        assert!(message("t,y,z").ends_with("choose by --input and --output"));
+        assert!(message("t,err,Stick [V]").ends_with("--output, as --input \"err\" --output \"Stick [V]\""));
+        assert!(message("t,e,stick").ends_with("--output, as --output \"stick\""));
         let mut alone = Columns::new("e", "u", false, 1e6);
         assert_eq!(sample(&mut alone, "3").u, 3.0);
     }

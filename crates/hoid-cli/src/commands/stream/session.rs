@@ -18,6 +18,7 @@ use crate::{
     error::CliError,
     output,
     recursion::{self, Plan},
+    text,
 };
 
 /// Length of the warm-up when none is typed, s.
@@ -317,13 +318,18 @@ impl Session {
     pub fn summary(&self) -> String {
         let c = self.counts;
         let mut text = format!(
-            "{} samples: {} skipped for a fault in e or u ({} of them missing), {} steps made shorter; {} lines dropped.",
-            c.samples, c.skipped, c.bridged, c.shortened, c.dropped
+            "{} samples: {} skipped for a fault in e or u ({} of them missing), {} made shorter; {} dropped.",
+            c.samples,
+            c.skipped,
+            c.bridged,
+            text::counted(c.shortened, "step"),
+            text::counted(c.dropped, "line")
         );
         if c.held > 0 || c.restarts > 0 {
             text.push_str(&format!(
-                " {} samples held back by the guard; the estimate was begun again {} times.",
-                c.held, c.restarts
+                " {} held back by the guard; the estimate was begun again {}.",
+                text::counted(c.held, "sample"),
+                text::counted(c.restarts, "time")
             ));
         }
         if let Live::Collecting(warm_up) = &self.live {

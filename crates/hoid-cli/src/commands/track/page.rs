@@ -191,12 +191,13 @@ impl Tracked<'_> {
             "{} samples; {} skipped for a fault in e or u; {} made shorter to stay stable or within bounds.\n",
             c.samples,
             c.skipped,
-            text::steps(usize::try_from(c.shortened).unwrap_or(usize::MAX))
+            text::counted(c.shortened, "step")
         );
         if c.held > 0 || c.restarts > 0 {
             text.push_str(&format!(
-                "{} samples held back by the guard; the estimate was begun again {} times.\n",
-                c.held, c.restarts
+                "{} held back by the guard; the estimate was begun again {}.\n",
+                text::counted(c.held, "sample"),
+                text::counted(c.restarts, "time")
             ));
         }
         if self.has_operator() {

@@ -54,7 +54,7 @@ impl Summary {
             samples: before(" samples:"),
             skipped: before(" skipped"),
             missing: before(" of them missing"),
-            dropped: before(" lines dropped"),
+            dropped: before(" line"),
         }
     }
 }

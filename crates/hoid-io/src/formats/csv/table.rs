@@ -7,12 +7,18 @@
 //! 0,0.125,-0.5                        one line a sample, decimal points
 //! ```
 //!
+//! Where semicolons or tabs divide the cells, as in what a spreadsheet saves in half of Europe, the
+//! numbers may have decimal commas.
+//!
 //! Blank lines are skipped; a byte order mark and CRLF are tolerated. The stated sample time says
 //! without rounding what t can only say up to its last digit; it counts where t agrees with it.
 
-use super::text::{as_meant, comments, is_aside, open_line, place, reader, row_start, separator, text};
+use super::text::{
+    as_meant, comments, has_decimal_commas, is_aside, open_line, place, reader, refuse_blanks, row_start, separator,
+    text,
+};
 use crate::IoError;
-use crate::table::{Cell, Column, Source, Table, asides, check_names, check_number};
+use crate::table::{Cell, Column, Source, Table, asides, check_names, check_number, with_decimal_point};
 use crate::time_column::is_time;
 use crate::wording::shown;
 
@@ -59,10 +65,13 @@ impl Source for CsvSource<'_> {
 /// The table in the bytes of a CSV file.
 pub(crate) fn parse<'a>(bytes: &'a [u8], file: &'a str) -> Result<Table<'a>, IoError> {
     let text = text(bytes, file)?;
-    let Some(header_line) = text.lines().find(|line| !is_aside(line)) else {
+    let mut lines = text.lines().filter(|line| !is_aside(line));
+    let Some(header_line) = lines.next() else {
         return Err(IoError::Empty { file: file.to_owned() });
     };
+    refuse_blanks(header_line, lines.next(), file)?;
     let separator = separator(header_line);
+    let commas = has_decimal_commas(text, separator);
     let mut reader = reader(text.as_bytes(), separator);
     let mut record = csv::ByteRecord::new();
     let mut columns: Vec<Column> = Vec::new();
@@ -80,7 +89,7 @@ pub(crate) fn parse<'a>(bytes: &'a [u8], file: &'a str) -> Result<Table<'a>, IoE
         let start = row_start(text.as_bytes(), record.position().map_or(0, |p| p.byte() as usize));
         let mut line = || place(text.as_bytes(), start);
         if columns.is_empty() {
-            columns = header(&record, file, &mut line, &mut notes)?;
+            columns = header(&record, commas, file, &mut line, &mut notes)?;
             times = columns.iter().map(|column| is_time(&column.name)).collect();
             continue;
         }
@@ -107,6 +116,7 @@ pub(crate) fn parse<'a>(bytes: &'a [u8], file: &'a str) -> Result<Table<'a>, IoE
             // The text is UTF-8 as a whole and the separators are ASCII, so that each cell is as
             // well.
             let cell = std::str::from_utf8(cell).unwrap_or("\u{fffd}");
+            let cell = &*with_decimal_point(cell, commas);
             column.values.push(match Cell::parse(cell) {
                 Cell::Number(value) => {
                     if is_time {
@@ -132,6 +142,9 @@ pub(crate) fn parse<'a>(bytes: &'a [u8], file: &'a str) -> Result<Table<'a>, IoE
     }
     if starts.is_empty() {
         return Err(IoError::NoRows { file: file.to_owned() });
+    }
+    if commas {
+        notes.push(String::from("the commas in its numbers are taken as decimal commas"));
     }
     let sample_time_s = asides(comments(text), &mut columns);
     if open.is_some_and(|open| starts.last().is_some_and(|start| *start >= open)) {
@@ -181,6 +194,7 @@ fn cut_number(text: &str, separator: u8, starts: &[usize]) -> Option<String> {
 
 fn header(
     record: &csv::ByteRecord,
+    commas: bool,
     file: &str,
     place: &mut dyn FnMut() -> String,
     notes: &mut Vec<String>,
@@ -190,7 +204,8 @@ fn header(
         .iter()
         .map(|name| as_meant(String::from_utf8_lossy(name).trim()).to_owned())
         .collect();
-    if names.iter().all(|name| !matches!(Cell::parse(name), Cell::Text)) {
+    let is_number = |name: &String| !matches!(Cell::parse(&with_decimal_point(name, commas)), Cell::Text);
+    if names.iter().all(is_number) {
         return Err(IoError::NoHeader {
             file: file.to_owned(),
             place: place(),

@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 
 use crate::IoError;
-use crate::table::Cell;
+use crate::table::{Cell, has_decimal_comma};
 
 pub(crate) fn text<'a>(bytes: &'a [u8], file: &str) -> Result<&'a str, IoError> {
     let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
@@ -80,6 +80,38 @@ pub(crate) fn separator(header: &str) -> u8 {
         .into_iter()
         .reduce(|best, next| if next.1 > best.1 { next } else { best })
         .map_or(b',', |best| best.0)
+}
+
+/// Refuses a table whose cells are divided by blanks, of which everything would be one column: a
+/// header without any separator, over a line of several numbers between blanks.
+pub(crate) fn refuse_blanks(header: &str, first: Option<&str>, file: &str) -> Result<(), IoError> {
+    let is_number = |word: &str| matches!(Cell::parse(word), Cell::Number(_));
+    let cells = first.map_or(0, |line| line.split_whitespace().count());
+    let all_numbers = first.is_some_and(|line| line.split_whitespace().all(is_number));
+    if header.contains([',', ';', '\t']) || cells < 2 || !all_numbers {
+        return Ok(());
+    }
+    Err(IoError::Blanks {
+        file: file.to_owned(),
+        found: cells,
+    })
+}
+
+/// Whether the numbers of a table have decimal commas: some cell is a number with a comma, and none
+/// has a point, beside which a comma may be one of thousands. Commas must not divide the cells.
+pub(crate) fn has_decimal_commas(text: &str, separator: u8) -> bool {
+    let mut reader = reader(text.as_bytes(), separator);
+    let mut record = csv::ByteRecord::new();
+    let mut found = false;
+    while separator != b',' && matches!(reader.read_byte_record(&mut record), Ok(true)) {
+        for cell in record.iter().filter_map(|cell| std::str::from_utf8(cell).ok()) {
+            if cell.contains('.') && matches!(Cell::parse(cell), Cell::Number(_)) {
+                return false;
+            }
+            found |= has_decimal_comma(cell);
+        }
+    }
+    found
 }
 
 /// The comment lines above the header, without their marks.

@@ -7,6 +7,7 @@ use super::columns::{Data, ReadColumn};
 use super::read::read;
 use crate::IoError;
 use crate::table::{Cell, Column, Precision, Source, Table, asides, check_names};
+use crate::time_column::is_time;
 use crate::wording::shown;
 
 /// What stood in the cells that are no finite numbers.
@@ -80,10 +81,8 @@ fn column_of(read: ReadColumn, rows: usize) -> (Column, Cells) {
         name: read.name,
         ..Column::default()
     };
-    if read.single {
-        column.precision = Precision::single();
-    }
     let nulls = read.nulls;
+    let single = read.single;
     column.values = match read.data {
         Data::Real(values) => values,
         Data::Signed(values) => values.into_iter().map(|value| value as f64).collect(),
@@ -108,6 +107,9 @@ fn column_of(read: ReadColumn, rows: usize) -> (Column, Cells) {
         }
     };
     nulls.iter().for_each(|row| column.values[*row] = f64::NAN);
+    if is_time(&column.name) {
+        column.precision = Precision::of_times(&column.values, single);
+    }
     let infinite = column
         .values
         .iter()

@@ -1,18 +1,7 @@
 //! Error and control by the names that people give them.
 
-/// Names of the error.
-const ERRORS: [&str; 6] = ["e", "error", "err", "tracking_error", "tracking error", "e_t"];
-/// Names of the control.
-const CONTROLS: [&str; 8] = [
-    "u",
-    "control",
-    "stick",
-    "command",
-    "cmd",
-    "control_input",
-    "joystick",
-    "delta",
-];
+use hoid_io::{control_among, error_among};
+
 /// Names of what is followed.
 const TARGETS: [&str; 7] = ["r", "ref", "reference", "target", "track", "setpoint", "f_t"];
 /// Names of what is steered.
@@ -32,9 +21,9 @@ pub fn choose(columns: &[&str], input: Option<&str>, output: Option<&str>) -> Ch
         all.find_map(|name| columns.iter().find(|column| column.eq_ignore_ascii_case(name)))
     };
     let asked = |name: &str| (name.to_owned(), "as asked for".to_owned());
-    let input = match (input, find(&ERRORS), find(&TARGETS).zip(find(&OUTPUTS))) {
+    let input = match (input, error_among(columns), find(&TARGETS).zip(find(&OUTPUTS))) {
         (Some(name), ..) => asked(name),
-        (_, Some(name), _) => ((*name).to_owned(), "the tracking error, by its name".to_owned()),
+        (_, Some(name), _) => (name.to_owned(), "the tracking error, by its name".to_owned()),
         (_, _, Some((r, y))) => (
             format!("{r}-{y}"),
             format!("no column is called e: target {r} less output {y}"),
@@ -44,9 +33,9 @@ pub fn choose(columns: &[&str], input: Option<&str>, output: Option<&str>) -> Ch
             "not found by its name: write the column, or a difference such as r-y".to_owned(),
         ),
     };
-    let output = match (output, find(&CONTROLS)) {
+    let output = match (output, control_among(columns)) {
         (Some(name), _) => asked(name),
-        (_, Some(name)) => ((*name).to_owned(), "the control, by its name".to_owned()),
+        (_, Some(name)) => (name.to_owned(), "the control, by its name".to_owned()),
         _ => ("u".to_owned(), "not found by its name: write the column".to_owned()),
     };
     Chosen { input, output }
@@ -66,6 +55,8 @@ mod tests {
         assert_eq!(of(&["t", "e", "u", "y"], None, None), pair("e", "u"));
         assert_eq!(of(&["t", "r", "d", "u", "y"], None, None), pair("r-y", "u"));
         assert_eq!(of(&["Time", "Error", "Stick"], None, None), pair("Error", "Stick"));
+        let words = ["Time (s)", "Target", "Stick [V]", "Tracking error"];
+        assert_eq!(of(&words, None, None), pair("Tracking error", "Stick [V]"));
         assert_eq!(of(&["t", "e", "u"], Some("-e"), Some("w")), pair("-e", "w"));
         let nothing = choose(&["a", "b"], None, None);
         assert!(nothing.input.1.contains("not found") && nothing.output.1.contains("not found"));

@@ -16,6 +16,10 @@ const MOST_CUT_S: f64 = 20.0;
 const MOST_CUT_SHARE: f64 = 0.4;
 /// Fewest lines that excite a person: of a sine a person knows what comes.
 const FEWEST_LINES: usize = 3;
+/// Shares of the power beside the lines that are no more than so many times another are alike.
+const LEAKS_ALIKE: f64 = 3.0;
+/// Share of the power that rounding to five digits or so may leave beside the lines.
+const ROUNDING: f64 = 1e-9;
 
 /// The excitation of a run.
 pub struct Periods {
@@ -58,29 +62,60 @@ pub fn search(record: &Record, known: &Known) -> Result<Periods, String> {
     })
 }
 
-/// The longest span of whole periods of a channel.
+/// The longest span of whole periods of a channel. A span that is some samples too long leaks little, and
+/// would pass: of those that are shorter by less than a second the one counts that leaks least.
 fn in_channel(record: &Record, channel: &str, known: &Known) -> Option<Periods> {
-    spans(record, known).into_iter().find_map(|(from_s, to_s)| {
-        let span = record.span(from_s, to_s).ok()?;
-        let excitation = Excitation::found_in(&span, channel, &LineSearch::default()).ok()?;
-        if excitation.harmonics().len() < FEWEST_LINES {
-            return None;
-        }
-        let (omega, period_s) = (excitation.omega_rad_s(), excitation.period_s());
-        let words = format!(
-            "{channel} has {} lines from {:.3} to {:.3} rad/s, harmonics of {period_s:.4} s, over {from_s:.3} to {to_s:.3} s",
-            omega.len(),
-            omega.first().copied().unwrap_or_default(),
-            omega.last().copied().unwrap_or_default()
-        );
-        Some(Periods {
-            channel: channel.to_owned(),
-            period_s,
-            span_s: (from_s, to_s),
-            excitation,
-            words,
-        })
+    let all = spans(record, known);
+    let longest = all.iter().position(|span| lines_in(record, channel, *span).is_some())?;
+    let least_s = all[longest].1 - all[longest].0 - 1.0;
+    let near: Vec<((f64, f64), Excitation, f64)> = all[longest..]
+        .iter()
+        .take_while(|(from_s, to_s)| to_s - from_s > least_s)
+        .filter_map(|span| lines_in(record, channel, *span).map(|(excitation, leak)| (*span, excitation, leak)))
+        .collect();
+    let least = near.iter().map(|(.., leak)| *leak).fold(f64::INFINITY, f64::min);
+    // Of those that leak alike the first, which is the longest.
+    let limit = LEAKS_ALIKE * least.max(ROUNDING);
+    let ((from_s, to_s), excitation, _) = near.into_iter().find(|(.., leak)| *leak <= limit)?;
+    let (omega, period_s) = (excitation.omega_rad_s(), excitation.period_s());
+    let words = format!(
+        "{channel} has {} lines from {:.3} to {:.3} rad/s, harmonics of {period_s:.4} s, over {from_s:.3} to {to_s:.3} s",
+        omega.len(),
+        omega.first().copied().unwrap_or_default(),
+        omega.last().copied().unwrap_or_default()
+    );
+    Some(Periods {
+        channel: channel.to_owned(),
+        period_s,
+        span_s: (from_s, to_s),
+        excitation,
+        words,
     })
+}
+
+/// The lines of a channel over a span, where they hold nearly all of its power, and the share of the
+/// power beside them.
+fn lines_in(record: &Record, channel: &str, (from_s, to_s): (f64, f64)) -> Option<(Excitation, f64)> {
+    let span = record.span(from_s, to_s).ok()?;
+    let excitation = Excitation::found_in(&span, channel, &LineSearch::default()).ok()?;
+    if excitation.harmonics().len() < FEWEST_LINES {
+        return None;
+    }
+    let values = span.channel(channel)?;
+    let n = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / n;
+    let power = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n;
+    let of_line = |omega: &f64| -> f64 {
+        let step = omega * span.sample_time().s();
+        let at = |k: usize| (step * k as f64).sin_cos();
+        let (sin, cos) = values.iter().enumerate().fold((0.0, 0.0), |(sin, cos), (k, v)| {
+            let (s, c) = at(k);
+            (sin + v * s, cos + v * c)
+        });
+        2.0 * (sin * sin + cos * cos) / (n * n)
+    };
+    let of_lines: f64 = excitation.omega_rad_s().iter().map(of_line).sum();
+    Some((excitation, (1.0 - of_lines / power).max(0.0)))
 }
 
 /// The spans that are tried, the longest first, of equal ones the latest: a person settles in.
@@ -141,6 +176,21 @@ mod tests {
         assert_eq!((found.channel.as_str(), found.span_s), ("d", (6.0, 26.0)));
         assert!((found.period_s - 10.0).abs() < 1e-9, "{}", found.period_s);
         assert_eq!(found.excitation.harmonics(), [1, 3, 7, 12]);
+    }
+
+    /// Samples behind the last period, as of a recorder that is stopped late: the span that ends with the
+    /// record leaks little, and is no whole period.
+    #[test]
+    fn a_period_is_not_drawn_out_by_samples_at_the_end() {
+        let whole = record(&[1.0, 2.0, 3.0]);
+        let longer = whole.span(0.0, 23.0).unwrap();
+        let exact = search(&longer, &Known::default()).ok().unwrap();
+        for late in 1..=3 {
+            let late = whole.span(0.0, 23.0 + 0.02 * f64::from(late)).unwrap();
+            let found = search(&late, &Known::default()).ok().unwrap();
+            assert_eq!((found.span_s, found.period_s), (exact.span_s, exact.period_s));
+        }
+        assert_eq!(exact.span_s, (3.0, 23.0));
     }
 
     #[test]
