@@ -4,7 +4,6 @@
 //! another.
 
 use super::{
-    basis::Signals,
     pair::Pair,
     sizes::{LARGEST_ORDER, SIGNALS},
 };
@@ -15,7 +14,7 @@ pub(super) type Paired = [Pair; SIGNALS / 2];
 
 /// In pairs.
 #[inline(always)]
-pub(super) fn paired(signals: &Signals) -> Paired {
+pub(super) fn paired(signals: &[f64; SIGNALS]) -> Paired {
     core::array::from_fn(|i| Pair([signals[2 * i], signals[2 * i + 1]]))
 }
 
@@ -43,7 +42,7 @@ impl PastSignals {
 
     /// Takes the signals of a sample in the place of the oldest.
     #[inline(always)]
-    pub fn push(&mut self, signals: &Signals) {
+    pub fn push(&mut self, signals: &[f64; SIGNALS]) {
         self.newest = self.newest.checked_sub(1).unwrap_or(LARGEST_ORDER - 1);
         self.twice[self.newest] = paired(signals);
         self.twice[self.newest + LARGEST_ORDER] = paired(signals);
