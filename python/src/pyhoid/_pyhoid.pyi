@@ -40,6 +40,7 @@ __all__ = [
     "describing_function",
     "detrended",
     "discretise_transfer_function",
+    "even_times",
     "group",
     "group_manifest",
     "identify",

@@ -41,8 +41,9 @@ class Reader:
         cargo.write_text(f'#!/bin/sh\nexec {shlex.quote(sys.executable)} {script} "$@"\n')
         cargo.chmod(0o755)
         beside = Path(sys.executable).parent
+        # The pages are as wide as they are: pytest-xdist tells its workers a width.
         self.environment = {
-            **os.environ,
+            **{name: value for name, value in os.environ.items() if name != "COLUMNS"},
             "PATH": os.pathsep.join([str(programs), str(beside), os.environ["PATH"]]),
             "HOID_BINARY": str(program),
             "MPLBACKEND": "Agg",
