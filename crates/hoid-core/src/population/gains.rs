@@ -14,9 +14,10 @@
 //!   after it is learnt as steadily as what was before.
 //!
 //! Weights follow the likelihood and are forgotten towards what is supposed of them, with a time
-//! constant: short among the drifts, for a person's gains may be steady or not from one moment to the
-//! next; long among the forms. (D. T. Magill, IEEE Trans. Automatic Control 10 (1965) 434-439; P. Andersson,
-//! Int. J. Control 42 (1985) 1175-1193, of filters that are born where a change is supposed.)
+//! constant of seconds: a person's gains may be steady or not from one moment to the next, and who
+//! changes may have another form from then on. (D. T. Magill, IEEE Trans. Automatic Control 10 (1965)
+//! 434-439; P. Andersson, Int. J. Control 42 (1985) 1175-1193, of filters that are born where a change is
+//! supposed.)
 //!
 //! The filters of both forms stand side by side (`kalman`), and a sample is taken step by step: all
 //! foretell it, all are weighed, all learn. A weight is kept as it is beside its logarithm, so that means
@@ -351,12 +352,23 @@ impl Gains {
         })
     }
 
-    /// Covariance of the mixture: the differences between the filters are part of it.
+    /// Covariance of the mixture: the differences between the filters are part of it. A newborn counts for
+    /// what it has gained since it was born: that somebody may be born is no news, and would make the
+    /// covariance grow at each birth.
     pub fn covariance(&self) -> [[f64; STATES]; STATES] {
         let mean = self.state();
         let (mut sum, mut total) = ([[0.0; STATES]; STATES], 0.0);
-        for filter in &self.filters {
+        let born = self
+            .weight_in_means(&self.filters[0])
+            .0
+            .map(|first| self.prior.odds * first);
+        for (k, filter) in self.filters.iter().enumerate() {
             for (form, weight) in self.weight_in_means(filter).0.into_iter().enumerate() {
+                let weight = if k < DRIFTS {
+                    weight
+                } else {
+                    (weight - born[form]).max(0.0)
+                };
                 let state = filter.state_of(form);
                 total += weight;
                 for i in 0..STATES {
