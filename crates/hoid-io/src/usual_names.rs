@@ -44,7 +44,7 @@ fn has_word_of(column: &str, usual: &[&str]) -> bool {
         .filter(|word| !word.is_empty());
     words.enumerate().any(|(at, word)| {
         let is_word = |name: &&str| word.eq_ignore_ascii_case(name);
-        (at == 0 || word.chars().count() > 1) && usual.iter().any(|name| is_word(&name))
+        (at == 0 || word.chars().count() > 1) && usual.iter().any(is_word)
     })
 }
 

@@ -262,7 +262,7 @@ mod tests {
             assert!(left_response(&columns, &e, &u, 100, TS).is_none());
         }
         // An exact fit has nothing to test.
-        assert!(left_response(&[known.clone()], &e, &known, 100, TS).is_none());
+        assert!(left_response(std::slice::from_ref(&known), &e, &known, 100, TS).is_none());
         u[2000] = f64::NAN;
         assert!(left_response(&[known], &e, &u, 100, TS).is_none());
     }
