@@ -7,17 +7,21 @@
 //! the person's ten trials of that element, `mean(U/D)/mean(E/D)`. The start span of methods that
 //! have one is 5 to 30 s. No person makes the jump of a seam: the filters take the ramp before the second
 //! trial there, without an update. A seam without a change is none, but alarms within 12 s of it do not count
-//! among those without a change.
+//! among those without a change. Certain changes are those whose likelihood ratio, where the person before and
+//! the person after are known, is above 12 within 8 s ([`oracle`]).
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 #[allow(dead_code, reason = "scenarios are for the other examples")]
 mod evidence;
+#[path = "evidence/oracle.rs"]
+mod oracle;
 
 use std::{env, f64::consts::PI, fs, path::PathBuf};
 
 use evidence::{median, on_all_cores};
 use hoid_model::{Channel, Record, SampleTime};
 use hoid_track::{Method, StartAt, TrackOptions, Tracker};
+use oracle::Rows;
 
 const PEOPLE: [&str; 3] = ["P03", "P05", "P09"];
 const ELEMENTS: [&str; 2] = ["fo", "so"];
@@ -30,6 +34,8 @@ const RATE_HZ: f64 = 60.0;
 const AT_S: [usize; 6] = [2, 4, 8, 13, 18, 28];
 const NK: usize = 13;
 const SETTLING_S: f64 = 12.0;
+const WITHIN_S: f64 = 8.0;
+const CERTAIN: f64 = 12.0;
 
 /// Error, output, disturbance of a trial, and error and output of its ramp, which goes before.
 struct Trial {
@@ -117,6 +123,20 @@ struct Run {
     after: [f64; 6],
     alarms_s: Vec<f64>,
     change: bool,
+    certain: bool,
+}
+
+/// Whether the change from a trial of one cell to one of another is certain to who knows both persons.
+fn is_certain(before: &[Trial], joined: usize, after: &[Trial], second: usize) -> bool {
+    let rows = |trial: &Trial| {
+        let of = |c: usize| [trial.ramp[c].as_slice(), &trial.signals[c]].concat();
+        Rows::new(&of(0), &of(1), FROM, 1.0 / RATE_HZ)
+    };
+    let [before, after] = [before, after].map(|trials| trials.iter().map(rows).collect::<Vec<Rows>>());
+    let others: Vec<&Rows> = (0..after.len()).filter(|i| *i != second).map(|i| &after[i]).collect();
+    let before: Vec<&Rows> = before.iter().collect();
+    let samples = (WITHIN_S * RATE_HZ) as usize;
+    oracle::log_ratio(&before, joined, &others, &after[second], samples) > CERTAIN
 }
 
 fn run(method: &str, first: &Trial, second: &Trial, truths: [&[[f64; 2]; 7]; 2], change: bool) -> Option<Run> {
@@ -140,6 +160,7 @@ fn run(method: &str, first: &Trial, second: &Trial, truths: [&[[f64; 2]; 7]; 2],
         after: [f64::NAN; 6],
         alarms_s: Vec::new(),
         change,
+        certain: false,
     };
     for k in 0..record.len() {
         let t = k as f64 / RATE_HZ;
@@ -200,14 +221,27 @@ fn main() {
             }
         }
     }
+    let certain = on_all_cores(pairs.len(), |i| {
+        let ([a, i0], [b, i1]) = pairs[i as usize];
+        a != b && is_certain(&cells[a], i0, &cells[b], i1)
+    });
     println!(
-        "| method | before | +2 | +4 | +8 | +13 | +18 | +28 s | mean from +8 | no change, +2 to +28 | found in 5 s | in 8 s | seams | alarms/h |"
+        "{} of {} changes are certain within {WITHIN_S} s\n",
+        certain.iter().filter(|c| **c).count(),
+        pairs.iter().filter(|([a, _], [b, _])| a != b).count()
     );
-    println!("|---|---|---|---|---|---|---|---|---|---|---|---|---|---|");
+    println!(
+        "| method | before | +2 | +4 | +8 | +13 | +18 | +28 s | mean from +8 | no change, +2 to +28 | found in 5 s | in 8 s | of the certain | seams | alarms/h |"
+    );
+    println!("|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|");
     for method in &methods {
         let runs: Vec<Run> = on_all_cores(pairs.len(), |i| {
             let ([a, i0], [b, i1]) = pairs[i as usize];
-            run(method, &cells[a][i0], &cells[b][i1], [&truths[a], &truths[b]], a != b)
+            let run = run(method, &cells[a][i0], &cells[b][i1], [&truths[a], &truths[b]], a != b)?;
+            Some(Run {
+                certain: certain[i as usize],
+                ..run
+            })
         })
         .into_iter()
         .flatten()
@@ -216,8 +250,8 @@ fn main() {
         let curve: Vec<f64> = (0..6).map(|at| of(true, at)).collect();
         let still: Vec<String> = (0..6).map(|at| format!("{:.2}", of(false, at))).collect();
         let seam = ROWS as f64 / RATE_HZ;
-        let found = |change: bool, within: f64| {
-            let these: Vec<&Run> = runs.iter().filter(|r| r.change == change).collect();
+        let found = |of: &dyn Fn(&Run) -> bool, within: f64| {
+            let these: Vec<&Run> = runs.iter().filter(|r| of(r)).collect();
             let hit = |r: &&&Run| r.alarms_s.iter().any(|t| (seam..seam + within).contains(t));
             these.iter().filter(hit).count() as f64 / these.len() as f64
         };
@@ -226,15 +260,16 @@ fn main() {
         let hours = runs.len() as f64 * (2.0 * seam - SETTLING_S) / 3600.0;
         let figures: Vec<String> = curve.iter().map(|c| format!("{c:.3}")).collect();
         println!(
-            "| {method} ({}) | {:.3} | {} | {:.3} | {} | {:.2} | {:.2} | {:.2} | {:.1} |",
+            "| {method} ({}) | {:.3} | {} | {:.3} | {} | {:.2} | {:.2} | {:.2} | {:.2} | {:.1} |",
             runs.len(),
             median(runs.iter().map(|r| r.before)),
             figures.join(" | "),
             curve[2..].iter().sum::<f64>() / 4.0,
             still.join(" "),
-            found(true, 5.0),
-            found(true, 8.0),
-            found(false, 8.0),
+            found(&|r| r.change, 5.0),
+            found(&|r| r.change, WITHIN_S),
+            found(&|r| r.certain, WITHIN_S),
+            found(&|r| !r.change, WITHIN_S),
             alarms as f64 / hours
         );
     }
