@@ -174,7 +174,7 @@ impl BoxGrid {
     fn add_names(&self, scene: &mut Scene, area: Area) {
         let names: Vec<String> = self.groups.iter().map(|g| marked(g)).collect();
         let pitch = area.width / names.len() as f64;
-        let widest = names.iter().map(|n| draw::text_width(n, TEXT)).fold(0.0, f64::max);
+        let widest = names.iter().map(|n| draw::text_room(n, TEXT)).fold(0.0, f64::max);
         let staggered = widest > pitch;
         for (k, name) in names.iter().enumerate() {
             let x = area.left + pitch * (k as f64 + 0.5);

@@ -140,7 +140,13 @@ pub fn fitted(x: f64, y: f64, content: String, room: f64, rotate: Option<f64>) -
     text(x, y, content, size, TextAnchor::Middle, rotate)
 }
 
-/// Width of sans-serif text, a little more on average.
+/// Room for a text in the font that the reader has: where there is no Helvetica or Arial it is often DejaVu
+/// Sans, which is an eighth wider.
+pub fn text_room(text: &str, size: u32) -> f64 {
+    1.14 * text_width(text, size)
+}
+
+/// Width of text in Helvetica, a little more on average.
 pub fn text_width(text: &str, size: u32) -> f64 {
     let of = |sign: char| match sign {
         ' ' | '.' | ',' | ':' | ';' | 'i' | 'j' | 'l' | '|' | '\'' | 'I' => 0.28,

@@ -72,7 +72,7 @@ pub fn add_legend_by(scene: &mut Scene, entries: &[Entry], multiple: usize) {
     let names: Vec<String> = entries.iter().map(|e| marked(&shortened(&e.name, LONGEST))).collect();
     let widths: Vec<f64> = names
         .iter()
-        .map(|n| SAMPLE + GAP + draw::text_width(n, TEXT) + BETWEEN)
+        .map(|n| SAMPLE + GAP + draw::text_room(n, TEXT) + BETWEEN)
         .collect();
     let last = scene.width - 4.0 + BETWEEN;
     let whole: f64 = widths.iter().sum();

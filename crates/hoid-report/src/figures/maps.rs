@@ -154,7 +154,7 @@ impl MapGrid {
     /// The names of the places of an abscissa of this width: as many as stand apart.
     fn x_names(&self, width: f64) -> Vec<String> {
         let names: Vec<String> = self.x_places.iter().map(|p| marked(p)).collect();
-        let widest = names.iter().map(|n| draw::text_width(n, TEXT)).fold(0.0, f64::max);
+        let widest = names.iter().map(|n| draw::text_room(n, TEXT)).fold(0.0, f64::max);
         let every = ((widest + APART) * names.len() as f64 / width).ceil().max(1.0) as usize;
         let shown = |(i, name): (usize, String)| if i.is_multiple_of(every) { name } else { String::new() };
         names.into_iter().enumerate().map(shown).collect()
@@ -249,7 +249,7 @@ impl MapGrid {
             _ => 3,
         };
         let fits = |decimals: &usize| {
-            let widths = finite().map(|v| draw::text_width(&printed(v, *decimals), TEXT));
+            let widths = finite().map(|v| draw::text_room(&printed(v, *decimals), TEXT));
             widths.fold(0.0, f64::max) <= width - 1.5
         };
         let least = usize::from(largest < 10.0);

@@ -11,7 +11,7 @@ use kuva::{
 pub const WIDTH: f64 = 420.0;
 /// Space for tick labels and the label of the ordinate, the same in all figures so that panels
 /// align.
-pub const LEFT: f64 = 68.0;
+pub const LEFT: f64 = 76.0;
 pub const RIGHT: f64 = 14.0;
 /// Space above the axes.
 pub const TOP: f64 = 10.0;
