@@ -80,8 +80,10 @@ fn gains(trials: &[&Rows], d: &[f64]) -> Vector3<f64> {
 /// The autoregression that leaves least of v.
 fn autoregression(v: &[f64]) -> Vec<f64> {
     let before = DMatrix::from_fn(v.len() - ORDER, ORDER, |k, j| v[k + ORDER - 1 - j]);
-    let now = DVector::from_column_slice(&v[ORDER..]);
-    let d = before.svd(true, true).solve(&now, 1e-12).unwrap();
+    let mut now = DVector::from_column_slice(&v[ORDER..]);
+    let triangular = before.qr();
+    triangular.q_tr_mul(&mut now);
+    let d = triangular.r().solve_upper_triangular(&now.rows(0, ORDER)).unwrap();
     core::iter::once(1.0).chain(d.iter().map(|d| -d)).collect()
 }
 
