@@ -25,6 +25,7 @@ fn prior(threshold: f64) -> PopulationPrior {
             shares: [0.9, 0.05, 0.05],
             newborn: [0.1, 0.5],
             odds: 0.01,
+            births: 60.0,
             life: 2.0,
             steady: 9.0,
             freedom: 5.0,

@@ -11,7 +11,9 @@
 //! - **Newborns.** Others say that the gains have just changed: they begin as the first, with a
 //!   variance added, and walk at random. After their life they are born again; one that foretells
 //!   better than the first then takes its place. So a change is followed at once, and what comes
-//!   after it is learnt as steadily as what was before.
+//!   after it is learnt as steadily as what was before. How often this person changes is learnt too:
+//!   the odds of a birth are the mean of a Beta distribution, of what is supposed of people and of the
+//!   births of this one that took the place, so that they cost less and less while nothing changes.
 //!
 //! Weights follow the likelihood and are forgotten towards what is supposed of them, with a time
 //! constant of seconds: a person's gains may be steady or not from one moment to the next, and who
@@ -80,9 +82,12 @@ pub struct Gains {
     /// they do not.
     steady: u64,
     still: u64,
+    /// Weight of a newborn at birth over that of the first, and how many births that rests on.
+    odds: f64,
+    births: f64,
 }
 
-crate::state!([] Gains { filters, weights, log_weights, samples, steady, still });
+crate::state!([] Gains { filters, weights, log_weights, samples, steady, still, odds, births });
 
 impl Gains {
     /// With gains of zero and nothing known of them. The basis gives the scale of the gains. `None`
@@ -100,6 +105,8 @@ impl Gains {
             life: libm::round(prior.life / prior.sample_time).max(NEWBORNS as f64) as u64,
             steady: libm::round(prior.steady / prior.sample_time) as u64,
             still: 0,
+            odds: prior.odds,
+            births: prior.births,
         };
         gains.weigh_anew();
         prior.is_sound().then_some(gains)
@@ -273,19 +280,23 @@ impl Gains {
                 continue;
             }
             let newborn = self.filters[DRIFTS + i];
+            let mut taken = 0.0;
             for form in 0..FORMS {
                 if newborn.log_weight.0[form] > self.filters[0].log_weight.0[form] {
                     let first = &mut self.filters[0];
                     first.follow(&newborn, form);
                     first.weight.0[form] = newborn.weight.0[form];
                     first.log_weight.0[form] = newborn.log_weight.0[form];
+                    taken += self.weights.0[form];
                 }
             }
+            self.births += 1.0;
+            self.odds += (taken - self.odds) / self.births;
             let jump = self.prior.newborn[1] * unit;
             let mut child = self.filters[0];
             child.open_gains(&self.shapes, jump * jump);
-            child.weight = child.weight * Forms::both(self.prior.odds);
-            child.log_weight += Forms::both(libm::log(self.prior.odds));
+            child.weight = child.weight * Forms::both(self.odds);
+            child.log_weight += Forms::both(libm::log(self.odds));
             self.filters[DRIFTS + i] = child;
         }
     }
@@ -358,10 +369,7 @@ impl Gains {
     pub fn covariance(&self) -> [[f64; STATES]; STATES] {
         let mean = self.state();
         let (mut sum, mut total) = ([[0.0; STATES]; STATES], 0.0);
-        let born = self
-            .weight_in_means(&self.filters[0])
-            .0
-            .map(|first| self.prior.odds * first);
+        let born = self.weight_in_means(&self.filters[0]).0.map(|first| self.odds * first);
         for (k, filter) in self.filters.iter().enumerate() {
             for (form, weight) in self.weight_in_means(filter).0.into_iter().enumerate() {
                 let weight = if k < DRIFTS {

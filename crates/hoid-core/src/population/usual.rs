@@ -33,9 +33,11 @@ pub const HOLD_S: f64 = 1.0;
 /// of their weights.
 const DRIFT: [f64; DRIFTS] = [0.0005, 0.07, 0.3];
 const SHARES: [f64; DRIFTS] = [0.9, 0.05, 0.05];
-/// Those who have just changed: their drift, the size of the change, their odds, and their life, s.
+/// Those who have just changed: their drift, the size of the change, their odds, the births that these are
+/// worth against what is learnt of the person, and their life, s.
 const NEWBORN: [f64; 2] = [0.1, 1.0];
 const ODDS: f64 = 0.01;
+const BIRTHS: f64 = 60.0;
 const LIFE_S: f64 = 2.0;
 /// Degrees of freedom of the innovations.
 const FREEDOM: f64 = 5.0;
@@ -135,6 +137,7 @@ impl Usual {
                 shares: SHARES,
                 newborn: NEWBORN,
                 odds: ODDS,
+                births: BIRTHS,
                 life: LIFE_S,
                 steady: STEADY_S,
                 freedom: FREEDOM,

@@ -16,6 +16,8 @@ pub struct GainPrior {
     pub newborn: [f64; 2],
     /// Their weight at birth, over that of the first filter.
     pub odds: f64,
+    /// Births that these odds are worth, against those of this person.
+    pub births: f64,
     /// Their life, s.
     pub life: f64,
     /// Time in which the gains do not walk once what is held is corrected, s.
@@ -44,6 +46,7 @@ impl GainPrior {
         sizes.into_iter().all(|d| *d >= 0.0)
             && self.shares.iter().all(|s| *s > 0.0 && *s <= 1.0)
             && self.odds > 0.0
+            && self.births > 0.0
             && self.life > 0.0
             && self.steady >= 0.0
             && self.freedom > 0.0

@@ -21,6 +21,7 @@ fn prior() -> GainPrior {
         shares: [1.0, 1e-300, 1e-300],
         newborn: [0.0; 2],
         odds: 1e-300,
+        births: 1e300,
         life: 1e9,
         steady: 0.0,
         freedom: 1e300,
@@ -176,6 +177,7 @@ fn newborns_follow_a_jump_that_the_steady_would_take_long_for() {
         let prior = GainPrior {
             newborn,
             odds,
+            births: 60.0,
             life: 1.0,
             ..prior()
         };
@@ -192,6 +194,33 @@ fn newborns_follow_a_jump_that_the_steady_would_take_long_for() {
     };
     let (with, without) = (of([0.1, 0.5], 0.01), of([0.0; 2], 1e-300));
     assert!(with < 0.15 && without > 0.5, "{with} {without}");
+}
+
+#[test]
+fn who_never_changes_has_rare_newborns_and_who_does_often_has_not() {
+    let odds = |every: u32| {
+        let prior = GainPrior {
+            newborn: [0.1, 0.5],
+            odds: 0.01,
+            births: 60.0,
+            life: 1.0,
+            ..prior()
+        };
+        let mut gains = Gains::new(prior, &basis()).unwrap();
+        gains.begin(2.0, 0.5);
+        for t in 0..12_000 {
+            let (y, mut regressors) = sample(t);
+            if t / every % 2 == 1 {
+                regressors.x[0] *= 0.4;
+            }
+            gains.update(y, &regressors, 0.3, basis().point(), &AROUND);
+        }
+        gains.odds
+    };
+    // 240 births: the prior's .6 of 60 and some by chance; a change every five seconds is 24 more.
+    let (steady, restless) = (odds(u32::MAX), odds(500));
+    assert!((0.6 / 300.0 - 1e-12..0.005).contains(&steady), "{steady}");
+    assert!((0.03..0.15).contains(&restless), "{restless}");
 }
 
 /// A gain that walks is followed by those that walk, but for the time in which none does.

@@ -66,6 +66,8 @@ struct Twin {
     log_weights: [f64; FORMS],
     samples: u64,
     still: u64,
+    /// Births that were taken for a change, and all, with those that the prior is worth.
+    changes: [f64; 2],
 }
 
 fn log_sum(logs: &[f64]) -> f64 {
@@ -100,6 +102,7 @@ impl Twin {
             log_weights: gains.log_weights.0,
             samples: gains.samples,
             still,
+            changes: [gains.prior.odds * gains.prior.births, gains.prior.births],
         }
     }
 
@@ -145,7 +148,7 @@ impl Twin {
     fn renew(&mut self, unit: f64) {
         let life = libm::round(self.prior.life / self.prior.sample_time).max(NEWBORNS as f64) as u64;
         let jump = self.prior.newborn[1] * unit;
-        for (filters, shape) in self.filters.iter_mut().zip(&self.shapes) {
+        for filters in &mut self.filters {
             let again = |filter: Plain| Plain {
                 log_weight: AGAIN,
                 ..filter
@@ -165,17 +168,24 @@ impl Twin {
                     *filter = again(best);
                 }
             }
-            for i in 0..NEWBORNS {
-                if !(self.samples + i as u64 * life / NEWBORNS as u64).is_multiple_of(life) {
-                    continue;
+        }
+        for i in (0..NEWBORNS).map(|i| i as u64) {
+            if !(self.samples + i * life / NEWBORNS as u64).is_multiple_of(life) {
+                continue;
+            }
+            let newborn = DRIFTS + i as usize;
+            self.changes[1] += 1.0;
+            for (filters, share) in self.filters.iter_mut().zip(self.log_weights) {
+                if filters[newborn].log_weight > filters[0].log_weight {
+                    filters[0] = filters[newborn];
+                    self.changes[0] += libm::exp(share);
                 }
-                if filters[DRIFTS + i].log_weight > filters[0].log_weight {
-                    filters[0] = filters[DRIFTS + i];
-                }
+            }
+            for (filters, shape) in self.filters.iter_mut().zip(&self.shapes) {
                 let mut child = filters[0];
                 open(&mut child, shape, jump * jump);
-                child.log_weight += libm::log(self.prior.odds);
-                filters[DRIFTS + i] = child;
+                child.log_weight += libm::log(self.changes[0] / self.changes[1]);
+                filters[newborn] = child;
             }
         }
     }
@@ -218,6 +228,7 @@ fn pairs_give_what_one_after_another_does() {
         shares: [0.9, 0.05, 0.05],
         newborn: [0.1, 0.5],
         odds: 0.01,
+        births: 20.0,
         life: 2.0,
         steady: 3.0,
         freedom: 5.0,
