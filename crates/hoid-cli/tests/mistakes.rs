@@ -141,6 +141,7 @@ fn wrong_usage_ends_with_two() {
     let d = directory.path();
     for arguments in [
         &["identify"][..],
+        &["identify", "c1.csv", "./c1.csv"],
         &["identify", "c1.csv", "--nk", "5..2"],
         &["identify", "c1.csv", "--orders", "nx=2"],
         &["identify", "c1.csv", "--orders", "nk=3", "--nk", "4"],

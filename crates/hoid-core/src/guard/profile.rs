@@ -205,6 +205,11 @@ pub struct Profile {
 
 crate::state!([] Profile { usual, blocks, frozen_u, idle, larger, rescaled, swapped, misfits, ratio, ratios, innovation });
 
+/// A number between two bounds; one of them that is no number does not bind.
+fn within(value: f64, least: f64, most: f64) -> f64 {
+    value.max(least).min(most)
+}
+
 impl Default for Profile {
     fn default() -> Self {
         Self::new()
@@ -277,22 +282,24 @@ impl Profile {
         self.blocks = self.blocks.saturating_add(1);
         let weight = if known { WEIGHT } else { 1.0 / f64::from(self.blocks) };
         let toward = |usual: &mut f64, found: f64, least: f64, most: f64| {
-            let bounded = if known { found.clamp(least, most) } else { found };
+            let bounded = if known { within(found, least, most) } else { found };
             *usual += weight * (bounded - *usual);
         };
-        if let Some(ratio) = block.ratio() {
+        // Signals whose squares underflow have no ratio.
+        let sound = |ratio: &f64| ratio.is_finite() && block.innovation.is_finite();
+        if let Some(ratio) = block.ratio().filter(sound) {
             let known = self.ratios >= LEARNT;
             self.ratios = self.ratios.saturating_add(1);
             let weight = if known { WEIGHT } else { 1.0 / f64::from(self.ratios) };
             let bounded = if known {
-                ratio.clamp(0.5 * self.ratio, 2.0 * self.ratio)
+                within(ratio, 0.5 * self.ratio, 2.0 * self.ratio)
             } else {
                 ratio
             };
             self.ratio += weight * (bounded - self.ratio);
             let size = block.innovation;
             let bounded = if known {
-                size.clamp(0.5 * self.innovation, 2.0 * self.innovation)
+                within(size, 0.5 * self.innovation, 2.0 * self.innovation)
             } else {
                 size
             };
@@ -417,6 +424,20 @@ mod tests {
             profile.learn(&usual);
         }
         profile
+    }
+
+    /// Squares that underflow: infinite innovations are no long-run value, and nothing panics after them.
+    #[test]
+    fn numbers_without_a_size_are_not_learnt() {
+        let mut profile = known();
+        for innovation in [f64::INFINITY, f64::NAN, 0.1] {
+            let found = Block {
+                innovation,
+                ..block([0.02, 0.1], [0.1, 1.1])
+            };
+            profile.learn(&found);
+            assert!(profile.ratio.is_finite() && profile.innovation.is_finite());
+        }
     }
 
     #[test]

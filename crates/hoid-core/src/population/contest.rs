@@ -11,13 +11,16 @@
 //! the same output, for D begins with 1; no sample is used before it was foretold (A. P. Dawid, J. Royal
 //! Statistical Society A 147 (1984) 278-292: the prequential likelihood). One that is ahead is believed
 //! from then on; one that is far behind is given up, and at the end all are: what they cost is paid only
-//! while the question is open. A contest begins with the first sample, and with every change that is
+//! while the question is open.
+//!
+//! Who is not far behind may be right as well, so that the scatter of all operators, each with a weight that
+//! falls with its evidence, is part of the error of the one that is told. A contest begins with the first sample, and with every change that is
 //! declared: people who change may be elsewhere.
 
 use super::{
     follower::{Follower, Learnt, Past},
     prior::PopulationPrior,
-    sizes::RIVALS,
+    sizes::{PARAMETERS, RIVALS},
 };
 use crate::state::{State, visit_all};
 
@@ -31,6 +34,8 @@ const MEMORY_S: f64 = 10.0;
 /// Evidence from which a rival is believed, and below which one is given up.
 const AHEAD: f64 = 14.0;
 const BEHIND: f64 = -100.0;
+/// Evidence by which a rival counts less in the scatter by a factor of e: it has faded, and many begin anywhere.
+const TEMPER: f64 = 10.0;
 
 /// Those who are followed beside.
 #[derive(Debug, Clone, PartialEq)]
@@ -39,12 +44,18 @@ pub(super) struct Contest {
     open: [bool; RIVALS],
     evidence: [f64; RIVALS],
     samples: u64,
+    /// Mean of d d', d the distance of the others' operators from the one that is believed, by their evidence, at
+    /// the last look.
+    scatter: [[f64; PARAMETERS]; PARAMETERS],
 }
 
 impl State for Contest {
     /// Those who are not followed have no numbers: who is, comes first.
     fn visit(&mut self, each: &mut dyn FnMut(&mut f64)) {
-        visit_all(&mut [&mut self.open, &mut self.evidence, &mut self.samples], each);
+        visit_all(
+            &mut [&mut self.open, &mut self.evidence, &mut self.samples, &mut self.scatter],
+            each,
+        );
         for (rival, _) in self.rivals.iter_mut().zip(self.open).filter(|(_, open)| *open) {
             rival.visit(each);
         }
@@ -59,7 +70,14 @@ impl Contest {
             open: [false; RIVALS],
             evidence: [0.0; RIVALS],
             samples: 0,
+            scatter: [[0.0; PARAMETERS]; PARAMETERS],
         }
+    }
+
+    /// How far the operators of others, who foretell u about as well, are from the one that is believed: means of
+    /// the products of their distances. One corrected estimate knows its own top of the likelihood alone.
+    pub fn scatter(&self) -> [[f64; PARAMETERS]; PARAMETERS] {
+        self.scatter
     }
 
     /// Begins. Their slow modes go on from those of the one who is believed. At a change all take part,
@@ -80,6 +98,9 @@ impl Contest {
         }
         self.evidence = [0.0; RIVALS];
         self.samples = 0;
+        if !at_a_change {
+            self.scatter = self.scatter_about(believed);
+        }
     }
 
     /// True while it goes on.
@@ -157,6 +178,26 @@ impl Contest {
         for (open, evidence) in self.open.iter_mut().zip(self.evidence) {
             *open &= evidence > BEHIND;
         }
+        self.scatter = self.scatter_about(believed);
         best.is_some()
+    }
+
+    fn scatter_about(&self, believed: &Follower) -> [[f64; PARAMETERS]; PARAMETERS] {
+        let at = believed.operator();
+        let (mut products, mut total) = ([[0.0; PARAMETERS]; PARAMETERS], 1.0);
+        for i in 0..RIVALS {
+            if !self.open[i] {
+                continue;
+            }
+            let weight = libm::exp(self.evidence[i].min(0.0) / TEMPER);
+            total += weight;
+            let other = self.rivals[i].operator();
+            for a in 0..PARAMETERS {
+                for b in 0..PARAMETERS {
+                    products[a][b] += weight * (other[a] - at[a]) * (other[b] - at[b]);
+                }
+            }
+        }
+        products.map(|row| row.map(|product| product / total))
     }
 }

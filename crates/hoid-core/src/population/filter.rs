@@ -11,7 +11,7 @@ use super::{
     known::Known,
     noise::NoiseModel,
     prior::PopulationPrior,
-    sizes::{GAINS, HELD, LARGEST_ORDER, LINEAR, STATES},
+    sizes::{GAINS, HELD, LARGEST_ORDER, LINEAR, PARAMETERS, STATES},
 };
 use crate::{
     recursion::Step,
@@ -340,6 +340,16 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> PopulationFilter<E> {
     /// The gains.
     pub fn gains(&self) -> &Gains {
         &self.believed.gains
+    }
+
+    pub(super) fn believed(&self) -> &Follower {
+        &self.believed
+    }
+
+    /// How far the operators of others are who foretell u about as well, those that are told and those that
+    /// compete: means of the products of their distances.
+    pub fn scatter(&self) -> [[f64; PARAMETERS]; PARAMETERS] {
+        self.contest.scatter()
     }
 
     /// Where what is held is now, the corrections included: never outside of where the basis may be.

@@ -10,7 +10,7 @@ use super::{
     past::{Paired, paired},
     place::Place,
     prior::PopulationPrior,
-    sizes::{GAINS, HELD, LARGEST_ORDER, LINEAR, STATES},
+    sizes::{GAINS, HELD, LARGEST_ORDER, LINEAR, PARAMETERS, STATES},
 };
 
 /// Magnitude beyond which the filters are brought to rest.
@@ -35,6 +35,9 @@ pub(super) const LATEST_S: f64 = 0.9;
 /// Time between two looks at whether it should, and time that a move takes, s.
 const LOOK_S: f64 = 1.0;
 const MOVE_S: f64 = 4.0;
+
+/// Frequencies at which gain and lead are nearest, rad/s.
+pub(super) const NEAR_RAD_S: [f64; 3] = [1.0, 2.0, 4.0];
 
 /// A time in samples, at least one.
 fn samples_of(seconds: f64, sample_time: f64) -> u64 {
@@ -345,6 +348,14 @@ impl Follower {
             tau: within(tau, RANGE[2]),
             lag,
         }
+    }
+
+    /// K_e, K_e_dot, omega, zeta and tau.
+    pub fn operator(&self) -> [f64; PARAMETERS] {
+        let (map, state) = (self.place.basis().gain_and_lead(&NEAR_RAD_S), self.gains.state());
+        let Point { omega, zeta, tau, .. } = self.corrected(&state);
+        let gain = |i: usize| (0..GAINS).map(|k| map[i][k] * state[k]).sum();
+        [gain(0), gain(1), omega, zeta, tau]
     }
 
     /// The response of each gain at a frequency in rad/s, for what is held now.

@@ -24,7 +24,9 @@
 //! | `gain-sign` | K_e is significantly positive in some rows and negative in others |
 //! | `negative-lead` | K_e and K_e_dot have significantly opposite signs in more than a tenth of the rows |
 //! | `idle-head` | a head in which neither e nor u moves: left out of the start span (a note), or in it (a doubt) |
+//! | `many-changes` | three changes or more, one in half a minute or oftener |
 //! | `supposed` | omega_nm, zeta_nm or tau_e of the last row are what was supposed before the record (a note) |
+//! | `last-row` | the estimate at the end is doubtful or no estimate, whatever the other rows are |
 //! | `not-followed` | what the last seconds of the record say against the last row |
 //! | `structure` | errors of before say more of u than the operator at the end does |
 //! | `not-finite` | an estimate that is no number |
@@ -79,6 +81,10 @@ impl Trace {
         all.extend(self.idle_finding(record));
         all.extend(self.supposed_finding());
         all.extend(self.not_followed(record));
+        if !all.iter().any(|finding| finding.kind == "gain") {
+            all.extend(self.last_row_finding());
+        }
+        all.extend(self.many_changes_finding());
         all.extend(self.missed_structure(record));
         Ok(Verdict::of(all))
     }
@@ -130,7 +136,8 @@ impl Trace {
             Finding::note(
                 "supposed",
                 format!(
-                    "{} at the end: not determined by the record, what stands there is what was supposed before it",
+                    "{} at the end: not determined by the record, what stands there is what was supposed before it, or one of \
+                     several that foretell u as well",
                     open.join(", ")
                 ),
             )

@@ -42,10 +42,13 @@ pub(super) fn operator_findings(trace: &Trace, operators: &[Operator]) -> Vec<Fi
     if lacking > NOT_CONVERTIBLE {
         let reason = operators.iter().find_map(|o| o.as_ref().err());
         let reason = reason.map_or(String::new(), |r| format!(", as {r}"));
-        all.push(Finding::doubt(
-            "not-convertible",
-            format!("{:.0} % of the rows stand for no operator{reason}", 100.0 * lacking),
-        ));
+        let words = format!("{:.0} % of the rows stand for no operator{reason}", 100.0 * lacking);
+        // A gain of zero in all rows is no model of another form: nothing was found.
+        let nothing = operators.iter().all(|o| matches!(o, Err(NotConvertible::ZeroGain)));
+        all.push(match nothing {
+            true => Finding::undetermined("not-convertible", words),
+            false => Finding::doubt("not-convertible", words),
+        });
     }
     let rows_with = |is: &dyn Fn(&OperatorEstimate) -> bool| share(found.iter().filter(|o| is(o)).count(), found.len());
     all.extend(gains_over_rows(&rows_with));

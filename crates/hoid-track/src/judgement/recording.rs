@@ -1,7 +1,7 @@
 //! What the recording itself says of a trace: what the guard did, an idle head, and whether the last
 //! seconds are followed by the last row.
 
-use hoid_ident::judgement::operator_step;
+use hoid_ident::judgement::{is_open, operator_step};
 use hoid_model::{Finding, Record};
 
 use crate::{
@@ -17,6 +17,9 @@ const LEFT: f64 = 0.25;
 const NAMED: usize = 3;
 /// Lengths of the end of the record at which the last row is held against it, s.
 const LAST_S: [f64; 2] = [16.0, 30.0];
+/// Changes from which there are many, and s of the record for each.
+const MANY: usize = 3;
+const FOR_EACH_S: f64 = 30.0;
 /// p-value of one of ten comparisons below which they differ.
 const UNLIKELY: f64 = 1e-4;
 
@@ -127,6 +130,32 @@ impl Trace {
             }
         }
         worst.map(|(_, words)| Finding::doubt("not-followed", words))
+    }
+
+    /// An estimate that is none at the end, whatever it was before.
+    pub(super) fn last_row_finding(&self) -> Option<Finding> {
+        let operator = self.operator(self.len().checked_sub(1)?).ok()?;
+        (is_open(&operator.k_e) && is_open(&operator.k_e_dot)).then(|| {
+            Finding::doubt(
+                "last-row",
+                "at the end of the record no gain stands two standard errors from zero: report an earlier row",
+            )
+        })
+    }
+
+    /// More changes than people make.
+    pub(super) fn many_changes_finding(&self) -> Option<Finding> {
+        let changes = self.changes().len();
+        let length = self.times_s().last()? - self.times_s().first()?;
+        (changes >= MANY && changes as f64 * FOR_EACH_S >= length).then(|| {
+            Finding::doubt(
+                "many-changes",
+                format!(
+                    "{changes} changes are declared in {length:.0} s: a person who changes so often is rare, a remnant that grows \
+                     with the error, gaps that were filled and steps of a sensor are not; look at e and u there"
+                ),
+            )
+        })
     }
 
     /// An idle head of the record.

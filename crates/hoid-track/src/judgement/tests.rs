@@ -85,6 +85,36 @@ fn an_output_without_a_response_is_not_determined() {
     assert!(kinds(&verdict).contains(&"start-explains-little"), "{verdict}");
 }
 
+/// A change of nothing.
+fn change() -> crate::Change {
+    let same = [Estimate::fixed(1.0); 2];
+    crate::Change {
+        seconds_ago: 1.0,
+        odds: 10.0,
+        k_e: same,
+        k_e_dot: same,
+        omega_nm_rad_s: same,
+        zeta_nm: same,
+        tau_e_s: same,
+        t_l_s: [1.0; 2],
+        innovation_variance: [1.0; 2],
+        z: [0.0; 6],
+        of_operator: true,
+    }
+}
+
+/// An output of zero has no gain: that is no doubtful operator, it is none.
+#[test]
+fn an_output_that_is_zero_is_not_determined() {
+    let record = simulated(Condition::C1);
+    let input = Channel::new("e", "", record.input().to_vec());
+    let silent = Channel::new("u", "", vec![0.0; record.len()]);
+    let other = Record::new(record.sample_time(), input, silent).unwrap();
+    let trace = track(&other, &TrackOptions::usual(Method::population(), 29), 10).unwrap();
+    let verdict = trace.verdict(&other, None).unwrap();
+    assert_eq!(verdict.level, VerdictLevel::NotDetermined, "{verdict}");
+}
+
 /// A trace of C1 whose rows are as they are wanted.
 fn changed(change: impl FnOnce(&mut Trace)) -> Vec<&'static str> {
     let record = simulated(Condition::C1);
@@ -117,6 +147,17 @@ fn each_size_of_the_trace_has_its_finding() {
         trace.covariance[last] *= 1e4;
     });
     assert_eq!(grown, ["covariance-blown-up"]);
+    let at_the_end = changed(|trace| {
+        let last = trace.operator.last_mut().unwrap();
+        open(&mut last.k_e);
+        open(&mut last.k_e_dot);
+    });
+    assert_eq!(at_the_end, ["last-row"]);
+    // 81.92 s: three are many, two are not.
+    for (count, expected) in [(2, vec![]), (3, vec!["many-changes"])] {
+        let often = changed(|trace| trace.changes = vec![(40.0, change()); count]);
+        assert_eq!(often, expected);
+    }
     let broken = changed(|trace| *trace.theta.last_mut().unwrap() = f64::NAN);
     assert_eq!(broken, ["not-finite"]);
 }

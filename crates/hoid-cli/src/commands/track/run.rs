@@ -9,7 +9,7 @@ use hoid::track::{StartAt, TrackOptions, track, usual_start_span};
 use super::{report, result::Tracked};
 use crate::{
     args::TrackArgs,
-    commands::{figure, places, reading},
+    commands::{faults, figure, places, reading},
     error::CliError,
     json, output, recursion,
     recursion::Plan,
@@ -86,6 +86,7 @@ pub fn run(args: &TrackArgs) -> Result<(), CliError> {
     settings.push(("rows of the trace".to_owned(), format!("every {} samples", args.every)));
 
     let verdict = trace.verdict(&record, choice.as_ref())?;
+    let verdict = verdict.behind(faults::of_quality(&account, &record));
     let tracked = Tracked {
         verdict: &verdict,
         file: args.record.display().to_string(),
