@@ -96,6 +96,15 @@ fn a_person_is_found_by_default() {
         assert!(!found[key].is_null(), "{key}");
     }
     assert!(found["forms"].as_array().unwrap().len() == 8);
+    // The element is 1/s: with ten times its gain, or with 1/s^2, nobody could have held this loop.
+    for wrong in ["10/s", "1/s^2", "0.001/s"] {
+        let last = arguments.len() - 1;
+        arguments[last] = wrong;
+        let found = json(at, &[&arguments[..], &["--json"]].concat());
+        let reasons = found["verdict"].to_string();
+        let told = reasons.contains("unstable-loop") || reasons.contains("no-crossover");
+        assert!(told && found["verdict"]["level"] != "trustworthy", "{wrong}: {reasons}");
+    }
     // Its own result is a prior elsewhere.
     std::fs::write(at.join("person.json"), found.to_string()).unwrap();
     let one = json(

@@ -8,6 +8,8 @@
 //! `d omega_c = -(d ln|L|/dx)/(d ln|L|/d omega)`,
 //! `d phi_m = d arg L/dx + (d arg L/d omega) d omega_c`.
 
+use std::f64::consts::{FRAC_PI_3, TAU};
+
 use hoid_model::{
     Complex64, ContinuousTransferFunction, FamilyOperator, SampleTime,
     uncertainty::{Estimate, variance_along},
@@ -95,6 +97,24 @@ impl Crossover {
     }
 }
 
+/// Phase margin in deg at a crossover, of the phase that is followed from low frequencies on: it has no bounds,
+/// and one below zero is a loop that is not stable.
+pub fn followed_margin_deg(open_loop: impl Fn(f64) -> Complex64, crossover_rad_s: f64) -> f64 {
+    let at = |i: usize| RANGE_RAD_S.0 * (crossover_rad_s / RANGE_RAD_S.0).powf(i as f64 / POINTS as f64);
+    let mut last = open_loop(RANGE_RAD_S.0.min(crossover_rad_s));
+    // A double integrator begins at -180 deg, on either side of the cut.
+    let mut phase = last.arg();
+    if phase > FRAC_PI_3 {
+        phase -= TAU;
+    }
+    for i in 1..=POINTS {
+        let next = open_loop(at(i));
+        phase += (next / last).arg();
+        last = next;
+    }
+    180.0 + phase.to_degrees()
+}
+
 /// Where a function that is positive at `low` and negative at `high` is zero, to rounding, by false
 /// position that halves an end which stays (M. Dowell and P. Jarratt, *BIT* 11 (1971) 168-174).
 fn zero_between(of: impl Fn(f64) -> f64, mut low: (f64, f64), mut high: (f64, f64)) -> f64 {
@@ -172,6 +192,19 @@ mod tests {
         // 90 deg less the delay and 2 zeta/omega of the neuromuscular part.
         let expected = 90.0 - (2.0_f64 * (0.1 + 0.014)).to_degrees();
         assert!((found.phase_margin_deg.value - expected).abs() < 0.1);
+    }
+
+    /// 20 e^{-.2 j omega}/(j omega) crosses at 20 rad/s with 90 deg less 229: -139, and one with a delay of .6 s at
+    /// 10 rad/s with 90 less 344: the principal value of both lies within 180 deg.
+    #[test]
+    fn a_margin_below_zero_is_followed_round() {
+        for (gain, delay) in [(20.0, 0.2), (10.0, 0.6), (2.0, 0.1)] {
+            let open_loop = |w: f64| Complex64::new(0.0, -gain / w) * Complex64::from_polar(1.0, -delay * w);
+            let expected = 90.0 - (gain * delay).to_degrees();
+            assert!((followed_margin_deg(open_loop, gain) - expected).abs() < 1e-9);
+        }
+        let double = |w: f64| Complex64::new(-4.0 / (w * w), 0.0);
+        assert!(followed_margin_deg(double, 2.0).abs() < 1e-9);
     }
 
     #[test]

@@ -56,6 +56,9 @@ pub fn run(args: &IdentifyArgs, files: &[String], records: &[Record], accounts: 
         });
         fit.verdict = fit.verdict.and(opinions);
     }
+    if let Some(element) = &args.controlled_element {
+        fit.verdict = fit.verdict.clone().and(fit.loop_finding(0, element));
+    }
     fit.verdict = faults::judged(fit.verdict, files, accounts);
     let described = described.ok();
     let validation = match &args.validate {
