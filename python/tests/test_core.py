@@ -94,6 +94,29 @@ def test_tables(fit: pyhoid.Fit, c1: pyhoid.Record, c4: pyhoid.Record) -> None:
     assert trace.to_xarray().K_e.attrs["units"] == "deg/deg"
 
 
+def test_a_second_run_chooses_the_start_covariance(c4: pyhoid.Record) -> None:
+    second = pyhoid.simulate("C4", seed=12)
+    trace = pyhoid.track(c4, "rpem", nk=29, nd=1, every=10, validate=second)
+    choice = trace.covariance_choice
+    assert choice is not None
+    best = max(choice["candidates"], key=lambda one: one["vaf"])
+    assert best["covariance"] == choice["covariance"] and best["vaf"] > 80
+    again = pyhoid.track(c4, "rpem", nk=29, nd=1, every=10, covariance=choice["covariance"])
+    np.testing.assert_array_equal(trace["b0"], again["b0"])
+    assert again.covariance_choice is None
+    assert pickle.loads(pickle.dumps(trace)).covariance_choice == choice
+    with pytest.raises(pyhoid.OptionError, match="one of the two"):
+        pyhoid.track(c4, "rpem", nk=29, nd=1, covariance=0.1, validate=second)
+    with pytest.raises(pyhoid.DataError, match="validate: expected"):
+        pyhoid.track(c4, "rpem", nk=29, nd=1, validate="second.csv")  # type: ignore[arg-type]
+    # The recursion of the reference text has no guard against windup.
+    text = {"nk": 29, "memory": 256, "covariance": 0.1}
+    off = pyhoid.track(c4, "rls", windup_guard="off", every=10, **text)
+    np.testing.assert_array_equal(pyhoid.track(c4, "rls", every=10, **text)["a1"], off["a1"])
+    on = pyhoid.track(c4, "rls", windup_guard=1e4, every=10, **text)
+    assert not np.array_equal(on["a1"], off["a1"])
+
+
 def test_tables_with_instants_and_durations(c1: pyhoid.Record, tmp_path: Path) -> None:
     pd = pytest.importorskip("pandas")
     pl = pytest.importorskip("polars")

@@ -16,6 +16,7 @@ fn kind_in_words(kind: Kind) -> String {
         Kind::Count => "whole number".to_owned(),
         Kind::Number => "number".to_owned(),
         Kind::Memory => "`256` samples, `2.56s` or `inf`".to_owned(),
+        Kind::NumberOrOff => "number or `off`".to_owned(),
         Kind::Span => "`LO..HI`".to_owned(),
         Kind::OpenSpan => "`LO..HI`, either end may be left out".to_owned(),
         Kind::Choice(words) => words
@@ -49,7 +50,9 @@ fn options_page(methods: &[MethodSpec]) -> String {
         page.push_str("| option | type | unit | default | bounds | what it does |\n|---|---|---|---|---|---|\n");
         for setting in &spec.settings {
             let bounds = match setting.kind {
-                Kind::Count | Kind::Number | Kind::Span | Kind::Named(Kind::Number) => setting.bounds.to_string(),
+                Kind::Count | Kind::Number | Kind::NumberOrOff | Kind::Span | Kind::Named(Kind::Number) => {
+                    setting.bounds.to_string()
+                }
                 _ => String::new(),
             };
             page.push_str(&format!(
@@ -79,6 +82,7 @@ fn python_type(kind: Kind) -> String {
         Kind::Count => "int".to_owned(),
         Kind::Number => "float".to_owned(),
         Kind::Memory => "float | str".to_owned(),
+        Kind::NumberOrOff => "float | Literal[\"off\"]".to_owned(),
         Kind::Span => "tuple[float, float]".to_owned(),
         Kind::OpenSpan => "tuple[float | None, float | None]".to_owned(),
         Kind::Choice(words) => format!("Literal[{}]", quoted(words)),

@@ -484,7 +484,7 @@ fn what_does_not_fit_together_ends_with_two() {
         (&["--method", "window", "--refit", "0"], "1 or more"),
         (&["--method", "rpem", "--bound", "omega_nm=5..30"], "--method physical"),
         (&["--bound", "K_x=5..30"], "K_e_dot"),
-        (&["--method", "rpem", "--track-delay", ".1...3"], "--method physical"),
+        (&["--method", "rls", "--track-delay", ".1...3"], "--method rpem"),
         (&["--start", "b0=1"], "--nk"),
         (&["--start", "b0=1", "--nk", "29"], "--start lacks b1"),
         (
@@ -580,4 +580,92 @@ fn other_rates_need_no_other_options() {
             assert!(off.abs() < 3.0, "{name} at {sample_time} s: {off} standard errors");
         }
     }
+}
+
+#[test]
+fn a_second_run_chooses_the_start_covariance() {
+    let directory = simulated("C4");
+    let d = directory.path();
+    good(
+        d,
+        &["simulate", "--condition", "C4", "--seed", "2", "--out", "second.csv"],
+    );
+    let arguments = [
+        "track",
+        "c.csv",
+        "--method",
+        "rpem",
+        "--nk",
+        "29",
+        "--orders",
+        "nd=1",
+        "--every",
+        "8",
+        "--validate",
+        "second.csv",
+        "--out",
+        "trace.csv",
+    ];
+    let with = |more: &[&'static str]| {
+        arguments
+            .iter()
+            .copied()
+            .chain(more.iter().copied())
+            .collect::<Vec<_>>()
+    };
+    let found = json(d, &with(&["--json"]));
+    let choice = &found["covariance_choice"];
+    assert_eq!(choice["file"], "second.csv");
+    let candidates = choice["candidates"].as_array().unwrap();
+    let vaf = |one: &Value| one["vaf"].as_f64().unwrap();
+    let best = candidates.iter().max_by(|a, b| vaf(a).total_cmp(&vaf(b))).unwrap();
+    assert_eq!((candidates.len(), &best["covariance"]), (9, &choice["covariance"]));
+    assert!((0.0..=100.0).contains(&vaf(best)) && vaf(best) > 80.0, "{choice}");
+    let said: f64 = found["settings"]["covariance"].as_str().unwrap().parse().unwrap();
+    assert_eq!(Some(said), choice["covariance"].as_f64());
+    let page = good(d, &arguments);
+    assert!(
+        page.contains("P0") && page.contains("taken") && page.contains("second.csv"),
+        "{page}"
+    );
+    let (status, says) = bad(d, &with(&["--covariance", "0.1"]));
+    assert!(status == 2 && says.contains("--covariance"), "{says}");
+    let (status, says) = bad(d, &with(&["--track-delay", "0.2..0.4"]));
+    assert!(status == 1 && says.contains("without track_delay"), "{says}");
+    fs::write(d.join("second.csv"), "t,e,u\n0,1,1\n0.01,2,1\n").unwrap();
+    let (_, says) = bad(d, &arguments);
+    assert!(says.contains("in common"), "{says}");
+}
+
+#[test]
+fn a_delay_is_followed_by_rpem_and_the_windup_guard_is_told() {
+    let directory = simulated("C4");
+    let d = directory.path();
+    let text = [
+        "--method",
+        "rpem",
+        "--nk",
+        "29",
+        "--orders",
+        "nd=1",
+        "--covariance",
+        "0.1",
+        "--limit",
+        "inf",
+    ];
+    let of = |more: &[&str]| {
+        let mut arguments = vec!["track", "c.csv", "--out", "trace.csv", "--every", "16", "--json"];
+        arguments.extend(text);
+        arguments.extend(more);
+        json(d, &arguments)
+    };
+    let memory = |found: &Value| found["settings"]["memory"].as_str().unwrap().to_owned();
+    assert!(memory(&of(&[])).contains("without a guard against windup"));
+    let guarded = of(&["--windup-guard", "1e4"]);
+    assert!(!memory(&guarded).contains("without"));
+    assert_eq!(guarded["settings"]["windup guard"], "1e4");
+    let followed = of(&["--track-delay", "0.2..0.4"]);
+    let tau = followed["last"]["operator"]["tau_e"]["value"].as_f64().unwrap();
+    assert!((tau - 0.28).abs() < 0.03, "{tau}");
+    assert!(column(&trace(d), "tau_e").iter().all(|tau| (0.2..=0.4).contains(tau)));
 }

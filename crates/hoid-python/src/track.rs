@@ -5,7 +5,10 @@ use std::path::PathBuf;
 use hoid_ident::{Choice, IdentError};
 use hoid_io::{ColumnValues, OutputColumn, OutputTable};
 use hoid_report::{BatchLine, TraceSection, TrackReport, default_batch_fits, write_report};
-use hoid_track::{NoCrossover, StartAt, Trace, TrackOptions, track as track_record, usual_start_span};
+use hoid_track::{
+    CovarianceChoice, NoCrossover, StartAt, Trace, TrackOptions, choose_covariance, track as track_record,
+    usual_start_span,
+};
 use numpy::PyArray1;
 use pyo3::{prelude::*, types::PyDict};
 
@@ -19,7 +22,7 @@ use crate::{
 
 /// Tracks a record; `options` are those of the recursion, the others concern the record.
 #[pyfunction]
-#[pyo3(signature = (record, options, *, start_span, update_from, moving_average, every, progress))]
+#[pyo3(signature = (record, options, *, start_span, update_from, moving_average, every, validate, progress))]
 #[allow(clippy::too_many_arguments)]
 pub fn track<'py>(
     py: Python<'py>,
@@ -29,13 +32,18 @@ pub fn track<'py>(
     update_from: Option<f64>,
     moving_average: Option<usize>,
     every: usize,
+    validate: Option<Bound<'py, PyAny>>,
     progress: Option<Bound<'py, PyAny>>,
 ) -> Outcome<PyTrace> {
     let record = arrays::record(record, Wanted::Only(&["f_t"]))?;
+    let validation = match &validate {
+        Some(other) => Some(arrays::record(other, Wanted::Only(&[]))?),
+        None => None,
+    };
     let plan = recursion::plan(options, record.sample_time())?;
     let span_s = start_span.unwrap_or_else(|| usual_start_span(&record));
     let candidates = plan.ranges().combinations()?.len() as u64;
-    let (trace, choice) = interrupt::run(py, candidates, progress.as_ref(), false, move |standing| {
+    let (trace, choice, covariance) = interrupt::run(py, candidates, progress.as_ref(), false, move |standing| {
         let (options, choice) = if plan.is_settled() {
             (plan.options().clone(), None)
         } else {
@@ -49,10 +57,21 @@ pub fn track<'py>(
             update_from_s: update_from,
             ..options
         };
+        let (options, covariance) = match &validation {
+            Some(other) => {
+                let (options, found) = choose_covariance(&record, other, &options)?;
+                (options, Some(found))
+            }
+            None => (options, None),
+        };
         let trace = track_record(&record, &options, every)?;
-        Ok::<_, IdentError>((trace.moving_average(moving_average.unwrap_or(1)), choice))
+        Ok::<_, IdentError>((trace.moving_average(moving_average.unwrap_or(1)), choice, covariance))
     })?;
-    Ok(PyTrace { trace, choice })
+    Ok(PyTrace {
+        trace,
+        choice,
+        covariance,
+    })
 }
 
 /// The estimate at every sample that was kept; the package wraps it in `pyhoid.Trace`.
@@ -60,6 +79,7 @@ pub fn track<'py>(
 pub struct PyTrace {
     trace: Trace,
     choice: Option<Choice>,
+    covariance: Option<CovarianceChoice>,
 }
 
 #[pymethods]
@@ -139,6 +159,27 @@ impl PyTrace {
             Ok(all)
         };
         self.trace.changes().iter().map(one).collect()
+    }
+
+    /// The start covariances that were tried on a second run, and the one that was taken.
+    #[getter]
+    fn covariance_choice<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
+        let Some(choice) = &self.covariance else {
+            return Ok(None);
+        };
+        let one = |(p, vaf): &(f64, f64)| {
+            let all = PyDict::new(py);
+            all.set_item("covariance", p)?;
+            all.set_item("vaf", vaf)?;
+            Ok(all)
+        };
+        let all = PyDict::new(py);
+        all.set_item("from", choice.span_s.0)?;
+        all.set_item("to", choice.span_s.1)?;
+        all.set_item("covariance", choice.covariance)?;
+        let candidates: PyResult<Vec<_>> = choice.candidates.iter().map(one).collect();
+        all.set_item("candidates", candidates?)?;
+        Ok(Some(all))
     }
 
     /// Number of fits that failed, and why the last did, for the method window.

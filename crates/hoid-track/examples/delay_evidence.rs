@@ -46,6 +46,8 @@ fn main() {
         ]
     };
     let methods = [
+        ("rpem, nk = 29", options(Method::rpem(), None)),
+        ("rpem, tracked", options(Method::rpem(), Some(RANGE_S))),
         ("adaptive, nk = 29", options(Method::adaptive(), None)),
         ("adaptive, tracked", options(Method::adaptive(), Some(RANGE_S))),
         ("physical, tracked", options(Method::physical(), Some(RANGE_S))),

@@ -13,7 +13,7 @@ use hoid_model::SampleTime;
 
 use hoid_ident::IdentError;
 
-use crate::{forgetting::ForgettingRule, setup::Setup, start::StartState};
+use crate::{forgetting::ForgettingRule, setup::Setup, shared_options::WindupGuard, start::StartState};
 
 /// Where nothing excites a parameter, its variance in P may grow to this multiple of the level that
 /// it has with the excitation of the start fit: the gain after a silence is that of three times the
@@ -125,10 +125,12 @@ impl<const N: usize> Gain<N> {
             });
         };
         let bound = std::array::from_fn(|i| {
-            let room = match setup.covariance {
+            let room = match (setup.windup_guard, setup.covariance) {
+                (Some(WindupGuard::Off), _) => return f64::INFINITY,
+                (Some(WindupGuard::Bound(multiple)), _) => multiple,
                 // N samples of the start leave 1/N of the information of a sample, a memory 1 -
                 // lambda of it.
-                None if from.from_fit && i < p => ROOM_TO_GROW * (from.residuals * (1.0 - lambda[i])).max(1.0),
+                (None, None) if from.from_fit && i < p => ROOM_TO_GROW * (from.residuals * (1.0 - lambda[i])).max(1.0),
                 _ => ROOM_WITHOUT_FIT,
             };
             room * matrix[i][i]

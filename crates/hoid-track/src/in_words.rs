@@ -2,7 +2,9 @@
 
 use hoid_model::SampleTime;
 
-use crate::{forgetting::ForgettingRule, memory::Memory, options::TrackOptions, setup::StartAt};
+use crate::{
+    forgetting::ForgettingRule, memory::Memory, options::TrackOptions, setup::StartAt, shared_options::WindupGuard,
+};
 
 impl TrackOptions {
     /// What the recursion remembers, and how.
@@ -13,7 +15,13 @@ impl TrackOptions {
         }
         let memories = || self.memories_in_words(sample_time);
         match method.forgetting() {
-            ForgettingRule::Exponential => format!("exponential forgetting, memory {}", memories()),
+            ForgettingRule::Exponential => {
+                let unbounded = match method.windup_guard(self.structure) {
+                    Some(WindupGuard::Off) => ", P without a guard against windup",
+                    _ => "",
+                };
+                format!("exponential forgetting, memory {}{unbounded}", memories())
+            }
             ForgettingRule::RandomWalk(drift) => {
                 let each: Vec<String> = drift.iter().map(|(name, d)| format!("{name} {d}")).collect();
                 format!("random walk, drift in one second: {}", each.join(", "))
@@ -104,6 +112,10 @@ mod tests {
         assert_eq!(
             of(&[("memory_of", "b=inf")]),
             "exponential forgetting, memory a1 a2 2.56 s (256 samples), b0 b1 without end"
+        );
+        assert_eq!(
+            of(&[("covariance", "0.1")]),
+            "exponential forgetting, memory 2.56 s (256 samples), P without a guard against windup"
         );
         assert!(of(&[("forgetting", "gradient")]).ends_with("rate 0.1"));
     }

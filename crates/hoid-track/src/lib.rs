@@ -43,6 +43,8 @@
 //! | `trace`, `columns`, `summary`, `in_words` | [`Trace`]: the estimate at every sample, as columns and in words |
 //! | `judgement` | what a trace, and the estimate of a moment, is worth: [`Trace::verdict`] |
 //! | `determined` | which parameters the data determine |
+//! | `delay_bank` | a delay in whole samples, followed beside any recursion |
+//! | `validation` | what a trace explains of another run; the covariance at the start that this chooses |
 //! | `change` | [`Change`]: when a person changed |
 //!
 //! **A recursion starts with what is known.** By default it is the batch fit of the first third of
@@ -58,6 +60,7 @@
 
 mod change;
 mod columns;
+mod delay_bank;
 mod determined;
 mod forgetting;
 mod gain;
@@ -91,6 +94,7 @@ mod start_noise;
 mod summary;
 mod trace;
 mod tracker;
+mod validation;
 
 pub use change::{Change, ErrorThreshold};
 pub use columns::{Columns, value_of};
@@ -110,9 +114,10 @@ pub use plan::{TrackPlan, ranges_of, theta_of};
 pub use recursion::Sample;
 pub use response::Response;
 pub use setup::StartAt;
-pub use shared_options::{BoundOptions, DelayOptions, GainOptions, StabilityOptions};
+pub use shared_options::{BoundOptions, DelayOptions, GainOptions, StabilityOptions, WindupGuard};
 pub use trace::{OPERATOR_COLUMNS, Trace};
 pub use tracker::Tracker;
+pub use validation::{COVARIANCES, CovarianceChoice, choose_covariance};
 
 /// Regressor and stability of the recursions, options of the kernel.
 pub use hoid_core::{predictor::Regressor, recursion::Stable};

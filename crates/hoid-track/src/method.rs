@@ -19,7 +19,7 @@ use crate::{
     person_prior::PersonPrior,
     recursion::Recursion,
     setup::Setup,
-    shared_options::GainOptions,
+    shared_options::{GainOptions, WindupGuard},
     start::StartState,
 };
 
@@ -124,6 +124,11 @@ pub(crate) trait RecursiveMethod: Settings {
     /// estimate no further.
     fn limit(&self) -> f64 {
         f64::INFINITY
+    }
+
+    /// How far P may grow where nothing excites a parameter; none where that follows from the start.
+    fn windup_guard(&self, _structure: Structure) -> Option<WindupGuard> {
+        self.gain().and_then(|gain| gain.windup_guard)
     }
 
     /// True where a guard stands in front of it.

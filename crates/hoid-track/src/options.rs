@@ -4,6 +4,7 @@ use hoid_ident::{Estimator, IdentError, SearchOptions};
 use hoid_model::{ContinuousTransferFunction, Orders, Record, Structure};
 
 use crate::{
+    forgetting::ForgettingRule,
     idle::usual_start_span,
     memory::Memory,
     method::bad,
@@ -135,6 +136,7 @@ impl TrackOptions {
             memories: self.parameter_names().into_iter().zip(self.memories()?).collect(),
             forgetting: method.forgetting(),
             covariance: method.covariance(),
+            windup_guard: method.windup_guard(self.structure),
             limit: method.limit(),
             stable: method.stable(),
             starts_itself: method.starts_itself(),
@@ -170,6 +172,14 @@ impl TrackOptions {
                 "the start covariance",
                 p.to_string(),
                 "a positive number, such as 0.1",
+            ));
+        }
+        if let (Some(_), ForgettingRule::Window | ForgettingRule::Gradient(_)) = (setup.windup_guard, &setup.forgetting)
+        {
+            return Err(bad(
+                "windup_guard",
+                "with forgetting by a window or the gradient, which have no P that grows".to_owned(),
+                "forgetting = exponential, random-walk, variable or directional; or leave it out",
             ));
         }
         if setup.limit.is_nan() || setup.limit <= 0.0 {

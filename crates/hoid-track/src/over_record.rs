@@ -93,6 +93,7 @@ pub fn track_from(
         }
         pack(&covariance, p, &mut trace.covariance);
         trace.operator.extend(tracker.recursion.operator());
+        trace.delays.extend(tracker.recursion.delay());
         if options.method.starts_itself() {
             for omega in &options.at_rad_s {
                 let told = tracker.response(*omega).map(|response| response.packed());

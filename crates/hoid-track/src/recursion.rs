@@ -1,7 +1,7 @@
 //! What a recursive method is.
 
 use hoid_core::{recursion::Step, state::State};
-use hoid_model::uncertainty::OperatorEstimate;
+use hoid_model::uncertainty::{Estimate, OperatorEstimate};
 
 use crate::{change::Change, response::Response};
 
@@ -32,6 +32,15 @@ impl From<Step> for StepOutcome {
             shortened: step.shortened,
         }
     }
+}
+
+/// A delay that is followed in whole samples.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Delay {
+    /// Delay of b0 of the polynomials, samples.
+    pub nk: usize,
+    /// Delay of the person.
+    pub tau_e_s: Estimate,
 }
 
 /// A recursive method. Samples are finite and not too large.
@@ -71,6 +80,10 @@ pub(crate) trait Recursion: State + Send + Sync {
     }
     /// Its real and imaginary part alone.
     fn response_value(&self, _omega_rad_s: f64) -> Option<[f64; 2]> {
+        None
+    }
+    /// The delay at present, where it is followed beside the polynomials.
+    fn delay(&self) -> Option<Delay> {
         None
     }
     /// The operator, where it is what the recursion estimates.

@@ -162,6 +162,7 @@ mod tests {
             of(Method::rriv()).with(&[("instruments", "f_t")]).unwrap(),
             of(Method::physical()).with(&[("track_delay", "0.2..0.35")]).unwrap(),
             of(Method::adaptive()).with(&[("track_delay", "0.2..0.35")]).unwrap(),
+            of(Method::rpem()).with(&[("track_delay", "0.2..0.35")]).unwrap(),
         ];
         for forgetting in [
             "exponential",

@@ -7,7 +7,7 @@ use hoid_core::recursion::Stable;
 use hoid_ident::{Constraint, Estimator, SearchOptions};
 use hoid_model::{Orders, Structure};
 
-use crate::{forgetting::ForgettingRule, memory::Memory};
+use crate::{forgetting::ForgettingRule, memory::Memory, shared_options::WindupGuard};
 
 /// Names of the operator's parameters in a physical recursion.
 pub(crate) const PHYSICAL_NAMES: [&str; 5] = ["K_e", "K_e_dot", "omega_nm", "zeta_nm", "tau_e"];
@@ -40,6 +40,8 @@ pub struct Setup {
     pub forgetting: ForgettingRule,
     /// P at the start as a multiple of the unit matrix; none for that of the start fit.
     pub covariance: Option<f64>,
+    /// How far P may grow where nothing excites a parameter; none where that follows from the start.
+    pub windup_guard: Option<WindupGuard>,
     /// Multiple of the innovation's standard deviation beyond which an innovation moves the
     /// estimate no further.
     pub limit: f64,

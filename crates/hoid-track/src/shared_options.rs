@@ -3,9 +3,49 @@
 use std::collections::BTreeMap;
 
 use hoid_core::recursion::Stable;
-use hoid_ident::{Constraint, settings, settings::Bounds};
+use hoid_ident::{
+    Constraint, settings,
+    settings::{Bounds, Kind, Value},
+};
 
 use crate::{forgetting::ForgettingRule, memory::MemoryOptions};
+
+/// How far the variances of P may grow where nothing excites a parameter.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum WindupGuard {
+    /// As far as forgetting takes them: equations 5.26 and 31 of the reference text as they stand.
+    Off,
+    /// To this multiple of what they are at the start.
+    Bound(f64),
+}
+
+/// `off`, or the bound.
+impl Value for WindupGuard {
+    const KIND: Kind = Kind::NumberOrOff;
+
+    fn read(text: &str) -> Result<Self, String> {
+        match text.eq_ignore_ascii_case("off") {
+            true => Ok(Self::Off),
+            false => f64::read(text)
+                .map(Self::Bound)
+                .map_err(|_| "off, or the multiple of P at the start that is allowed, such as 1e4".to_owned()),
+        }
+    }
+
+    fn text(&self) -> Option<String> {
+        match self {
+            Self::Off => Some("off".to_owned()),
+            Self::Bound(multiple) => multiple.text(),
+        }
+    }
+
+    fn numbers(&self) -> Vec<f64> {
+        match self {
+            Self::Off => Vec::new(),
+            Self::Bound(multiple) => vec![*multiple],
+        }
+    }
+}
 
 settings! {
     /// The gain of a recursion of the kernel.
@@ -17,6 +57,10 @@ settings! {
         /// Standard deviations beyond which an innovation moves the estimate no further
         #[setting(bounds(Bounds::Positive))]
         pub limit: Option<f64> = None,
+        /// How far each variance in P may grow where nothing excites its parameter, as a multiple of
+        /// what it is at the start; off: without end
+        #[setting(bounds(Bounds::AtLeast(1.0)), default("1e4 with a covariance or without a start fit, else 10 times what the memory has under the excitation of that fit"))]
+        pub windup_guard: Option<WindupGuard> = None,
     }
     groups {
         /// Memories.
@@ -33,6 +77,15 @@ impl GainOptions {
             ForgettingRule::Window => f64::INFINITY,
             _ => self.limit.unwrap_or(usual),
         }
+    }
+
+    /// The guard against windup in use; `None` where it follows from the start. It is off for the
+    /// recursion of the reference text: P at the start is given, P forgets exponentially, and no
+    /// innovation is too large.
+    pub(crate) fn windup_guard(&self, limit: f64) -> Option<WindupGuard> {
+        let of_the_text =
+            self.covariance.is_some() && self.forgetting == ForgettingRule::Exponential && limit == f64::INFINITY;
+        self.windup_guard.or(of_the_text.then_some(WindupGuard::Off))
     }
 
     /// Leaves out what was said of parameters that are not known.
@@ -64,7 +117,7 @@ settings! {
     /// A delay that is followed.
     pub struct DelayOptions {
         /// Follow the delay tau_e too, within this range: as a parameter by physical, in whole
-        /// samples by adaptive
+        /// samples by rpem and adaptive
         #[setting(name("track_delay"), unit("s"), bounds(Bounds::NonNegative), default("nk stays"))]
         pub track_delay_s: Option<(f64, f64)> = None,
     }

@@ -9,6 +9,7 @@ use crate::{
     Change, Counts, TrackFault,
     open_loop::{NoCrossover, OpenLoop},
     options::TrackOptions,
+    recursion::Delay,
     response::Response,
 };
 use hoid_ident::{Fit, IdentError};
@@ -26,6 +27,8 @@ pub struct Trace {
     pub(crate) covariance: Vec<f64>,
     /// The operator itself, for a recursion in physical parameters.
     pub(crate) operator: Vec<OperatorEstimate>,
+    /// The delay of each row, where it is followed in whole samples.
+    pub(crate) delays: Vec<Delay>,
     /// The responses that are not those of the polynomials, at each frequency of the options.
     pub(crate) responses: Vec<f64>,
     /// Crossover and margin of such a recursion, and why there are none.
@@ -72,6 +75,7 @@ impl Trace {
             theta: Vec::with_capacity(rows * p),
             covariance: Vec::with_capacity(rows * packed_len(p)),
             operator: Vec::new(),
+            delays: Vec::new(),
             responses: Vec::new(),
             open_loops: Vec::new(),
             no_crossover: Vec::new(),
@@ -178,13 +182,31 @@ impl Trace {
                 Err(NotConvertible::ZeroGain)
             };
         }
+        let covariance = self.covariance(row);
+        self.operator_of_polynomials(row, covariance.as_deref())
+    }
+
+    fn operator_of_polynomials(
+        &self,
+        row: usize,
+        covariance: Option<&[f64]>,
+    ) -> Result<OperatorEstimate, NotConvertible> {
         operator_of(
             self.options.structure,
             self.options.orders,
+            self.delays.get(row),
             self.sample_time,
             self.theta(row),
-            self.covariance(row).as_deref(),
+            covariance,
         )
+    }
+
+    /// Orders of the polynomials of a row, with the delay that they have there.
+    fn orders_of(&self, row: usize) -> Orders {
+        let orders = self.options.polynomial_orders();
+        self.delays
+            .get(row)
+            .map_or(orders, |delay| Orders { nk: delay.nk, ..orders })
     }
 
     /// The operator of a row without standard errors, which take most of the time of
@@ -194,13 +216,7 @@ impl Trace {
     /// [`NotConvertible`] with the reason.
     pub fn operator_values(&self, row: usize) -> Result<OperatorEstimate, NotConvertible> {
         if self.operator.is_empty() {
-            operator_of(
-                self.options.structure,
-                self.options.orders,
-                self.sample_time,
-                self.theta(row),
-                None,
-            )
+            self.operator_of_polynomials(row, None)
         } else {
             self.operator(row)
         }
@@ -212,7 +228,7 @@ impl Trace {
         let count = self.options.at_rad_s.len();
         let omega_rad_s = *self.options.at_rad_s.get(place)?;
         if self.responses.is_empty() {
-            let (orders, covariance) = (self.options.polynomial_orders(), self.covariance(row));
+            let (orders, covariance) = (self.orders_of(row), self.covariance(row));
             let (theta, whole) = (self.theta(row), covariance.as_deref());
             return Some(Response::of_polynomials(
                 &orders,
@@ -235,7 +251,7 @@ impl Trace {
             let found = OpenLoop::unpacked(&self.open_loops[from..from + OpenLoop::NUMBERS]);
             return Some(found.ok_or(self.no_crossover[row].unwrap_or(NoCrossover::NotDetermined)));
         }
-        let (orders, theta, ts) = (self.options.polynomial_orders(), self.theta(row), self.sample_time);
+        let (orders, theta, ts) = (self.orders_of(row), self.theta(row), self.sample_time);
         let value = |omega: f64| Some(Response::value_of_polynomials(&orders, theta, omega, ts));
         let whole = |omega: f64| {
             let covariance = self.covariance(row);
@@ -349,6 +365,15 @@ impl Trace {
         if !self.open_loops.is_empty() {
             self.open_loops = causal_mean(&self.open_loops, OpenLoop::NUMBERS, rows);
         }
+        let taus: Vec<f64> = (self.delays.iter())
+            .flat_map(|delay| {
+                let error = delay.tau_e_s.standard_error.unwrap_or(f64::NAN);
+                [delay.tau_e_s.value, error * error]
+            })
+            .collect();
+        for (delay, mean) in self.delays.iter_mut().zip(causal_mean(&taus, 2, rows).chunks_exact(2)) {
+            delay.tau_e_s = Estimate::with_variance(mean[0], mean[1]);
+        }
         let numbers: Vec<f64> = self
             .operator
             .iter()
@@ -380,20 +405,26 @@ impl Trace {
 pub(crate) fn operator_of(
     structure: Structure,
     orders: Orders,
+    delay: Option<&Delay>,
     sample_time: SampleTime,
     theta: &[f64],
     covariance: Option<&[f64]>,
 ) -> Result<OperatorEstimate, NotConvertible> {
+    let orders = delay.map_or(orders, |delay| Orders { nk: delay.nk, ..orders });
     let model = PolynomialModel::new(structure, orders, sample_time, theta.to_vec()).map_err(|_| {
         NotConvertible::OtherOrders {
             nb: orders.nb,
             poles: orders.na + orders.nf,
         }
     })?;
-    match covariance {
-        Some(covariance) => operator_estimate(&model, covariance),
-        None => Ok(OperatorEstimate::from(model.discrete_operator()?.parameters()?)),
-    }
+    let found = match covariance {
+        Some(covariance) => operator_estimate(&model, covariance)?,
+        None => OperatorEstimate::from(model.discrete_operator()?.parameters()?),
+    };
+    Ok(OperatorEstimate {
+        tau_e_s: delay.map_or(found.tau_e_s, |delay| delay.tau_e_s),
+        ..found
+    })
 }
 
 /// Length of the upper triangle of a p x p matrix.

@@ -3,7 +3,7 @@
 use hoid_core::guard::reference::ReferenceModel;
 use hoid_ident::{Fit, IdentError};
 use hoid_model::{
-    NotConvertible, Record, SampleTime,
+    NotConvertible, Orders, Record, SampleTime,
     uncertainty::{Estimate, OperatorEstimate},
 };
 
@@ -215,6 +215,7 @@ impl Tracker {
             None => operator_of(
                 self.options.structure,
                 self.options.orders,
+                self.recursion.delay().as_ref(),
                 self.sample_time,
                 self.theta(),
                 self.covariance().as_deref(),
@@ -222,12 +223,19 @@ impl Tracker {
         }
     }
 
+    /// Orders of the polynomials, with the delay that they have now.
+    fn orders(&self) -> Orders {
+        let orders = self.options.polynomial_orders();
+        let delay = self.recursion.delay();
+        delay.map_or(orders, |delay| Orders { nk: delay.nk, ..orders })
+    }
+
     /// The response of the estimate at a frequency in rad/s; `None` while there is no estimate.
     pub fn response(&self, omega_rad_s: f64) -> Option<Response> {
         if self.options.method.starts_itself() {
             return self.recursion.response(omega_rad_s);
         }
-        let orders = self.options.polynomial_orders();
+        let orders = self.orders();
         let covariance = self.covariance();
         let (theta, ts) = (self.theta(), self.sample_time);
         let whole = covariance.as_deref();
@@ -242,7 +250,7 @@ impl Tracker {
             let value = |omega: f64| self.recursion.response_value(omega);
             return Some(OpenLoop::of(value, whole, element, self.sample_time));
         }
-        let orders = self.options.polynomial_orders();
+        let orders = self.orders();
         let value = |omega: f64| {
             let alone = Response::value_of_polynomials(&orders, self.theta(), omega, self.sample_time);
             Some(alone)

@@ -284,6 +284,8 @@ class Trace:
         """How many rows have no crossover, and why most of them."""
 
     @property
+    def covariance_choice(self) -> dict[str, Any] | None: ...
+    @property
     def start(self) -> Fit | None: ...
     @property
     def innovation_variance(self) -> _Array: ...
@@ -568,6 +570,7 @@ def track(
     update_from: float | None,
     moving_average: int | None,
     every: int,
+    validate: Record | None,
     progress: _Progress,
 ) -> Trace: ...
 def without_level(records: Sequence[Record], structure: str) -> list[dict[str, Any]] | None: ...

@@ -55,6 +55,10 @@ class MethodSettings(TypedDict, total=False):
     # rpem, physical, adaptive, population, fused.
     limit: float | None
 
+    # How far each variance in P may grow where nothing excites its parameter, as a multiple of
+    # what it is at the start; off: without end. For rls, rpem, physical.
+    windup_guard: float | Literal["off"] | None
+
     # Memory of single parameters, or of all of one letter, as b0=256,f=inf,K_e=5s. For rls,
     # rpem, physical, rriv, fused.
     memory_of: Mapping[str, float | str] | None
@@ -99,13 +103,13 @@ class MethodSettings(TypedDict, total=False):
     # Polynomials kept stable: predictor (C and F), or noise (D too). For rpem, physical, fused.
     stable: Literal["predictor", "noise"] | None
 
+    # Follow the delay tau_e too, within this range: as a parameter by physical, in whole
+    # samples by rpem and adaptive. For rpem, physical, adaptive.
+    track_delay: tuple[float, float] | None
+
     # Bounds of physical parameters, as omega_nm=5..30,zeta_nm=0.1..2; an end may be left open.
     # For physical, adaptive, ekf, ukf.
     bound: Mapping[str, tuple[float | None, float | None]] | None
-
-    # Follow the delay tau_e too, within this range: as a parameter by physical, in whole
-    # samples by adaptive. For physical, adaptive.
-    track_delay: tuple[float, float] | None
 
     # Length of the window: samples or seconds. For window.
     window: float | str | None
@@ -154,6 +158,9 @@ SETTINGS = """covariance : float
         limit : float
             Standard deviations beyond which an innovation moves the estimate no further. For
             rls, rpem, physical, adaptive, population, fused.
+        windup_guard : float | Literal['off']
+            How far each variance in P may grow where nothing excites its parameter, as a
+            multiple of what it is at the start; off: without end. For rls, rpem, physical.
         memory_of : Mapping[str, float | str]
             Memory of single parameters, or of all of one letter, as b0=256,f=inf,K_e=5s. For
             rls, rpem, physical, rriv, fused.
@@ -181,12 +188,12 @@ SETTINGS = """covariance : float
         stable : Literal['predictor', 'noise']
             Polynomials kept stable: predictor (C and F), or noise (D too). For rpem, physical,
             fused.
+        track_delay : tuple[float, float]
+            Follow the delay tau_e too, within this range: as a parameter by physical, in whole
+            samples by rpem and adaptive. For rpem, physical, adaptive.
         bound : Mapping[str, tuple[float | None, float | None]]
             Bounds of physical parameters, as omega_nm=5..30,zeta_nm=0.1..2; an end may be left
             open. For physical, adaptive, ekf, ukf.
-        track_delay : tuple[float, float]
-            Follow the delay tau_e too, within this range: as a parameter by physical, in whole
-            samples by adaptive. For physical, adaptive.
         window : float | str
             Length of the window: samples or seconds. For window.
         refit : int

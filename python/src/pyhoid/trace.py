@@ -41,6 +41,7 @@ _ANSWERS = (
     "changes",
     "failures",
     "no_crossover",
+    "covariance_choice",
     "innovation_variance",
 )
 
@@ -129,6 +130,13 @@ class Trace:
     def orders(self) -> dict[str, int]:
         """na, nb, nc, nd, nf and nk."""
         return self._native.orders
+
+    @property
+    def covariance_choice(self) -> dict[str, Any] | None:
+        """With `validate` the start covariances that were tried: ``covariance``, the one that was
+        taken; ``candidates``, each with the VAF in % of the second run; ``from`` and ``to``, the span
+        that was compared, in s from its first sample. Otherwise None."""
+        return self._native.covariance_choice
 
     @property
     def parameter_names(self) -> list[str]:

@@ -42,6 +42,7 @@ def track(
     controlled_element: str | tuple[Sequence[float], Sequence[float]] | None = None,
     start_span: tuple[float, float] | None = None,
     update_from: float | None = None,
+    validate: Record | None = None,
     moving_average: float | None = None,
     every: int = 1,
     progress: Progress = False,
@@ -80,6 +81,10 @@ def track(
         Span of the start fit in s; default the first third.
     update_from : float, optional
         Time in s from which the estimate is updated.
+    validate : Record, optional
+        A second run of the same person in the same task. `covariance` is then the one of a grid
+        whose trace explains most of it (VAF); ``trace.covariance_choice`` has the table. For methods
+        with `covariance`, which is not given then.
     moving_average : float, optional
         Replace each estimate by the mean over this many seconds.
     every : int
@@ -111,10 +116,12 @@ def track(
     shared = {
         name: value
         for name, value in locals().items()
-        if name not in ("record", "progress", "settings")
+        if name not in ("record", "progress", "settings", "validate")
     }
     if not isinstance(record, Record):
         raise DataError(f"expected a pyhoid.Record, found {type(record).__name__}")
+    if validate is not None and not isinstance(validate, Record):
+        raise DataError(f"validate: expected a pyhoid.Record, found {type(validate).__name__}")
     options = _recursion.plain(shared, settings)
     if start_span is not None and isinstance(start, Mapping):
         raise OptionError(
@@ -143,9 +150,11 @@ def track(
         update_from=update_from,
         moving_average=rows,
         every=int(every),
+        validate=validate,
         progress=_options.reporter(progress, "candidates"),
     )
-    return Trace(native, record, shared | settings, Call("track", (record,), shared | settings))
+    again = shared | settings | {"validate": validate}
+    return Trace(native, record, shared | settings, Call("track", (record,), again))
 
 
 track.__doc__ = (track.__doc__ or "").format(methods=METHODS, settings=SETTINGS)

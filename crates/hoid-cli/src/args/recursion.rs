@@ -72,6 +72,10 @@ pub struct TrackArgs {
     /// [default: the end of the start span; the first sample with --covariance or --start]
     #[arg(long, value_name = "S", allow_hyphen_values = true)]
     pub update_from: Option<f64>,
+    /// A second run of the same person in the same task: the start covariance (--covariance) is the one
+    /// whose trace explains most of it (VAF) [for methods with --covariance]
+    #[arg(long, value_name = "FILE", conflicts_with = "covariance")]
+    pub validate: Option<PathBuf>,
     /// Mean of the estimate over the last S seconds in place of each; it lags by S/2
     #[arg(long, value_name = "S")]
     pub moving_average: Option<f64>,

@@ -58,6 +58,7 @@ fn argument(setting: &Setting, methods: &[MethodSpec]) -> Arg {
         Kind::Count => arg.value_name("N"),
         Kind::Number => arg.value_name("X"),
         Kind::Memory => arg.value_name("N|Ss|inf"),
+        Kind::NumberOrOff => arg.value_name("X|off"),
         Kind::Span | Kind::OpenSpan => arg.value_name("LO..HI"),
         Kind::Channel => arg.value_name("CHANNEL"),
         Kind::Prior => arg.value_name("PRIOR"),

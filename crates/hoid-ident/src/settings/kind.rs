@@ -13,6 +13,8 @@ pub enum Kind {
     Number,
     /// Samples (`256`), seconds (`2.56s`) or `inf`.
     Memory,
+    /// A number, or `off`.
+    NumberOrOff,
     /// `LO..HI`, two finite numbers in order.
     Span,
     /// `LO..HI`, of which either end may be left out.

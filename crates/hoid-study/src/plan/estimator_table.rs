@@ -322,6 +322,7 @@ fn in_words(kind: Kind) -> &'static str {
         Kind::Count => "a whole number",
         Kind::Number => "a number",
         Kind::Memory => "a number of samples, or a text such as \"2.56s\" or \"inf\"",
+        Kind::NumberOrOff => "a number, or the text \"off\"",
         Kind::Span | Kind::OpenSpan => "two numbers",
         Kind::Choice(_) | Kind::Channel | Kind::Prior => "a text",
         Kind::Named(_) => "a table of values by name",

@@ -82,6 +82,7 @@ fn of_kind(kind: Kind) -> Value {
         Kind::Count => json!({ "type": "integer", "minimum": 0 }),
         Kind::Number => json!({ "type": "number" }),
         Kind::Memory => json!({ "type": ["number", "string"] }),
+        Kind::NumberOrOff => json!({ "anyOf": [{ "type": "number" }, { "enum": ["off"] }] }),
         Kind::Span => json!({ "type": "array", "items": { "type": "number" }, "minItems": 2, "maxItems": 2 }),
         Kind::OpenSpan | Kind::Channel | Kind::Prior => json!({ "type": "string" }),
         Kind::Choice(words) => json!({ "enum": words }),

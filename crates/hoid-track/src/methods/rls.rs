@@ -11,7 +11,7 @@ use crate::{
     method::{About, RecursiveMethod, bad},
     recursion::Recursion,
     setup::Setup,
-    shared_options::GainOptions,
+    shared_options::{GainOptions, WindupGuard},
     start::StartState,
 };
 
@@ -26,6 +26,10 @@ settings! {
     }
 }
 
+/// The default of the guard against windup, in words.
+const WINDUP_GUARD: &str =
+    "off for arx with a covariance and exponential forgetting (the text's recursion), else as for physical";
+
 impl RecursiveMethod for RlsOptions {
     fn about(&self) -> About {
         About {
@@ -33,7 +37,12 @@ impl RecursiveMethod for RlsOptions {
             help: "recursive least squares",
             source: "Ljung 1999, section 11.2; the reference text, section III",
             structures: &[Structure::Arx, Structure::Fir],
-            defaults: &[("memory", "2.56s"), ("limit", "inf"), ("guard", "no")],
+            defaults: &[
+                ("memory", "2.56s"),
+                ("limit", "inf"),
+                ("guard", "no"),
+                ("windup_guard", WINDUP_GUARD),
+            ],
         }
     }
 
@@ -65,6 +74,14 @@ impl RecursiveMethod for RlsOptions {
 
     fn gain(&self) -> Option<&GainOptions> {
         Some(&self.gain)
+    }
+
+    /// Off under the settings of the text, which has ARX models.
+    fn windup_guard(&self, structure: Structure) -> Option<WindupGuard> {
+        match structure {
+            Structure::Arx => self.gain.windup_guard(self.limit()),
+            _ => self.gain.windup_guard,
+        }
     }
 
     fn is_guarded(&self) -> bool {

@@ -6,13 +6,14 @@ use hoid_ident::{IdentError, settings};
 use hoid_model::{SampleTime, Structure};
 
 use crate::{
+    delay_bank::DelayBank,
     guard::GuardOptions,
     kernel::{Kernel, Plan},
     memory::Memory,
-    method::{About, RecursiveMethod},
+    method::{About, RecursiveMethod, bad},
     recursion::Recursion,
     setup::Setup,
-    shared_options::{GainOptions, StabilityOptions},
+    shared_options::{DelayOptions, GainOptions, StabilityOptions, WindupGuard},
     start::StartState,
 };
 
@@ -28,6 +29,8 @@ settings! {
         pub gain: GainOptions,
         /// Stability.
         pub stability: StabilityOptions,
+        /// A delay that is followed.
+        pub delay: DelayOptions,
         /// The guard.
         pub guard: GuardOptions,
     }
@@ -47,6 +50,10 @@ impl RecursiveMethod for RpemOptions {
                 ("memory", "2.56s for b, 20.48s for the others"),
                 ("limit", "5"),
                 ("guard", "no"),
+                (
+                    "windup_guard",
+                    "off for bj with a covariance, exponential forgetting and limit inf (the text's recursion), else as for physical",
+                ),
             ],
         }
     }
@@ -55,8 +62,15 @@ impl RecursiveMethod for RpemOptions {
         short_for_b(parameter)
     }
 
-    fn check(&self, _setup: &Setup) -> Result<(), IdentError> {
-        Ok(())
+    fn check(&self, setup: &Setup) -> Result<(), IdentError> {
+        match setup.track_delay_s {
+            Some(_) if !setup.structure.has_input() => Err(bad(
+                "the range of the delay",
+                format!("with {}, which has no input", setup.structure),
+                "a structure with an input, as bj",
+            )),
+            _ => Ok(()),
+        }
     }
 
     fn build(
@@ -65,11 +79,23 @@ impl RecursiveMethod for RpemOptions {
         from: &StartState,
         sample_time: SampleTime,
     ) -> Result<Box<dyn Recursion>, IdentError> {
-        Plan::new(setup, from, sample_time).build(Kernel::PredictionError(self.regressor))
+        let build = |setup: &Setup| Plan::new(setup, from, sample_time).build(Kernel::PredictionError(self.regressor));
+        match setup.track_delay_s {
+            None => build(setup),
+            Some(range_s) => Ok(Box::new(DelayBank::new(setup, range_s, sample_time, build)?)),
+        }
     }
 
     fn gain(&self) -> Option<&GainOptions> {
         Some(&self.gain)
+    }
+
+    /// Off under the settings of the text, which has Box-Jenkins models.
+    fn windup_guard(&self, structure: Structure) -> Option<WindupGuard> {
+        match structure {
+            Structure::BoxJenkins => self.gain.windup_guard(self.limit()),
+            _ => self.gain.windup_guard,
+        }
     }
 
     fn is_guarded(&self) -> bool {
@@ -78,6 +104,10 @@ impl RecursiveMethod for RpemOptions {
 
     fn limit(&self) -> f64 {
         self.gain.limit_or(LIMIT)
+    }
+
+    fn track_delay_s(&self) -> Option<(f64, f64)> {
+        self.delay.track_delay_s
     }
 
     fn stable(&self) -> Stable {

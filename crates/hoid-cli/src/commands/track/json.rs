@@ -43,6 +43,22 @@ impl Tracked<'_> {
             _ => Value::Null,
         };
         set("start", start);
+        if let Some((file, choice)) = self.covariance {
+            let each = choice.candidates.iter();
+            let candidates: Vec<Value> = each
+                .map(|(p, vaf)| json!({ "covariance": number(*p), "vaf": number(*vaf) }))
+                .collect();
+            set(
+                "covariance_choice",
+                json!({
+                    "file": file,
+                    "from": number(choice.span_s.0),
+                    "to": number(choice.span_s.1),
+                    "covariance": number(choice.covariance),
+                    "candidates": candidates,
+                }),
+            );
+        }
         set("updated_from", number(trace.updated_from_s()));
         set("last", self.last_json());
         set("samples", json!(counts.samples));

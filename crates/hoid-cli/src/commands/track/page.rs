@@ -39,6 +39,7 @@ impl Tracked<'_> {
         if let Some(choice) = self.choice {
             page.push_str(&text::delay(choice));
         }
+        page.push_str(&self.covariance());
         page.push_str(&text::records(
             std::slice::from_ref(&self.file),
             std::slice::from_ref(self.record),
@@ -74,6 +75,22 @@ impl Tracked<'_> {
         }
         page.push_str(&text::settings(self.settings));
         Ok(page)
+    }
+
+    /// The start covariances that were tried on a second run, where one was given.
+    fn covariance(&self) -> String {
+        let Some((file, choice)) = self.covariance else {
+            return String::new();
+        };
+        let mut rows = text::table(&["P0", "VAF in %", ""]);
+        for (p, vaf) in &choice.candidates {
+            let taken = if *p == choice.covariance { "taken" } else { "" };
+            rows.add_row(vec![format!("{p} I"), format!("{vaf:.2}"), taken.to_owned()]);
+        }
+        format!(
+            "\nStart covariance by what the trace explains of {file} ({:.2} to {:.2} s):\n{rows}\n",
+            choice.span_s.0, choice.span_s.1
+        )
     }
 
     /// The estimate at a handful of times.

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use hoid::ident::{Choice, Fit};
 use hoid::io::{ColumnValues, OutputColumn, OutputTable};
 use hoid::model::{NotConvertible, Record, Verdict, uncertainty::OperatorEstimate};
-use hoid::track::{NoCrossover, Trace};
+use hoid::track::{CovarianceChoice, NoCrossover, Trace};
 
 use super::errors::relative_errors;
 use crate::commands::reading::Account;
@@ -22,6 +22,8 @@ pub struct Tracked<'a> {
     /// The operator in each row.
     pub operators: Vec<Result<OperatorEstimate, NotConvertible>>,
     pub choice: Option<&'a Choice>,
+    /// The start covariance that a second run chose, and the file of that run.
+    pub covariance: Option<&'a (String, CovarianceChoice)>,
     /// The file of the trace.
     pub out: String,
     pub settings: &'a [(String, String)],

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use hoid::io::{check_table_path, write_table};
 use hoid::model::Record;
-use hoid::track::{StartAt, TrackOptions, track, usual_start_span};
+use hoid::track::{StartAt, TrackOptions, choose_covariance, track, usual_start_span};
 
 use super::{report, result::Tracked};
 use crate::{
@@ -23,10 +23,14 @@ pub fn run(args: &TrackArgs) -> Result<(), CliError> {
     if let Some(path) = &args.picture.figure {
         figure::check(path)?;
     }
-    let inputs: Vec<&Path> = [Some(args.record.as_path()), recursion::prior_file(&args.recursion)]
-        .into_iter()
-        .flatten()
-        .collect();
+    let inputs: Vec<&Path> = [
+        Some(args.record.as_path()),
+        args.validate.as_deref(),
+        recursion::prior_file(&args.recursion),
+    ]
+    .into_iter()
+    .flatten()
+    .collect();
     places::check(
         &inputs,
         &[Some(&args.out), args.picture.figure.as_deref()],
@@ -51,11 +55,29 @@ pub fn run(args: &TrackArgs) -> Result<(), CliError> {
         update_from_s: update_from(args, &record)?,
         ..options
     };
+    let (options, covariance) = match &args.validate {
+        Some(path) => {
+            let (validation, _) = reading::read(path, &args.read, with_input)?;
+            let (options, choice) = choose_covariance(&record, &validation, &options)?;
+            (options, Some((path.display().to_string(), choice)))
+        }
+        None => (options, None),
+    };
     let trace = track(&record, &options, args.every)?;
     let rows = averaged_rows(args, &record)?;
     let trace = trace.moving_average(rows);
 
     let mut settings = plan.settings(&options, choice.as_ref());
+    if let Some((file, choice)) = &covariance {
+        let words = format!(
+            "of {} values that whose trace explains most of {file} from {:.2} to {:.2} s, VAF {:.2} %",
+            choice.candidates.len(),
+            choice.span_s.0,
+            choice.span_s.1,
+            choice.vaf()
+        );
+        settings.push(("covariance chosen".to_owned(), words));
+    }
     settings.push((
         "start".to_owned(),
         match &options.start {
@@ -97,6 +119,7 @@ pub fn run(args: &TrackArgs) -> Result<(), CliError> {
         account: &account,
         trace: &trace,
         choice: choice.as_ref(),
+        covariance: covariance.as_ref(),
         settings: &settings,
     };
     let batch = report::batch_fits(args, &tracked)?;
