@@ -105,15 +105,23 @@ def test_a_second_run_chooses_the_start_covariance(c4: pyhoid.Record) -> None:
     np.testing.assert_array_equal(trace["b0"], again["b0"])
     assert again.covariance_choice is None
     assert pickle.loads(pickle.dumps(trace)).covariance_choice == choice
+    text: Any = {"covariance": 0.1, "limit": float("inf")}
+    updated = pyhoid.track(
+        c4, "rpem", nk=29, nd=1, every=10, validate=second, update_covariance=True, **text
+    )
+    plain = pyhoid.track(c4, "rpem", nk=29, nd=1, every=10, **text)
+    assert updated.covariance_choice is None and not np.array_equal(updated["b0"], plain["b0"])
+    with pytest.raises(pyhoid.OptionError, match="belongs to validate"):
+        pyhoid.track(c4, "rpem", nk=29, nd=1, update_covariance=True)
     with pytest.raises(pyhoid.OptionError, match="one of the two"):
         pyhoid.track(c4, "rpem", nk=29, nd=1, covariance=0.1, validate=second)
     with pytest.raises(pyhoid.DataError, match="validate: expected"):
         pyhoid.track(c4, "rpem", nk=29, nd=1, validate="second.csv")  # type: ignore[arg-type]
     # The recursion of the reference text has no guard against windup.
-    text = {"nk": 29, "memory": 256, "covariance": 0.1}
-    off = pyhoid.track(c4, "rls", windup_guard="off", every=10, **text)
-    np.testing.assert_array_equal(pyhoid.track(c4, "rls", every=10, **text)["a1"], off["a1"])
-    on = pyhoid.track(c4, "rls", windup_guard=1e4, every=10, **text)
+    of_rls: Any = {"nk": 29, "memory": 256, "covariance": 0.1}
+    off = pyhoid.track(c4, "rls", windup_guard="off", every=10, **of_rls)
+    np.testing.assert_array_equal(pyhoid.track(c4, "rls", every=10, **of_rls)["a1"], off["a1"])
+    on = pyhoid.track(c4, "rls", windup_guard=1e4, every=10, **of_rls)
     assert not np.array_equal(on["a1"], off["a1"])
 
 

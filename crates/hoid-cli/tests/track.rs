@@ -630,6 +630,28 @@ fn a_second_run_chooses_the_start_covariance() {
     );
     let (status, says) = bad(d, &with(&["--covariance", "0.1"]));
     assert!(status == 2 && says.contains("--covariance"), "{says}");
+    // In course instead, whatever P is at the start.
+    let updated = json(d, &with(&["--json", "--update-covariance", "--covariance", "0.1"]));
+    assert!(updated["covariance_choice"].is_null());
+    assert!(
+        updated["settings"]["covariance updated"]
+            .as_str()
+            .unwrap()
+            .contains("second.csv")
+    );
+    let (status, says) = bad(
+        d,
+        &[
+            "track",
+            "c.csv",
+            "--method",
+            "rpem",
+            "--update-covariance",
+            "--out",
+            "trace.csv",
+        ],
+    );
+    assert!(status == 2 && says.contains("--validate"), "{says}");
     let (status, says) = bad(d, &with(&["--track-delay", "0.2..0.4"]));
     assert!(status == 1 && says.contains("without track_delay"), "{says}");
     fs::write(d.join("second.csv"), "t,e,u\n0,1,1\n0.01,2,1\n").unwrap();

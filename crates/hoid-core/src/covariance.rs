@@ -122,6 +122,11 @@ impl<const N: usize> Covariance<N> {
         self
     }
 
+    /// P times a factor, so that the estimate moves less until it has forgotten, or more.
+    pub fn scale(&mut self, factor: f64) {
+        self.factors.scale_all(factor);
+    }
+
     /// P itself.
     pub fn matrix(&self) -> [[f64; N]; N] {
         self.factors.matrix()

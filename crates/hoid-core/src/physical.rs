@@ -333,6 +333,11 @@ impl<S: Shape, const N: usize, const K: usize, const L: usize, A: Adaptation<N>>
         &self.adaptation
     }
 
+    /// The adaptation, to be changed from outside.
+    pub fn adaptation_mut(&mut self) -> &mut A {
+        &mut self.adaptation
+    }
+
     /// Covariance of eta over sigma^2.
     pub fn normalised_covariance(&self) -> [[f64; N]; N] {
         self.adaptation.normalised_covariance(&self.bars)

@@ -136,6 +136,11 @@ impl<S: Shape, const N: usize, A: Adaptation<N>, B: ErrorPropagation<N, 0>> Rls<
         &self.adaptation
     }
 
+    /// The adaptation, to be changed from outside.
+    pub fn adaptation_mut(&mut self) -> &mut A {
+        &mut self.adaptation
+    }
+
     /// How often a step was not finite and the regressor was brought to rest.
     pub fn restarts(&self) -> u64 {
         self.restarts

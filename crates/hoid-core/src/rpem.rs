@@ -150,6 +150,11 @@ impl<S: Shape, const N: usize, const K: usize, A: Adaptation<N>, B: ErrorPropaga
         &self.adaptation
     }
 
+    /// The adaptation, to be changed from outside.
+    pub fn adaptation_mut(&mut self) -> &mut A {
+        &mut self.adaptation
+    }
+
     /// How often a signal overflowed and the filters were brought to rest.
     pub fn restarts(&self) -> u64 {
         self.restarts

@@ -6,8 +6,8 @@ use hoid_ident::{Choice, IdentError};
 use hoid_io::{ColumnValues, OutputColumn, OutputTable};
 use hoid_report::{BatchLine, TraceSection, TrackReport, default_batch_fits, write_report};
 use hoid_track::{
-    CovarianceChoice, NoCrossover, StartAt, Trace, TrackOptions, choose_covariance, track as track_record,
-    usual_start_span,
+    CovarianceChoice, CovarianceUpdates, NoCrossover, StartAt, Trace, TrackOptions, choose_covariance,
+    track as track_record, track_validated, usual_start_span,
 };
 use numpy::PyArray1;
 use pyo3::{prelude::*, types::PyDict};
@@ -22,7 +22,7 @@ use crate::{
 
 /// Tracks a record; `options` are those of the recursion, the others concern the record.
 #[pyfunction]
-#[pyo3(signature = (record, options, *, start_span, update_from, moving_average, every, validate, progress))]
+#[pyo3(signature = (record, options, *, start_span, update_from, moving_average, every, validate, update_covariance, progress))]
 #[allow(clippy::too_many_arguments)]
 pub fn track<'py>(
     py: Python<'py>,
@@ -33,6 +33,7 @@ pub fn track<'py>(
     moving_average: Option<usize>,
     every: usize,
     validate: Option<Bound<'py, PyAny>>,
+    update_covariance: bool,
     progress: Option<Bound<'py, PyAny>>,
 ) -> Outcome<PyTrace> {
     let record = arrays::record(record, Wanted::Only(&["f_t"]))?;
@@ -57,14 +58,17 @@ pub fn track<'py>(
             update_from_s: update_from,
             ..options
         };
-        let (options, covariance) = match &validation {
+        let (trace, covariance) = match &validation {
+            Some(other) if update_covariance => {
+                let updates = CovarianceUpdates::default();
+                (track_validated(&record, other, &options, &updates, every)?, None)
+            }
             Some(other) => {
                 let (options, found) = choose_covariance(&record, other, &options)?;
-                (options, Some(found))
+                (track_record(&record, &options, every)?, Some(found))
             }
-            None => (options, None),
+            None => (track_record(&record, &options, every)?, None),
         };
-        let trace = track_record(&record, &options, every)?;
         Ok::<_, IdentError>((trace.moving_average(moving_average.unwrap_or(1)), choice, covariance))
     })?;
     Ok(PyTrace {

@@ -144,6 +144,22 @@ impl<const N: usize> Gain<N> {
     }
 }
 
+/// A gain with a covariance that can be changed from outside.
+pub(crate) trait Scaled {
+    /// P times a factor; false where there is no P that stays.
+    fn scale(&mut self, factor: f64) -> bool;
+}
+
+impl<const N: usize> Scaled for Gain<N> {
+    fn scale(&mut self, factor: f64) -> bool {
+        match self {
+            Self::Covariance(c) => c.scale(factor),
+            Self::Window(_) => return false,
+        }
+        true
+    }
+}
+
 impl<const N: usize> Adaptation<N> for Gain<N> {
     #[inline]
     fn update(&mut self, psi: &[f64; N], eps: f64, theta: &[f64; N], variance: f64) -> ParameterStep<N> {

@@ -20,7 +20,7 @@ use hoid_model::{
 use hoid_ident::IdentError;
 
 use crate::{
-    gain::{self, Gain},
+    gain::{self, Gain, Scaled},
     recursion::{Recursion, Sample, StepOutcome},
     setup::Setup,
     start::{self, StartState},
@@ -233,7 +233,9 @@ struct Linear<S, const N: usize, A> {
     parameters: usize,
 }
 
-impl<S: Shape + Send + Sync, const N: usize, A: Adaptation<N> + State + Send + Sync> Recursion for Linear<S, N, A> {
+impl<S: Shape + Send + Sync, const N: usize, A: Adaptation<N> + Scaled + State + Send + Sync> Recursion
+    for Linear<S, N, A>
+{
     fn step(&mut self, sample: Sample) -> StepOutcome {
         let x = self.delay.step(sample.e);
         self.rls.step(x, sample.u).into()
@@ -247,6 +249,10 @@ impl<S: Shape + Send + Sync, const N: usize, A: Adaptation<N> + State + Send + S
     fn bridge(&mut self, sample: Sample) {
         let x = self.delay.step(sample.e);
         self.rls.bridge(x);
+    }
+
+    fn scale_covariance(&mut self, factor: f64) -> bool {
+        self.rls.adaptation_mut().scale(factor)
     }
 
     fn theta(&self) -> &[f64] {
@@ -274,7 +280,7 @@ struct Polynomials<S, const N: usize, const K: usize, A> {
     parameters: usize,
 }
 
-impl<S: Shape + Send + Sync, const N: usize, const K: usize, A: Adaptation<N> + State + Send + Sync> Recursion
+impl<S: Shape + Send + Sync, const N: usize, const K: usize, A: Adaptation<N> + Scaled + State + Send + Sync> Recursion
     for Polynomials<S, N, K, A>
 {
     fn step(&mut self, sample: Sample) -> StepOutcome {
@@ -290,6 +296,10 @@ impl<S: Shape + Send + Sync, const N: usize, const K: usize, A: Adaptation<N> + 
     fn bridge(&mut self, sample: Sample) {
         let x = self.delay.step(sample.e);
         self.rpem.bridge(x);
+    }
+
+    fn scale_covariance(&mut self, factor: f64) -> bool {
+        self.rpem.adaptation_mut().scale(factor)
     }
 
     fn theta(&self) -> &[f64] {
@@ -319,8 +329,13 @@ struct InPhysical<S, const N: usize, const K: usize, const L: usize, A> {
     fixed_tau_s: f64,
 }
 
-impl<S: Shape + Send + Sync, const N: usize, const K: usize, const L: usize, A: Adaptation<N> + State + Send + Sync>
-    Recursion for InPhysical<S, N, K, L, A>
+impl<
+    S: Shape + Send + Sync,
+    const N: usize,
+    const K: usize,
+    const L: usize,
+    A: Adaptation<N> + Scaled + State + Send + Sync,
+> Recursion for InPhysical<S, N, K, L, A>
 {
     fn step(&mut self, sample: Sample) -> StepOutcome {
         let x = self.delay.step(sample.e);
@@ -335,6 +350,10 @@ impl<S: Shape + Send + Sync, const N: usize, const K: usize, const L: usize, A: 
     fn bridge(&mut self, sample: Sample) {
         let x = self.delay.step(sample.e);
         self.recursion.bridge(x);
+    }
+
+    fn scale_covariance(&mut self, factor: f64) -> bool {
+        self.recursion.adaptation_mut().scale(factor)
     }
 
     fn theta(&self) -> &[f64] {

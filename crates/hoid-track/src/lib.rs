@@ -117,7 +117,7 @@ pub use setup::StartAt;
 pub use shared_options::{BoundOptions, DelayOptions, GainOptions, StabilityOptions, WindupGuard};
 pub use trace::{OPERATOR_COLUMNS, Trace};
 pub use tracker::Tracker;
-pub use validation::{COVARIANCES, CovarianceChoice, choose_covariance};
+pub use validation::{COVARIANCES, CovarianceChoice, CovarianceUpdates, choose_covariance, track_validated};
 
 /// Regressor and stability of the recursions, options of the kernel.
 pub use hoid_core::{predictor::Regressor, recursion::Stable};

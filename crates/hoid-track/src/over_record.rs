@@ -33,6 +33,17 @@ pub fn track_from(
     every: usize,
     start: Option<&Fit>,
 ) -> Result<Trace, IdentError> {
+    track_with(record, options, every, start, &mut |_, _| {})
+}
+
+/// As [`track_from`]; `each` is called with the tracker after every sample, and with its number.
+pub(crate) fn track_with(
+    record: &Record,
+    options: &TrackOptions,
+    every: usize,
+    start: Option<&Fit>,
+    each: &mut dyn FnMut(&mut Tracker, usize),
+) -> Result<Trace, IdentError> {
     trace::check_every(every)?;
     options.check()?;
     let sample_time = record.sample_time();
@@ -77,6 +88,7 @@ pub fn track_from(
             reference: reference.map(|r| r[k]),
         };
         let outcome = tracker.update(sample, t >= first_update);
+        each(&mut tracker, k);
         if let Some(change) = tracker.change() {
             trace.changes.push((t, change));
         }

@@ -15,13 +15,28 @@
 //! that is too stiff explains less where the person changes. Runs are laid on one another from their
 //! first samples on, so that what changes in the task has to change at the same time in both.
 //!
+//! [`track_validated`] takes the proposal by its word: P is updated in course. At regular times the
+//! model of now and that of one interval before are both simulated over the last seconds of the second
+//! run; where the one of now explains less,
+//!
+//! `P <- P max(least, ((1 - VAF_before)/(1 - VAF_now))^power)`,
+//!
+//! the estimate moves less until it has forgotten; where it explains more, P stays. What the remnant
+//! leaves unexplained is in both, so that a model that is right is not punished by noise.
+//!
 //! The VAF removes no mean. The first seconds are left out: the simulation begins at rest, and the
 //! person does not.
 
 use hoid_ident::{IdentError, validation::vaf};
-use hoid_model::{Orders, Record};
+use hoid_model::{Orders, Record, SampleTime};
 
-use crate::{forgetting::ForgettingRule, method::bad, options::TrackOptions, over_record::track_from, trace::Trace};
+use crate::{
+    forgetting::ForgettingRule,
+    method::bad,
+    options::TrackOptions,
+    over_record::{track_from, track_with},
+    trace::Trace,
+};
 
 /// Values of p that are tried, in units of the innovation variance; the text's is 0.1.
 pub const COVARIANCES: [f64; 9] = [1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 0.1, 1.0, 10.0, 100.0];
@@ -63,27 +78,7 @@ impl Trace {
     /// and for a trace whose delay moves.
     pub fn vaf_of(&self, other: &Record) -> Result<(f64, (f64, f64)), IdentError> {
         let ts = self.sample_time();
-        let found = other.sample_time();
-        if !found.matches(ts) {
-            return Err(IdentError::MixedSampling {
-                label: other.label().to_owned(),
-                found: found.s(),
-                expected: ts.s(),
-            });
-        }
-        if other.input_channel().is_none() {
-            return Err(IdentError::NoInput {
-                structure: self.options().structure.label(),
-                label: other.label().to_owned(),
-            });
-        }
-        if self.options().method.track_delay_s().is_some() || self.options().method.starts_itself() {
-            return Err(bad(
-                "the validation of a trace",
-                "a delay that moves".to_owned(),
-                "a method with a delay that is given, without track_delay",
-            ));
-        }
+        check(other, self.options(), ts)?;
         let o = self.options().polynomial_orders();
         let rows = (self.len() * self.every()).min(other.len());
         let first = o.nk + (SETTLING_S / ts.s()).ceil() as usize;
@@ -98,49 +93,66 @@ impl Trace {
                 ),
             ));
         }
-        let response = self.simulated(&o, &other.input()[..rows]);
+        let row_at = |k: usize| ((k + 1) / self.every()).saturating_sub(1).min(self.len() - 1);
+        let response = simulated(&o, &other.input()[..rows], 0, |k| self.theta(row_at(k)));
         let found = vaf(&other.output()[first..rows], &response[first..]);
         Ok((if found.is_finite() { found } else { 0.0 }, span_s))
     }
-
-    /// The response to an input, the coefficients as they changed in time.
-    fn simulated(&self, o: &Orders, e: &[f64]) -> Vec<f64> {
-        let mut w = vec![0.0; e.len()];
-        for k in 0..e.len() {
-            let row = ((k + 1) / self.every()).saturating_sub(1).min(self.len() - 1);
-            let theta = self.theta(row);
-            let (a, b) = (&theta[..o.na], &theta[o.na..o.na + o.nb]);
-            let f = &theta[theta.len() - o.nf..];
-            let input = |lag: usize| if k >= lag { e[k - lag] } else { 0.0 };
-            let past = |lag: usize| if k >= lag { w[k - lag] } else { 0.0 };
-            let mut now: f64 = b.iter().enumerate().map(|(j, b)| b * input(o.nk + j)).sum();
-            // G = A F, term by term.
-            for i in 0..=o.na {
-                for j in 0..=o.nf {
-                    if i + j > 0 {
-                        let a_i = if i == 0 { 1.0 } else { a[i - 1] };
-                        let f_j = if j == 0 { 1.0 } else { f[j - 1] };
-                        now -= a_i * f_j * past(i + j);
-                    }
-                }
-            }
-            w[k] = now;
-        }
-        w
-    }
 }
 
-/// The options with the covariance at the start whose trace of the record explains most of a second
-/// run; of two that explain the same, the smaller.
-///
-/// # Errors
-/// [`IdentError`] for a method without such a covariance, one that is given already, and as
-/// [`track_from`] and [`Trace::vaf_of`].
-pub fn choose_covariance(
-    record: &Record,
-    validation: &Record,
-    options: &TrackOptions,
-) -> Result<(TrackOptions, CovarianceChoice), IdentError> {
+/// What a second run must be, and what its trace.
+fn check(other: &Record, options: &TrackOptions, ts: SampleTime) -> Result<(), IdentError> {
+    let found = other.sample_time();
+    if !found.matches(ts) {
+        return Err(IdentError::MixedSampling {
+            label: other.label().to_owned(),
+            found: found.s(),
+            expected: ts.s(),
+        });
+    }
+    if other.input_channel().is_none() {
+        return Err(IdentError::NoInput {
+            structure: options.structure.label(),
+            label: other.label().to_owned(),
+        });
+    }
+    if options.method.track_delay_s().is_some() || options.method.starts_itself() {
+        return Err(bad(
+            "the validation of a trace",
+            "a delay that moves".to_owned(),
+            "a method with a delay that is given, without track_delay",
+        ));
+    }
+    Ok(())
+}
+
+/// The response to an input from a sample on, at rest before it, the coefficients as they are at each.
+fn simulated<'t>(o: &Orders, e: &[f64], first: usize, theta_at: impl Fn(usize) -> &'t [f64]) -> Vec<f64> {
+    let mut w = vec![0.0; e.len()];
+    for k in first..e.len() {
+        let theta = theta_at(k);
+        let (a, b) = (&theta[..o.na], &theta[o.na..o.na + o.nb]);
+        let f = &theta[theta.len() - o.nf..];
+        let input = |lag: usize| if k >= lag { e[k - lag] } else { 0.0 };
+        let past = |lag: usize| if k >= first + lag { w[k - lag] } else { 0.0 };
+        let mut now: f64 = b.iter().enumerate().map(|(j, b)| b * input(o.nk + j)).sum();
+        // G = A F, term by term.
+        for i in 0..=o.na {
+            for j in 0..=o.nf {
+                if i + j > 0 {
+                    let a_i = if i == 0 { 1.0 } else { a[i - 1] };
+                    let f_j = if j == 0 { 1.0 } else { f[j - 1] };
+                    now -= a_i * f_j * past(i + j);
+                }
+            }
+        }
+        w[k] = now;
+    }
+    w
+}
+
+/// A method whose gain has a covariance.
+fn check_method(options: &TrackOptions) -> Result<(), IdentError> {
     let method = &options.method;
     let has_p = method
         .settings()
@@ -155,6 +167,22 @@ pub fn choose_covariance(
             "a method with the option covariance, as rls or rpem, and a way of forgetting that has P",
         ));
     }
+    Ok(())
+}
+
+/// The options with the covariance at the start whose trace of the record explains most of a second
+/// run; of two that explain the same, the smaller.
+///
+/// # Errors
+/// [`IdentError`] for a method without such a covariance, one that is given already, and as
+/// [`track_from`] and [`Trace::vaf_of`].
+pub fn choose_covariance(
+    record: &Record,
+    validation: &Record,
+    options: &TrackOptions,
+) -> Result<(TrackOptions, CovarianceChoice), IdentError> {
+    check_method(options)?;
+    let method = &options.method;
     if let Some(given) = method.covariance() {
         return Err(bad(
             COVARIANCE,
@@ -191,4 +219,81 @@ pub fn choose_covariance(
         span_s,
     };
     Ok((options, choice))
+}
+
+/// How P follows the VAF of a second run.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CovarianceUpdates {
+    /// Time between two looks at the second run, s.
+    pub interval_s: f64,
+    /// Length of the second run that is looked at, s.
+    pub window_s: f64,
+    /// Smallest factor of P.
+    pub least: f64,
+    /// Power of the ratio of what is not explained; 0 leaves P alone.
+    pub power: f64,
+}
+
+/// Set on runs of their own (the page "The survey's methods" of the book).
+impl Default for CovarianceUpdates {
+    fn default() -> Self {
+        Self {
+            interval_s: 0.5,
+            window_s: 5.12,
+            least: 0.1,
+            power: 4.0,
+        }
+    }
+}
+
+/// As [`crate::track()`], with a covariance that shrinks where the estimate has come to explain less of a
+/// second run.
+///
+/// # Errors
+/// As [`crate::track()`]; [`IdentError`] for a method without such a covariance or with a delay that moves,
+/// and a second run that is sampled otherwise, shorter, or without an input.
+pub fn track_validated(
+    record: &Record,
+    validation: &Record,
+    options: &TrackOptions,
+    updates: &CovarianceUpdates,
+    every: usize,
+) -> Result<Trace, IdentError> {
+    let ts = record.sample_time();
+    check_method(options)?;
+    check(validation, options, ts)?;
+    if validation.len() < record.len() {
+        return Err(bad(
+            "the run for validation",
+            format!("{} samples", validation.len()),
+            &format!("the {} of the run that is tracked, or more", record.len()),
+        ));
+    }
+    let samples = |time_s: f64| ((time_s / ts.s()).round() as usize).max(1);
+    let [interval, window, settling] = [updates.interval_s, updates.window_s, SETTLING_S].map(samples);
+    let o = options.polynomial_orders();
+    let (e, u) = (validation.input(), validation.output());
+    let unexplained = |theta: &[f64], end: usize| -> f64 {
+        let first = end.saturating_sub(window);
+        let from = first.saturating_sub(settling);
+        // The input of nk before is that of the run too.
+        let begin = from.saturating_sub(o.nk + o.nb);
+        let w = simulated(&o, &e[begin..end], from - begin, |_| theta);
+        let error: f64 = (first..end).map(|k| (u[k] - w[k - begin]).powi(2)).sum();
+        error / (first..end).map(|k| u[k] * u[k]).sum::<f64>()
+    };
+    let mut before: Option<Vec<f64>> = None;
+    track_with(record, options, every, None, &mut |tracker, k| {
+        let last = before.get_or_insert_with(|| tracker.theta().to_vec());
+        if !(k + 1).is_multiple_of(interval) {
+            return;
+        }
+        let ratio = unexplained(last, k + 1) / unexplained(tracker.theta(), k + 1);
+        if ratio < 1.0 {
+            tracker
+                .recursion
+                .scale_covariance(ratio.powf(updates.power).max(updates.least));
+        }
+        last.copy_from_slice(tracker.theta());
+    })
 }

@@ -1,6 +1,6 @@
 //! The start covariance that a second run chooses, and what a trace explains of that run.
 
-#![allow(clippy::unwrap_used)]
+#![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 use hoid_ident::validation::vaf;
 use hoid_model::{
@@ -8,7 +8,9 @@ use hoid_model::{
     scenario::{Condition, RemnantStrength, Scenario},
 };
 use hoid_sim::{RunSeed, Simulator};
-use hoid_track::{COVARIANCES, Method, StartAt, TrackOptions, choose_covariance, track};
+use hoid_track::{
+    COVARIANCES, CovarianceUpdates, Method, StartAt, TrackOptions, choose_covariance, track, track_validated,
+};
 
 const NK: usize = 29;
 
@@ -134,4 +136,65 @@ fn what_cannot_choose_is_refused_with_what_to_do() {
     assert!(found.contains("VAF of 0 %"), "{found}");
     let alone = Record::of_output(record.sample_time(), Channel::new("u", "", u)).unwrap();
     assert!(says(&alone, &options(Method::rls())).contains("no input"));
+}
+
+/// With a power of zero nothing is changed, to the last bit; with the usual one P shrinks and the estimate
+/// of a person who changes is better in what the text names, the oscillations.
+#[test]
+fn the_covariance_shrinks_where_less_is_explained() {
+    let (mut usual, mut updated, mut differs) = (0.0, 0.0, false);
+    for seed in 20..26 {
+        let (record, other) = (run(0.2, seed), run(0.2, seed + 100));
+        let settings = [
+            ("memory", "256"),
+            ("covariance", "0.1"),
+            ("limit", "inf"),
+            ("stable", "noise"),
+        ];
+        let text = options(Method::rpem()).with(&settings).unwrap();
+        let alone = CovarianceUpdates {
+            power: 0.0,
+            ..CovarianceUpdates::default()
+        };
+        let plain = track(&record, &text, 1).unwrap();
+        let left = track_validated(&record, &other, &text, &alone, 1).unwrap();
+        let by_vaf = track_validated(&record, &other, &text, &CovarianceUpdates::default(), 1).unwrap();
+        for k in (0..plain.len()).step_by(500) {
+            assert_eq!(plain.theta(k), left.theta(k), "{k}");
+            differs |= plain.theta(k) != by_vaf.theta(k);
+        }
+        usual += plain.vaf_of(&other).unwrap().0;
+        updated += by_vaf.vaf_of(&other).unwrap().0;
+    }
+    println!(
+        "VAF of the second run, mean of six: {:.2} %, with updates {:.2} %",
+        usual / 6.0,
+        updated / 6.0
+    );
+    assert!(differs && updated > usual, "{usual} {updated}");
+    let (record, other) = (run(0.1, 30), run(0.1, 31).span(0.0, 60.0).unwrap());
+    let says = |other: &Record, options: TrackOptions| {
+        let updates = CovarianceUpdates::default();
+        track_validated(&record, other, &options, &updates, 1)
+            .unwrap_err()
+            .to_string()
+    };
+    assert!(says(&other, options(Method::rpem())).contains("6000 samples"));
+    assert!(says(&record, options(Method::window())).contains("rls or rpem"));
+    let tracked = options(Method::rpem()).with(&[("track_delay", "0.2..0.4")]).unwrap();
+    assert!(says(&record, tracked).contains("without track_delay"));
+    // A second run in which nothing happens says nothing.
+    let n = record.len();
+    let silent = Record::new(
+        record.sample_time(),
+        Channel::new("e", "", vec![0.0; n]),
+        Channel::new("u", "", vec![0.0; n]),
+    );
+    let silent = silent.unwrap();
+    let updates = CovarianceUpdates::default();
+    let found = track_validated(&record, &silent, &options(Method::rls()), &updates, n).unwrap();
+    assert_eq!(
+        found.theta(0),
+        track(&record, &options(Method::rls()), n).unwrap().theta(0)
+    );
 }

@@ -571,6 +571,7 @@ def track(
     moving_average: int | None,
     every: int,
     validate: Record | None,
+    update_covariance: bool,
     progress: _Progress,
 ) -> Trace: ...
 def without_level(records: Sequence[Record], structure: str) -> list[dict[str, Any]] | None: ...

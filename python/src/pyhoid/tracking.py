@@ -43,6 +43,7 @@ def track(
     start_span: tuple[float, float] | None = None,
     update_from: float | None = None,
     validate: Record | None = None,
+    update_covariance: bool = False,
     moving_average: float | None = None,
     every: int = 1,
     progress: Progress = False,
@@ -85,6 +86,9 @@ def track(
         A second run of the same person in the same task. `covariance` is then the one of a grid
         whose trace explains most of it (VAF); ``trace.covariance_choice`` has the table. For methods
         with `covariance`, which is not given then.
+    update_covariance : bool
+        With `validate`: P is not chosen at the start but made smaller in course, every half a
+        second in which the estimate has come to explain less of the second run.
     moving_average : float, optional
         Replace each estimate by the mean over this many seconds.
     every : int
@@ -116,12 +120,14 @@ def track(
     shared = {
         name: value
         for name, value in locals().items()
-        if name not in ("record", "progress", "settings", "validate")
+        if name not in ("record", "progress", "settings", "validate", "update_covariance")
     }
     if not isinstance(record, Record):
         raise DataError(f"expected a pyhoid.Record, found {type(record).__name__}")
     if validate is not None and not isinstance(validate, Record):
         raise DataError(f"validate: expected a pyhoid.Record, found {type(validate).__name__}")
+    if update_covariance and validate is None:
+        raise OptionError("update_covariance belongs to validate, a second run; give it too")
     options = _recursion.plain(shared, settings)
     if start_span is not None and isinstance(start, Mapping):
         raise OptionError(
@@ -151,9 +157,11 @@ def track(
         moving_average=rows,
         every=int(every),
         validate=validate,
+        update_covariance=bool(update_covariance),
         progress=_options.reporter(progress, "candidates"),
     )
-    again = shared | settings | {"validate": validate}
+    by_run = {"validate": validate, "update_covariance": update_covariance}
+    again = shared | settings | by_run
     return Trace(native, record, shared | settings, Call("track", (record,), again))
 
 

@@ -254,6 +254,7 @@ const HEADINGS: [(&str, &[&str]); 2] = [
         &[
             "controlled_element",
             "validate",
+            "update_covariance",
             "horizon",
             "figure",
             "width",

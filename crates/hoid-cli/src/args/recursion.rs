@@ -74,8 +74,12 @@ pub struct TrackArgs {
     pub update_from: Option<f64>,
     /// A second run of the same person in the same task: the start covariance (--covariance) is the one
     /// whose trace explains most of it (VAF) [for methods with --covariance]
-    #[arg(long, value_name = "FILE", conflicts_with = "covariance")]
+    #[arg(long, value_name = "FILE")]
     pub validate: Option<PathBuf>,
+    /// With --validate: P is not chosen at the start but made smaller in course, every half a second in
+    /// which the estimate has come to explain less of the second run
+    #[arg(long, requires = "validate")]
+    pub update_covariance: bool,
     /// Mean of the estimate over the last S seconds in place of each; it lags by S/2
     #[arg(long, value_name = "S")]
     pub moving_average: Option<f64>,

@@ -24,7 +24,7 @@ use hoid_ident::{IdentError, settings, settings::Bounds};
 
 use super::rpem::LIMIT;
 use crate::{
-    gain::{self, Gain},
+    gain::{self, Gain, Scaled},
     kernel::{Kernel, Plan},
     memory::{Memory, MemoryOptions},
     method::{About, RecursiveMethod, check_operator_orders},
@@ -237,6 +237,10 @@ impl Recursion for FusedRecursion {
         let y = self.filtered(0.0);
         let predicted = -self.rls.step_without_update(x, y).innovation;
         self.remember(crate::past::bounded(predicted));
+    }
+
+    fn scale_covariance(&mut self, factor: f64) -> bool {
+        self.rls.adaptation_mut().scale(factor) && self.rpem.scale_covariance(factor)
     }
 
     fn theta(&self) -> &[f64] {

@@ -4,7 +4,9 @@ use std::path::Path;
 
 use hoid::io::{check_table_path, write_table};
 use hoid::model::Record;
-use hoid::track::{StartAt, TrackOptions, choose_covariance, track, usual_start_span};
+use hoid::track::{
+    CovarianceUpdates, StartAt, TrackOptions, choose_covariance, track, track_validated, usual_start_span,
+};
 
 use super::{report, result::Tracked};
 use crate::{
@@ -17,6 +19,13 @@ use crate::{
 
 pub fn run(args: &TrackArgs) -> Result<(), CliError> {
     check_table_path(&args.out)?;
+    let given = |name: &str| args.recursion.settings.given().any(|(option, _)| option == name);
+    if args.validate.is_some() && !args.update_covariance && given("covariance") {
+        return Err(CliError::Usage(
+            "--covariance gives the start covariance, and --validate chooses it; drop one, or add --update-covariance"
+                .to_owned(),
+        ));
+    }
     if !args.batch.is_empty() && args.report.is_none() {
         return Err(CliError::Usage("--batch belongs to --report".to_owned()));
     }
@@ -55,15 +64,27 @@ pub fn run(args: &TrackArgs) -> Result<(), CliError> {
         update_from_s: update_from(args, &record)?,
         ..options
     };
-    let (options, covariance) = match &args.validate {
-        Some(path) => {
-            let (validation, _) = reading::read(path, &args.read, with_input)?;
-            let (options, choice) = choose_covariance(&record, &validation, &options)?;
-            (options, Some((path.display().to_string(), choice)))
-        }
-        None => (options, None),
+    let validation = match &args.validate {
+        Some(path) => Some((
+            path.display().to_string(),
+            reading::read(path, &args.read, with_input)?.0,
+        )),
+        None => None,
     };
-    let trace = track(&record, &options, args.every)?;
+    let mut covariance = None;
+    let mut options = options;
+    let trace = match &validation {
+        Some((_, other)) if args.update_covariance => {
+            track_validated(&record, other, &options, &CovarianceUpdates::default(), args.every)?
+        }
+        Some((file, other)) => {
+            let choice;
+            (options, choice) = choose_covariance(&record, other, &options)?;
+            covariance = Some((file.clone(), choice));
+            track(&record, &options, args.every)?
+        }
+        None => track(&record, &options, args.every)?,
+    };
     let rows = averaged_rows(args, &record)?;
     let trace = trace.moving_average(rows);
 
@@ -77,6 +98,12 @@ pub fn run(args: &TrackArgs) -> Result<(), CliError> {
             choice.vaf()
         );
         settings.push(("covariance chosen".to_owned(), words));
+    }
+    if let (Some((file, _)), true) = (&validation, args.update_covariance) {
+        settings.push((
+            "covariance updated".to_owned(),
+            format!("by what the estimate explains of {file}, VAF"),
+        ));
     }
     settings.push((
         "start".to_owned(),
