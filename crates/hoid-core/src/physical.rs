@@ -333,6 +333,11 @@ impl<S: Shape, const N: usize, const K: usize, const L: usize, A: Adaptation<N>>
         &self.adaptation
     }
 
+    /// Delay of b0 in samples where tau_e is one of the parameters: its whole samples, and that of the hold.
+    pub fn nk(&self) -> usize {
+        self.polynomials.whole_samples + 1
+    }
+
     /// The adaptation, to be changed from outside.
     pub fn adaptation_mut(&mut self) -> &mut A {
         &mut self.adaptation

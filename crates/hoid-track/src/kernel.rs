@@ -21,7 +21,7 @@ use hoid_ident::IdentError;
 
 use crate::{
     gain::{self, Gain, Scaled},
-    recursion::{Recursion, Sample, StepOutcome},
+    recursion::{Delay, Recursion, Sample, StepOutcome},
     setup::Setup,
     start::{self, StartState},
 };
@@ -354,6 +354,14 @@ impl<
 
     fn scale_covariance(&mut self, factor: f64) -> bool {
         self.recursion.adaptation_mut().scale(factor)
+    }
+
+    fn delay(&self) -> Option<Delay> {
+        let tau_e_s = self.operator()?.tau_e_s;
+        self.tracked.then(|| Delay {
+            nk: self.recursion.nk(),
+            tau_e_s,
+        })
     }
 
     fn theta(&self) -> &[f64] {

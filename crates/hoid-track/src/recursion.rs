@@ -34,7 +34,7 @@ impl From<Step> for StepOutcome {
     }
 }
 
-/// A delay that is followed in whole samples.
+/// A delay that is followed, and that of the polynomials.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Delay {
     /// Delay of b0 of the polynomials, samples.
@@ -86,7 +86,7 @@ pub(crate) trait Recursion: State + Send + Sync {
     fn scale_covariance(&mut self, _factor: f64) -> bool {
         false
     }
-    /// The delay at present, where it is followed beside the polynomials.
+    /// The delay at present, where it is followed.
     fn delay(&self) -> Option<Delay> {
         None
     }

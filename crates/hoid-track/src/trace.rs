@@ -27,7 +27,7 @@ pub struct Trace {
     pub(crate) covariance: Vec<f64>,
     /// The operator itself, for a recursion in physical parameters.
     pub(crate) operator: Vec<OperatorEstimate>,
-    /// The delay of each row, where it is followed in whole samples.
+    /// The delay of each row, where it is followed.
     pub(crate) delays: Vec<Delay>,
     /// The responses that are not those of the polynomials, at each frequency of the options.
     pub(crate) responses: Vec<f64>,

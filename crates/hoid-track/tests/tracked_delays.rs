@@ -93,6 +93,35 @@ fn a_delay_that_changes_is_followed_and_one_that_stays_is_kept() {
     }
 }
 
+/// `physical` moves B along the input as tau_e grows; its response moves too.
+#[test]
+fn the_response_of_physical_has_the_delay_of_its_row() {
+    let record = run(0.34, 0.1);
+    let physical = TrackOptions {
+        start: StartAt::Span(Some((0.0, 30.72))),
+        at_rad_s: vec![2.5],
+        ..TrackOptions::usual(Method::physical(), NK)
+    };
+    // A memory that lets the delay go.
+    let options = physical
+        .with(&[("track_delay", "0.2..0.4"), ("memory_of", "tau_e=5s")])
+        .unwrap();
+    let trace = track(&record, &options, 8).unwrap();
+    let last = trace.len() - 1;
+    let (tau, phase) = (
+        trace.operator(last).unwrap().tau_e_s.value,
+        trace.response(last, 0).unwrap().phase_deg().value,
+    );
+    // That of the operator of the row, not of the delay of the start fit.
+    let found = trace.operator(last).unwrap();
+    let square = found.omega_nm_rad_s.value.powi(2);
+    let lead = (2.5 * found.t_l_s.value).atan();
+    let lag = (2.0 * found.zeta_nm.value * found.omega_nm_rad_s.value * 2.5).atan2(square - 6.25);
+    let expected = (lead - lag - 2.5 * (tau + 0.005)).to_degrees();
+    assert!((phase - expected).abs() < 0.05, "{phase} for {expected}, tau_e {tau}");
+    assert!((tau - 0.28).abs() > 0.02, "the delay has moved: {tau}");
+}
+
 /// Phase of the true operator of the last sample at 2.5 rad/s, behind its hold.
 fn true_phase_deg(record: &Record) -> f64 {
     let of = |name: &str| record.channel(name).unwrap()[record.len() - 1];
