@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from . import _options, _pyhoid, _recursion
+from ._decimation import decimated
 from ._options import Order, Progress
 from ._settings import METHODS, SETTINGS
 from ._pickling import Call
@@ -44,6 +45,7 @@ def track(
     update_from: float | None = None,
     moving_average: float | None = None,
     every: int = 1,
+    decimate: int | str = "auto",
     progress: Progress = False,
     **settings: Unpack[MethodSettings],
 ) -> Trace:
@@ -84,6 +86,10 @@ def track(
         Replace each estimate by the mean over this many seconds.
     every : int
         Keep every n-th sample.
+    decimate : "auto", "off" or int
+        Track every n-th sample behind a linear-phase low-pass filter; ``"auto"``: above 200 Hz by the
+        number that comes nearest to 100 Hz, unless `nk` is given or the method counts samples (its
+        memory or orders are those of a polynomial). ``trace.record`` is the decimated record.
     progress : bool or callable
         As in `identify`.
     **settings
@@ -127,6 +133,10 @@ def track(
         )
     if every < 1:
         raise OptionError(f"every is {every}, expected 1 or more")
+    read = record
+    (record,) = decimated((read,), decimate, counts_samples=_pyhoid.counts_samples(options))
+    # Rows as far apart as samples of the record were to be.
+    every = max(int(np.floor(every * read.sample_time / record.sample_time + 0.5)), 1)
     rows = None
     if moving_average is not None:
         if not 0 <= moving_average <= len(record) * record.sample_time:
@@ -145,7 +155,8 @@ def track(
         every=int(every),
         progress=_options.reporter(progress, "candidates"),
     )
-    return Trace(native, record, shared | settings, Call("track", (record,), shared | settings))
+    again = shared | settings | {"every": every, "decimate": "off"}
+    return Trace(native, record, shared | settings, Call("track", (record,), again))
 
 
 track.__doc__ = (track.__doc__ or "").format(methods=METHODS, settings=SETTINGS)
