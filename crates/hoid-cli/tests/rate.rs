@@ -20,9 +20,11 @@ use common::{bad, good, hoid, json};
 fn simulate(at: &Path, person: &str, hz: f64, seed: u64) -> String {
     let file = format!("{person}-{hz}-{seed}.csv");
     let (ts, seed) = (format!("{:?}", 1.0 / hz), seed.to_string());
+    // Four periods, or three where these are no whole samples of four.
+    let (measurement_s, run_in_s) = if ts == "0.003" { (60.0, 6.0) } else { (80.0, 8.0) };
     let toml = |form: &str, gains: &str, element: &str| {
         format!(
-            "form = \"{form}\"\nsample_time_s = {ts}\nmeasurement_s = 80.0\nrun_in_s = 8.0\n[initial]\n{gains}\n\
+            "form = \"{form}\"\nsample_time_s = {ts}\nmeasurement_s = {measurement_s}\nrun_in_s = {run_in_s}\n[initial]\n{gains}\n\
              omega_nm_rad_s = 12.0\nzeta_nm = 0.3\ntau_e_s = 0.15\ncontrolled_element = \"{element}\"\n\
              [disturbance]\nperiod_s = 20.0\nlargest_multiple = 60\nrms = 1.0\n\
              [[remnant]]\nshape = \"lag\"\nshare = 0.1\nT_n_s = 0.3\n"
@@ -197,7 +199,7 @@ fn what_counts_samples_keeps_them() {
 fn rates_of_all_kinds() {
     let directory = TempDir::new().unwrap();
     let at = directory.path();
-    for (hz, factor) in [(200.0, 1), (250.0, 3), (1000.0 / 3.0, 3), (2000.0, 20)] {
+    for (hz, factor) in [(200.0, 1), (250.0, 3), (1.0 / 0.003, 3), (2000.0, 20)] {
         let file = simulate(at, "gain", hz, 1);
         let found = json(at, &["describe", &file, "--json"]);
         let ts = found["records"][0]["sample_time"].as_f64().unwrap();
@@ -237,7 +239,8 @@ fn a_stream_at_1000_hz_is_the_track() {
     let directory = TempDir::new().unwrap();
     let at = directory.path();
     let file = simulate(at, "lead", 1000.0, 1);
-    good(at, &["track", &file, "--to", "20", "--out", "trace.csv"]);
+    // Of any worth: 20 s are few.
+    hoid(at, &["track", &file, "--to", "20", "--out", "trace.csv"]);
     let text = fs::read_to_string(at.join(&file)).unwrap();
     let rows: Vec<&str> = text
         .lines()

@@ -158,7 +158,7 @@ fn what_is_done_is_told_in_every_form() {
     );
     let trace = fs::read_to_string(at.join("trace.csv")).unwrap();
     assert!(
-        trace.contains("# preparation: 100 Hz to 25 Hz by a linear-phase filter"),
+        trace.contains("# preparation: 100 Hz, filtered and decimated by 4 to 25 Hz"),
         "{}",
         &trace[..600]
     );

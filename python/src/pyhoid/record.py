@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from difflib import get_close_matches
 from typing import TYPE_CHECKING, Any
 
@@ -427,7 +427,7 @@ class Record:
             "output_name",
             "input_lead",
         )
-        return (_record_of, ({key: getattr(self, key) for key in keys},))
+        return (_record_of, ({key: getattr(self, key) for key in keys}, list(self.steps)))
 
     def _rows(self) -> list[list[str]]:
         rows = []
@@ -456,8 +456,9 @@ class Record:
         )
 
 
-def _record_of(parts: Mapping[str, Any]) -> Record:
+def _record_of(parts: Mapping[str, Any], steps: Sequence[str] = ()) -> Record:
     """A record out of its pickle, checked as one that is made by hand."""
     record = Record._of(parts)
+    record.steps = list(steps)
     _pyhoid.check_record(record)
     return record

@@ -246,7 +246,7 @@ fn what_cannot_be_done_is_said() {
     for (preparation, n, words) in [
         (rate(NewRate::Decimated(0)), 10, "found a factor of 0"),
         (rate(NewRate::Decimated(4)), 1, "found 1 samples for a filter"),
-        (rate(NewRate::Decimated(4)), 100, "a longer record"),
+        (rate(NewRate::Decimated(4)), 50, "a longer record"),
         (rate(NewRate::Decimated(usize::MAX)), 200, "a longer record"),
         (rate(NewRate::Hz(f64::NAN)), 200, "expected a positive"),
         (rate(NewRate::Hz(-1.0)), 200, "expected a positive"),

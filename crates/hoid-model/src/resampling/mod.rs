@@ -4,7 +4,7 @@
 //! linear phase,
 //!
 //! ```text
-//! x'(k) = sum_n h(n) x(k M - n),    k = 0 .. floor(N/M) - 1
+//! x'(k) = sum_n h(n) x(k M - n),    k = 0 .. round(N/M) - 1
 //! ```
 //!
 //! (R. E. Crochiere and L. R. Rabiner, *Multirate Digital Signal Processing*, 1983, chapter 2). h is

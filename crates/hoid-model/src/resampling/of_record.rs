@@ -45,10 +45,12 @@ impl Record {
                 "a longer record, or a smaller factor; decimate off keeps the rate".to_owned(),
             ));
         };
+        // As long as it was, to half a new sample: whole periods stay whole.
+        let new_samples = (n + factor / 2) / factor;
         let (label, start_s) = (self.label().to_owned(), self.time_s(0));
         let (input, output, others) = self.into_channels();
         let at = |first: f64, channel: Channel| Channel {
-            values: filtered(kernel, &channel.values, first, factor, n / factor),
+            values: filtered(kernel, &channel.values, first, factor, new_samples),
             ..channel
         };
         let output = at(0.0, output);
