@@ -3,6 +3,8 @@
 
 mod common;
 
+use std::{fs, path::Path};
+
 use common::{reals, texts};
 use hoid_ident::frequency::{DescriptionOptions, describe_runs};
 use hoid_io::{ReadOptions, read_record, read_table};
@@ -13,24 +15,37 @@ use hoid_study::{
     group::{Manifest, NumberOrText, PeopleExperiment, PreparationSettings, run_group, simulate_people},
 };
 
-#[test]
-fn a_group_at_1000_hz_is_that_at_100_hz() {
+/// A person's runs at a rate, analysed: the manifest, and crossover, margin and delay with their errors.
+fn analysed(directory: &Path, sample_time_s: f64) -> (Manifest, [(f64, f64); 3]) {
     let experiment = PeopleExperiment {
         subjects: 1,
         plants: vec![Plant::Integrator],
         remnants: vec![RemnantKind::BroadBand],
         runs: 3,
         between_runs: 0.0,
-        sample_time: SampleTime::new(0.001).unwrap(),
+        sample_time: SampleTime::new(sample_time_s).unwrap(),
+        seed: 3,
         ..PeopleExperiment::default()
     };
-    let directory = tempfile::tempdir().unwrap();
-    let (files, out) = (directory.path().join("files"), directory.path().join("out"));
+    let (files, out) = (directory.join("files"), directory.join("out"));
     let mut manifest = simulate_people(&experiment, &files, &|| ()).unwrap();
     manifest.analysis.methods.clear();
     manifest.analysis.each_run = false;
     run_group(&manifest, &files, &out, &RunOptions::default(), &|_| (), &|| true).unwrap();
+    let people = read_table(&out.join("people.parquet")).unwrap();
+    let of = |name: &str| (reals(&people, name)[0], reals(&people, &format!("{name}_se"))[0]);
+    (manifest, ["crossover_rad_s", "phase_margin_deg", "tau_e"].map(of))
+}
 
+#[test]
+fn a_group_at_1000_hz_is_that_at_100_hz() {
+    let directory = tempfile::tempdir().unwrap();
+    let (fast, slow) = (directory.path().join("fast"), directory.path().join("slow"));
+    fs::create_dir(&fast).unwrap();
+    fs::create_dir(&slow).unwrap();
+    let (manifest, found) = analysed(&fast, 0.001);
+    let (_, at_100_hz) = analysed(&slow, 0.01);
+    let (files, out) = (fast.join("files"), fast.join("out"));
     let steps = read_table(&out.join("preparation.parquet")).unwrap();
     let said = "1000 Hz, filtered and decimated by 10 to 100 Hz";
     let told = texts(&steps, "step").iter().zip(texts(&steps, "what"));
@@ -41,14 +56,17 @@ fn a_group_at_1000_hz_is_that_at_100_hz() {
     );
 
     let truth = read_table(&files.join("truth.csv")).unwrap();
-    let people = read_table(&out.join("people.parquet")).unwrap();
-    for name in ["crossover_rad_s", "phase_margin_deg", "tau_e"] {
-        let (found, error) = (reals(&people, name)[0], reals(&people, &format!("{name}_se"))[0]);
+    let names = ["crossover_rad_s", "phase_margin_deg", "tau_e"];
+    for ((name, found), slow) in names.into_iter().zip(found).zip(at_100_hz) {
         let truth = reals(&truth, name)[0];
-        println!("{name}: {found:.4} +- {error:.4}, true {truth:.4}");
+        println!("{name}: {found:?}, at 100 Hz {slow:?}, true {truth:.4}");
         assert!(
-            (found - truth).abs() < 2.0 * error,
-            "{name}: {found} +- {error}, true {truth}"
+            (found.0 - truth).abs() < 2.0 * found.1,
+            "{name}: {found:?}, true {truth}"
+        );
+        assert!(
+            (found.0 - slow.0).abs() < 2.0 * found.1.hypot(slow.1),
+            "{name}: {found:?} {slow:?}"
         );
     }
 
@@ -72,12 +90,18 @@ fn a_group_at_1000_hz_is_that_at_100_hz() {
     let expected = describe_runs(&whole, &options).unwrap();
     let lines = read_table(&out.join("describing-functions.parquet")).unwrap();
     for (k, (line, phase)) in expected.function.lines.iter().zip(expected.phases_deg()).enumerate() {
-        assert!((reals(&lines, "magnitude_db")[k] - line.magnitude_db().value).abs() < 0.02);
-        assert!(
-            (reals(&lines, "phase_deg")[k] - phase.value).abs() < 0.2,
-            "{}",
-            line.omega_rad_s
-        );
+        // What the filter takes from the ends is noise to the lines: a small part of their errors. The lead
+        // of the input alone would be .26 deg at 1 rad/s.
+        let magnitude = line.magnitude_db();
+        for (name, expected, least) in [("magnitude_db", magnitude, 0.02), ("phase_deg", phase, 0.1)] {
+            let distance = (reals(&lines, name)[k] - expected.value).abs();
+            let most = 0.1 * expected.standard_error.unwrap() + least;
+            println!(
+                "{:.2} rad/s, {name}: {distance:.4}, at most {most:.4}",
+                line.omega_rad_s
+            );
+            assert!(distance < most, "{} rad/s, {name}: {distance}", line.omega_rad_s);
+        }
     }
 }
 
@@ -115,7 +139,7 @@ fn the_rate_of_a_group_as_typed() {
         assert!(message.contains("expected \"auto\""), "{message}");
     }
     assert!(of(number(2.0), Some(50.0)).preparation(None).is_err());
-    let manifest =
-        "[prepare]\ndecimate = \"off\"\n[[runs]]\nsubject = \"a\"\ncondition = \"c\"\nrun = \"1\"\nfile = \"x.csv\"\n";
-    assert!(Manifest::parse(manifest, "group.toml").is_ok());
+    let manifest = "name = \"g\"\n[prepare]\ndecimate = \"off\"\n[[runs]]\nsubject = \"a\"\ncondition = \"c\"\nrun = \"1\"\nfile = \"x.csv\"\n";
+    let read = Manifest::parse(manifest, "group.toml").unwrap();
+    assert_eq!(read.by_rate("c").unwrap().factor(ts), 1);
 }
