@@ -69,7 +69,9 @@ def test_a_tracker_has_the_digits_of_a_track(fast: pyhoid.Record) -> None:
     last = innovations[np.isfinite(innovations)]
     behind = len(trace) - np.flatnonzero(trace["innovation"] == last[-1])[0]
     assert 14 <= behind <= 16
-    assert np.array_equal(trace["innovation"][-behind - 900 : 1 - behind or None][-900:], last[-900:])
+    assert np.array_equal(
+        trace["innovation"][-behind - 900 : 1 - behind or None][-900:], last[-900:]
+    )
     assert pyhoid.Tracker(sample_time=0.001, nk=281).decimation is None
     assert pyhoid.Tracker(sample_time=0.001, decimate="off").decimation is None
     assert pyhoid.Tracker(sample_time=0.005).decimation is None

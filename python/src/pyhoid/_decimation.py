@@ -24,5 +24,7 @@ def decimated(
 
 def said(records: Sequence[Record]) -> str:
     """What was done to the rate of the records, as a line; empty where nothing was."""
-    steps = [step.partition(":")[0] for one in records for step in one.steps if "decimated by" in step]
+    steps = [
+        step.partition(":")[0] for one in records for step in one.steps if "decimated by" in step
+    ]
     return "\n".join(dict.fromkeys(steps))

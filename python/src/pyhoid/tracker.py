@@ -168,7 +168,9 @@ class Tracker(_pyhoid.Tracker):
     @property
     def settings(self) -> dict[str, Any]:
         """The keywords that it was made with, defaults included; a prior from a fit by its source."""
-        shared = {name: self._options[name] for name in _recursion.KEYWORDS if name in self._options}
+        shared = {
+            name: self._options[name] for name in _recursion.KEYWORDS if name in self._options
+        }
         settings = shared | self._options["orders"] | self._options["settings"]
         if self._options["fit"] is not None:
             settings["prior"] = self._options["fit"][1]
