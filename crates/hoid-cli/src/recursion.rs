@@ -10,7 +10,8 @@ use hoid::track::{Method, StartAt, TrackOptions, TrackPlan, ranges_of};
 use crate::{
     args::{RecursionArgs, flag, methods_with},
     error::CliError,
-    orders, output,
+    orders::{self, DelayRange},
+    output,
 };
 
 /// The option that may be a file.
@@ -32,6 +33,15 @@ pub fn structure(args: &RecursionArgs) -> Result<Structure, CliError> {
         Some(structure) => Ok(structure),
         None => Ok(method(args)?.usual_structure()),
     }
+}
+
+/// Whether the recursion is of polynomials, or its delay was typed in samples: such takes the samples as
+/// they are.
+///
+/// # Errors
+/// As [`method`].
+pub fn counts_samples(args: &RecursionArgs) -> Result<bool, CliError> {
+    Ok(matches!(args.nk, Some(DelayRange::Samples(_))) || method(args)?.counts_samples())
 }
 
 /// The method with the options that were typed.

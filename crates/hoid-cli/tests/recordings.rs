@@ -154,11 +154,11 @@ fn what_is_done_is_told_in_every_form() {
     let step = &tracked["records"][0]["preparation"][0];
     assert_eq!(
         (&step["step"], &step["to_hz"], &step["stop_hz"]),
-        (&Value::from("rate"), &Value::from(25.0), &Value::from(12.5))
+        (&Value::from("rate"), &Value::from(25.0), &Value::from(15.0))
     );
     let trace = fs::read_to_string(at.join("trace.csv")).unwrap();
     assert!(
-        trace.contains("# preparation: 100 Hz to 25 Hz by a linear-phase filter"),
+        trace.contains("# preparation: 100 Hz, filtered and decimated by 4 to 25 Hz"),
         "{}",
         &trace[..600]
     );
@@ -249,7 +249,7 @@ fn wrong_preparations_are_told_in_the_users_words() {
         (&["--scale", "e=rad:N"], 2, "two units of one kind"),
         (&["--offset", "u=4000"], 1, "u=4000 samples in a record of 3998 samples"),
         (&["--offset", "u=x"], 2, "expected a number of samples"),
-        (&["--decimate", "0"], 1, "factor 0"),
+        (&["--decimate", "0"], 2, "expected auto, off"),
         (&["--decimate", "5000"], 1, "a longer record"),
         (&["--decimate", "2", "--new-fs", "10"], 2, "cannot be used with"),
         (&["--new-fs", "-3"], 2, "unexpected argument"),

@@ -72,6 +72,16 @@ pub enum ModelError {
         /// The names that exist.
         available: String,
     },
+    /// A sampling rate that cannot be lowered so.
+    #[error("decimation of {label}: found {found}, expected {expected}")]
+    Decimation {
+        /// Label of the record.
+        label: String,
+        /// What was found.
+        found: String,
+        /// What would do.
+        expected: String,
+    },
     /// Two records that do not follow each other.
     #[error("{label} cannot be joined: found {found}, expected {expected}")]
     Joined {

@@ -48,6 +48,7 @@
 //! | [`operator`] | [`OperatorParameters`] and their discrete model |
 //! | [`delayed_operator`](mod@delayed_operator) | the operator with a delay of any fraction of a sample |
 //! | [`operator_family`] | gain, lead and lag with their powers: the operators that people are found to be |
+//! | [`resampling`] | other sampling rates: the filter, and [`Decimation`] of records and streams |
 //! | [`remnant`] | the remnant filter, its discretisations and its retrieval |
 //! | [`remnant_noise`] | the noise model of the exactly held remnant as a function of T_n, with derivatives |
 //! | [`uncertainty`] | standard errors of derived quantities by the delta method |
@@ -85,6 +86,7 @@ pub mod record;
 pub mod remnant;
 pub mod remnant_gain;
 pub mod remnant_noise;
+pub mod resampling;
 pub mod sample_time;
 pub mod scenario;
 pub mod schedule;
@@ -105,6 +107,7 @@ pub use operator::{DiscreteOperator, OperatorParameters};
 pub use operator_family::{FamilyOperator, FittedOperator, Form};
 pub use polynomial_model::PolynomialModel;
 pub use record::{Channel, Detrend, Record};
+pub use resampling::{Decimated, Decimation, Decimator};
 pub use sample_time::SampleTime;
 pub use structure::{MAX_DELAY, MAX_ORDER, Orders, Structure};
 pub use transfer_function::{ContinuousTransferFunction, DiscreteTransferFunction};

@@ -82,7 +82,8 @@ impl From<ModelError> for Failure {
             | ModelError::EmptyRecord { .. }
             | ModelError::DuplicateChannel { .. }
             | ModelError::NoSuchChannel { .. }
-            | ModelError::EmptySpan { .. } => DataError::new_err(text),
+            | ModelError::EmptySpan { .. }
+            | ModelError::Decimation { .. } => DataError::new_err(text),
             ModelError::NotConvertible(_) => NotConvertibleError::new_err(text),
             _ => OptionError::new_err(text),
         })

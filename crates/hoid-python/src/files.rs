@@ -2,7 +2,8 @@
 
 use std::{collections::BTreeMap, path::PathBuf, str::FromStr};
 
-use hoid_io::{ColumnValues, IoError, NewRate, Preparation, ReadOptions, Repair, read_segments, write_record};
+use hoid_io::{ColumnValues, IoError, NewRate, Preparation, ReadOptions, Repair, Step, read_segments, write_record};
+use hoid_model::{Decimation, SampleTime};
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::{prelude::*, types::PyDict};
 
@@ -75,7 +76,13 @@ pub fn read<'py>(
             let steps = read.steps.iter().map(ToString::to_string).collect();
             let issues = read.quality_issues.iter().map(ToString::to_string);
             let notes = read.notes.iter().cloned().chain(issues).collect();
-            Ok((parts(py, read.record)?, steps, notes))
+            let leads = read.steps.iter().map(|step| match step {
+                Step::Rate { input_lead_s, .. } => *input_lead_s,
+                _ => 0.0,
+            });
+            let (lead, parts) = (leads.sum::<f64>(), parts(py, read.record)?);
+            parts.set_item("input_lead", lead)?;
+            Ok((parts, steps, notes))
         })
         .collect()
 }
@@ -120,6 +127,49 @@ pub fn detrended<'py>(py: Python<'py>, record: &Bound<'py, PyAny>, how: &str) ->
     let how = names::detrend(how)?;
     let record = arrays::record(record, Wanted::All)?;
     Ok(parts(py, record.detrended(how))?)
+}
+
+/// The record at a lower rate, and what was done; None where nothing was.
+#[pyfunction]
+#[pyo3(signature = (record, decimate, counts_samples))]
+pub fn decimated<'py>(
+    py: Python<'py>,
+    record: &Bound<'py, PyAny>,
+    decimate: &str,
+    counts_samples: bool,
+) -> Outcome<Option<(Bound<'py, PyDict>, String)>> {
+    let decimation = decimation(decimate)?;
+    let decimation = if counts_samples {
+        decimation.when_named()
+    } else {
+        decimation
+    };
+    let sample_time = SampleTime::new(record.getattr("sample_time")?.extract()?)?;
+    if decimation.factor(sample_time) == 1 {
+        return Ok(None);
+    }
+    let record = arrays::record(record, Wanted::All)?;
+    let (record, done) = py.detach(|| decimation.of(record))?;
+    let Some(done) = done else { return Ok(None) };
+    let parts = parts(py, record)?;
+    parts.set_item("input_lead", done.lead_s)?;
+    Ok(Some((parts, Step::from(done).to_string())))
+}
+
+/// Whether nothing was said of the rate.
+#[pyfunction]
+#[pyo3(signature = (decimate))]
+pub fn decimation_is_auto(decimate: &str) -> Outcome<bool> {
+    Ok(decimation(decimate)? == Decimation::Auto)
+}
+
+/// A decimation as it is typed.
+pub fn decimation(text: &str) -> Outcome<Decimation> {
+    text.parse().map_err(|_| {
+        bad_option(format!(
+            "decimate is {text:?}, expected \"auto\", \"off\" or by how many samples, as 10"
+        ))
+    })
 }
 
 /// A table that hoid has written, as columns by name: numbers, whole numbers, or text.

@@ -72,6 +72,15 @@ pub fn plan(options: &Bound<'_, PyDict>, sample_time: SampleTime) -> Outcome<Tra
     TrackPlan::new(track_options, ranges, criterion, sample_time).map_err(Failure::from)
 }
 
+/// Whether the recursion is of polynomials, or its delay is given in samples: such takes the samples as
+/// they are.
+#[pyfunction]
+#[pyo3(signature = (options))]
+pub fn counts_samples(options: &Bound<'_, PyDict>) -> Outcome<bool> {
+    let orders: BTreeMap<String, (usize, usize)> = get(options, "orders")?.unwrap_or_default();
+    Ok(orders.contains_key("nk") || method(options)?.counts_samples())
+}
+
 /// The method with its options, which come as texts by name.
 fn method(options: &Bound<'_, PyDict>) -> Outcome<Method> {
     let mut method = match get::<String>(options, "method")? {

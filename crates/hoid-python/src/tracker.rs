@@ -1,15 +1,15 @@
 //! `pyhoid.Tracker`: a recursive estimate, live.
 
 use hoid_ident::{Choice, IdentError};
-use hoid_model::{Orders, Record, SampleTime};
-use hoid_track::{Counts, Live, Sample, TrackPlan, Tracker};
+use hoid_model::{Decimation, Decimator, Orders, Record, SampleTime};
+use hoid_track::{Counts, Live, Sample, TrackPlan, Tracker, opened, sealed};
 use numpy::{PyArray1, PyArray2, PyReadonlyArray1};
 use pyo3::{prelude::*, types::PyDict};
 
 use crate::{
     arrays::{self, Wanted, array, matrix},
     errors::{Outcome, bad_option},
-    figures,
+    figures, files,
     fit::PyFit,
     recursion,
 };
@@ -30,6 +30,8 @@ pub struct PyTracker {
     live: Live,
     choice: Option<Choice>,
     sample_time: SampleTime,
+    /// What lowers a high rate: error, control, target.
+    decimator: Option<Decimator<3>>,
 }
 
 /// Searches the open orders on the start record, and runs the filters over it.
@@ -59,7 +61,23 @@ impl PyTracker {
         }
     }
 
+    /// The sample time that is tracked.
+    fn tracked(&self) -> SampleTime {
+        self.decimator.as_ref().map_or(self.sample_time, Decimator::sample_time)
+    }
+
     fn take(&mut self, sample: Sample, update: bool) -> f64 {
+        let sample = match &mut self.decimator {
+            None => sample,
+            Some(decimator) => match decimator.take([sample.e, sample.u, sample.reference.unwrap_or(f64::NAN)]) {
+                Some([e, u, f_t]) => Sample {
+                    e,
+                    u,
+                    reference: Some(f_t).filter(|f| f.is_finite()),
+                },
+                None => return f64::NAN,
+            },
+        };
         if let (Live::Tracking(tracker), false) = (&mut self.live, update) {
             return tracker.update(sample, false).innovation.unwrap_or(f64::NAN);
         }
@@ -84,7 +102,23 @@ impl PyTracker {
         record: Option<Bound<'_, PyAny>>,
     ) -> Outcome<Self> {
         let sample_time = SampleTime::new(sample_time)?;
-        let plan = recursion::plan(options, sample_time)?;
+        let decimation = match options.get_item("decimate")? {
+            Some(text) => files::decimation(&text.extract::<String>()?)?,
+            None => Decimation::Off,
+        };
+        let decimation = if recursion::counts_samples(options)? {
+            decimation.when_named()
+        } else {
+            decimation
+        };
+        let factor = decimation.factor(sample_time);
+        let decimator = match factor {
+            1 => None,
+            factor => Some(Decimator::new(factor, sample_time, [true, false, false])?),
+        };
+        let tracked = decimator.as_ref().map_or(sample_time, Decimator::sample_time);
+        let warm_up = if factor > 1 { (warm_up / factor).max(1) } else { warm_up };
+        let plan = recursion::plan(options, tracked)?;
         if plan.options().method.smooths() {
             return Err(bad_option(
                 "smooth belongs to pyhoid.track: what is still to come cannot say anything of a stream",
@@ -104,19 +138,28 @@ impl PyTracker {
                     sample_time.s()
                 )));
             }
-            let (tracker, choice) = py.detach(|| started(&plan, &record))?;
+            let (tracker, choice) = py.detach(|| {
+                let record = if factor > 1 {
+                    record.decimated(factor)?.0
+                } else {
+                    record
+                };
+                started(&plan, &record)
+            })?;
             return Ok(Self {
                 plan,
                 live: Live::Tracking(Box::new(tracker)),
                 choice,
                 sample_time,
+                decimator,
             });
         }
         Ok(Self {
-            live: Live::new(plan.options(), warm_up, sample_time)?,
+            live: Live::new(plan.options(), warm_up, tracked)?,
             plan,
             choice: None,
             sample_time,
+            decimator,
         })
     }
 
@@ -189,6 +232,12 @@ impl PyTracker {
     #[getter]
     fn sample_time(&self) -> f64 {
         self.sample_time.s()
+    }
+
+    /// How a high rate is lowered; None where it is not.
+    #[getter]
+    fn decimation(&self) -> Option<String> {
+        self.decimator.as_ref().map(|decimator| decimator.done().to_string())
     }
 
     #[getter]
@@ -311,7 +360,7 @@ impl PyTracker {
         let Live::Tracking(tracker) = &self.live else {
             return Ok(None);
         };
-        let event = tracker.event().map(|event| event.at(0.0, self.sample_time));
+        let event = tracker.event().map(|event| event.at(0.0, self.tracked()));
         event.map(|fault| figures::track_fault(py, &fault)).transpose()
     }
 
@@ -332,7 +381,13 @@ impl PyTracker {
 
     /// The orders, once there is a tracker, and all that changes as numbers.
     fn saved<'py>(&mut self, py: Python<'py>) -> PyResult<Saved<'py>> {
-        let (orders, numbers) = self.live.saved();
+        let (orders, mut numbers) = self.live.saved();
+        if let Some(decimator) = &mut self.decimator {
+            let of_tracker = numbers.len();
+            numbers.extend(decimator.saved());
+            numbers = sealed(numbers);
+            numbers.push(of_tracker as f64);
+        }
         let orders = orders.map(|orders| figures::orders(py, &orders)).transpose()?;
         Ok((orders, array(py, numbers)))
     }
@@ -343,7 +398,18 @@ impl PyTracker {
         orders: Option<std::collections::BTreeMap<String, usize>>,
         numbers: PyReadonlyArray1<'_, f64>,
     ) -> Outcome<()> {
-        let numbers = numbers.as_slice().map_err(PyErr::from)?;
+        let mut numbers = numbers.as_slice().map_err(PyErr::from)?;
+        let tracked = self.tracked();
+        if let Some(decimator) = &mut self.decimator {
+            let wrong = || bad_option("the saved tracker is of another rate, or was changed since; save it again");
+            let (of_tracker, all) = numbers.split_last().ok_or_else(wrong)?;
+            let all = opened(all).ok_or_else(wrong)?;
+            let (tracker, of_decimator) = all.split_at_checked(*of_tracker as usize).ok_or_else(wrong)?;
+            if !decimator.restore(of_decimator) {
+                return Err(wrong());
+            }
+            numbers = tracker;
+        }
         let orders = match orders {
             None => None,
             Some(orders) => {
@@ -361,7 +427,7 @@ impl PyTracker {
                 })
             }
         };
-        self.live = Live::restored(&self.plan, orders, numbers, self.sample_time)?;
+        self.live = Live::restored(&self.plan, orders, numbers, tracked)?;
         Ok(())
     }
 }

@@ -113,6 +113,7 @@ pub use person_prior::PersonPrior;
 pub use plan::{TrackPlan, ranges_of, theta_of};
 pub use recursion::Sample;
 pub use response::Response;
+pub use seal::{opened, sealed};
 pub use setup::StartAt;
 pub use shared_options::{BoundOptions, DelayOptions, GainOptions, StabilityOptions, WindupGuard};
 pub use trace::{OPERATOR_COLUMNS, Trace};

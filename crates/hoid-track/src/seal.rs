@@ -14,13 +14,13 @@ const PRIME: u64 = 0x0000_0100_0000_01b3;
 const KEPT: u32 = 53;
 
 /// The numbers and their seal.
-pub(crate) fn sealed(mut numbers: Vec<f64>) -> Vec<f64> {
+pub fn sealed(mut numbers: Vec<f64>) -> Vec<f64> {
     numbers.push(seal(&numbers));
     numbers
 }
 
 /// The numbers before their seal; none where it is another.
-pub(crate) fn opened(sealed: &[f64]) -> Option<&[f64]> {
+pub fn opened(sealed: &[f64]) -> Option<&[f64]> {
     let (stated, numbers) = sealed.split_last()?;
     (stated.to_bits() == seal(numbers).to_bits()).then_some(numbers)
 }

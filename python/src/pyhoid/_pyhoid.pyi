@@ -36,6 +36,9 @@ __all__ = [
     "check_record",
     "convert_discrete",
     "convert_operator",
+    "counts_samples",
+    "decimated",
+    "decimation_is_auto",
     "describe",
     "describing_function",
     "detrended",
@@ -318,6 +321,10 @@ class Tracker:
     @property
     def sample_time(self) -> float: ...
     @property
+    def decimation(self) -> str | None:
+        """How a high rate is lowered; None where it is not."""
+
+    @property
     def method(self) -> str: ...
     @property
     def structure(self) -> str: ...
@@ -374,6 +381,7 @@ def convert_discrete(
     f: tuple[float, float], b: tuple[float, float], nk: int, sample_time: float
 ) -> dict[str, Any]: ...
 def convert_operator(operator: list[tuple[str, float]], sample_time: float) -> dict[str, Any]: ...
+def counts_samples(options: dict[str, Any]) -> bool: ...
 def describe(
     records: Sequence[Record],
     *,
@@ -403,6 +411,10 @@ def describing_function(
     detrend: str,
     smoothing_bins: int,
 ) -> DescribingFunction: ...
+def decimated(
+    record: Record, decimate: str, counts_samples: bool
+) -> tuple[dict[str, Any], str] | None: ...
+def decimation_is_auto(decimate: str) -> bool: ...
 def detrended(record: Record, how: str) -> dict[str, Any]: ...
 def discretise_transfer_function(
     num: list[float], den: list[float], sample_time: float, method: str, prewarp: float | None

@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from . import _options, _pyhoid, _text
 from ._arrays import FloatArray
+from ._decimation import decimated
 from ._pickling import Call, recalled, state_of
 from .errors import OptionError
 from .estimates import Estimate, estimates
@@ -304,6 +305,7 @@ def describe(
     stop: float | None = None,
     offset_samples: float = 0.0,
     detrend: str = "none",
+    decimate: int | str = "auto",
 ) -> Description:
     """Describe how a person responds at the lines of a periodic excitation, without a model.
 
@@ -329,6 +331,8 @@ def describe(
     offset_samples : float
         ``e[k]`` belongs to ``u[k + offset_samples]``.
     detrend : {"none", "mean", "linear"}
+    decimate : "auto", "off" or int
+        As in `identify_operator`. The response at the lines is the same at both rates.
 
     Returns
     -------
@@ -347,7 +351,14 @@ def describe(
     >>> found.open_loop["phase_margin_deg"]
     """
     settings = {name: value for name, value in locals().items() if name != "records"}
-    several = tuple(_options.as_records(records))
+    given = _options.as_records(records)
+    several = decimated(given, decimate)
+    # A ratio of samples knows no hold: what the input was moved for it is taken back.
+    late = offset_samples * given[0].sample_time + several[0].input_lead
+    settings |= {
+        "decimate": "off",
+        "offset_samples": offset_samples * given[0].sample_time / several[0].sample_time,
+    }
     element = None
     if controlled_element is not None:
         element = _options.controlled_element(controlled_element)
@@ -360,7 +371,7 @@ def describe(
             controlled_element=element,
             start=start,
             stop=stop,
-            offset_samples=offset_samples,
+            offset_samples=late / several[0].sample_time,
             detrend=detrend,
         ),
         Call("describe", several, settings),

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Literal, overload
 
 from . import _faults, _options, _pyhoid
+from ._decimation import decimated
 from ._options import Order, Progress
 from ._pickling import Call
 from .errors import OptionError
@@ -98,6 +99,7 @@ if TYPE_CHECKING:
         max_iterations: int
         tolerance: float
         faults: Faults
+        decimate: int | str
         progress: Progress
 
 
@@ -144,6 +146,7 @@ def identify(
     max_iterations: int = 100,
     tolerance: float = 1e-12,
     faults: Faults = "bridge",
+    decimate: int | str = "auto",
     progress: Progress = False,
 ) -> Fit | TimeVaryingFit:
     """Identify a model and the operator's parameters from one or several records.
@@ -210,6 +213,11 @@ def identify(
         bridge what lasts up to 0.1 s and cut at what is longer, cut all, report only, or look for
         none. What was found is ``fit.faults``. Of recorded data a level of u is estimated too
         (``fit.levels``), and ``fit.records`` are without their means; keep leaves data as they are.
+    decimate : "auto", "off" or int
+        Keep every n-th sample behind a linear-phase low-pass filter. ``"auto"``: above 200 Hz by the
+        number that comes nearest to 100 Hz for ``"grey-box"`` and ``"time-varying"``; polynomial
+        structures, whose orders and delay count samples, take all samples unless a number is given.
+        ``fit.records`` are the decimated records.
     progress : bool or callable
         True shows on standard error how far a search is; a callable gets the number of
         candidates done and the number of all.
@@ -268,6 +276,7 @@ def identify(
     given = {key: value for key, (value, default) in usual.items() if value != default}
     _check(name, method.lower(), {**given, **orders})
     several, of_faults, says = _faults.mended(_options.as_records(records), faults)
+    several = decimated(several, decimate, counts_samples=name not in _MODELS)
     # A constant of u: out of the data of a constant model, an unknown of one that changes.
     as_read = several
     level = faults != "keep" and _pyhoid.may_have_level(as_read)
@@ -311,7 +320,7 @@ def identify(
     )
     # The records are mended already: what is looked for in them again is not taken out. Their level is
     # still in them: out of records without it a rest of rounding would be taken, and change the digits.
-    again = settings | {"faults": "keep" if faults == "keep" else "report"}
+    again = settings | {"faults": "keep" if faults == "keep" else "report", "decimate": "off"}
     call = Call("identify", as_read, again)
     if isinstance(found, _pyhoid.TimeVaryingFit):
         change = TimeVaryingFit(found, several, settings, call)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from . import _pyhoid, _text
 from ._arrays import FloatArray
+from ._decimation import said
 from ._pickling import Call, recalled, state_of
 from .estimates import Estimate, channel_units, estimates, unit_of
 from .fit import Fit
@@ -338,7 +339,8 @@ class OperatorFit:
 
     def _closing(self) -> str:
         prior = ", ".join(f"{name} = {c:g}:{s:g}" for name, (c, s) in self.prior.items())
-        return (
+        rate = said(self.records)
+        return (f"{rate}\n" if rate else "") + (
             f"Errors by the scatter of {self.errors['clusters']} {self.errors['kind']}: variances"
             f" {self.errors['inflation']:.2f} times those of white residuals\n"
             f"Loss {_text.number(self.loss)}; {self.termination['reason']} after"

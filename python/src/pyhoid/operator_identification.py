@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from . import _faults, _options, _pyhoid
+from ._decimation import decimated
 from ._options import Order
 from ._pickling import Call
 from .errors import FormatError, OptionError
@@ -96,6 +97,7 @@ def identify_operator(
     max_iterations: int = 100,
     tolerance: float = 1e-9,
     faults: Faults = "bridge",
+    decimate: int | str = "auto",
 ) -> OperatorFit:
     """The operator of a recorded person: form, parameters with errors that hold, and a verdict.
 
@@ -143,6 +145,10 @@ def identify_operator(
         Relative decrease of the loss below which the search has converged.
     faults : {"bridge", "cut", "report", "keep"}
         What is done about faults of the records, as in `identify`.
+    decimate : "auto", "off" or int
+        Keep every n-th sample behind a linear-phase low-pass filter; ``"auto"``: above 200 Hz by the
+        number that comes nearest to 100 Hz. ``fit.records`` are the decimated records, and their
+        ``steps`` say what was done.
 
     Returns
     -------
@@ -166,6 +172,7 @@ def identify_operator(
     """
     settings = {name: value for name, value in locals().items() if name != "records"}
     several, of_faults, says = _faults.mended(_options.as_records(records), faults)
+    several = decimated(several, decimate)
     element = None
     if controlled_element is not None:
         element = _options.controlled_element(controlled_element)
@@ -188,7 +195,7 @@ def identify_operator(
         tolerance=float(tolerance),
         second_opinion=faults != "keep",
     )
-    again = settings | {"faults": "keep" if faults == "keep" else "report"}
+    again = settings | {"faults": "keep" if faults == "keep" else "report", "decimate": "off"}
     fit = OperatorFit(found, several, settings, Call("identify_operator", several, again))
     fit.faults, fit.verdict = of_faults, _faults.joined(says, fit.verdict)
     return fit

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from difflib import get_close_matches
 from typing import TYPE_CHECKING, Any
 
@@ -143,6 +143,7 @@ class Record:
         channels: dict[str, FloatArray],
         input_name: str = "e",
         output_name: str = "u",
+        input_lead: float = 0.0,
         own: bool = False,
     ) -> None:
         kept = _own if own else _read_only
@@ -157,7 +158,10 @@ class Record:
         }
         self.input_name: str = input_name
         self.output_name: str = output_name
-        #: What was done to the numbers when the record was read from a file.
+        #: By how much a sample of e is taken later than that of u beside it, s: in the middle of its
+        #: hold where the record was decimated.
+        self.input_lead: float = input_lead
+        #: What was done to the numbers, when the record was read from a file and since.
         self.steps: list[str] = []
 
     @classmethod
@@ -335,8 +339,10 @@ class Record:
             channels={name: values[first:end] for name, values in self.channels.items()},
             input_name=self.input_name,
             output_name=self.output_name,
+            input_lead=self.input_lead,
             own=True,
         )
+        record.steps = list(self.steps)
         return record
 
     def detrended(self, how: Detrending = "mean") -> Record:
@@ -344,7 +350,31 @@ class Record:
 
         >>> record.detrended("linear")
         """
-        return Record._of(_pyhoid.detrended(self, how))
+        record = Record._of(_pyhoid.detrended(self, how) | {"input_lead": self.input_lead})
+        record.steps = list(self.steps)
+        return record
+
+    def decimated(self, decimate: int | str = "auto") -> Record:
+        """The record at a lower rate: every n-th sample behind a linear-phase low-pass filter.
+
+        The filter is the same for all channels; the input is taken in the middle of the n samples
+        over which it is held then, so that delays stay. It is what `identify_operator`, `track` and
+        `describe` do by themselves above 200 Hz.
+
+        Parameters
+        ----------
+        decimate : "auto", "off" or int
+            ``"auto"``: above 200 Hz by the number that comes nearest to 100 Hz.
+
+        >>> record.decimated(10)
+        """
+        found = _pyhoid.decimated(self, str(decimate), False)
+        if found is None:
+            return self
+        parts, step = found
+        record = Record._of(parts | {"input_lead": self.input_lead + parts["input_lead"]})
+        record.steps = [*self.steps, step]
+        return record
 
     def to_pandas(self) -> pd.DataFrame:
         """All channels as a table with the time in s as index.
@@ -395,8 +425,9 @@ class Record:
             "channels",
             "input_name",
             "output_name",
+            "input_lead",
         )
-        return (_record_of, ({key: getattr(self, key) for key in keys},))
+        return (_record_of, ({key: getattr(self, key) for key in keys}, list(self.steps)))
 
     def _rows(self) -> list[list[str]]:
         rows = []
@@ -425,8 +456,9 @@ class Record:
         )
 
 
-def _record_of(parts: Mapping[str, Any]) -> Record:
+def _record_of(parts: Mapping[str, Any], steps: Sequence[str] = ()) -> Record:
     """A record out of its pickle, checked as one that is made by hand."""
     record = Record._of(parts)
+    record.steps = list(steps)
     _pyhoid.check_record(record)
     return record

@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from . import _options, _pyhoid, _text
 from ._arrays import FloatArray
+from ._decimation import said
 from .estimates import Estimate, Operator, unit_of
 from ._pickling import Call, recalled, state_of
 from .fit import Fit
@@ -330,6 +331,8 @@ class Trace:
             return f"Trace by {self.method}: no rows"
         header, *rows = self._rows()
         title = f"Trace by {self.method}, {self.structure}: {len(self)} rows"
+        rate = said([self.record])
+        title = f"{title}\n{rate}" if rate else title
         return f"{title}\n{_text.plain_table(header, rows)}"
 
     def _repr_html_(self) -> str:

@@ -40,6 +40,10 @@ class Tracker(_pyhoid.Tracker):
         Frequencies in rad/s that `responses` tells.
     controlled_element : str or (sequence of float, sequence of float), optional
         What the person controls, as in `track`: then `crossover` and `phase_margin` are told.
+    decimate : "auto", "off" or int
+        As in `track`: above 200 Hz every n-th sample is tracked by default, .15 s behind the last one
+        taken; between them the estimate stays, and `step` returns NaN. `decimation` says what is
+        done.
     record : Record, optional
         A record to start from, instead of the warm-up: its fit is the start, and the filters have
         run over it.
@@ -72,10 +76,11 @@ class Tracker(_pyhoid.Tracker):
         largest: float = 1e6,
         at: Sequence[float] = (),
         controlled_element: str | tuple[Sequence[float], Sequence[float]] | None = None,
+        decimate: int | str = "auto",
         **settings: Unpack[MethodSettings],
     ) -> Tracker:
         """See the class."""
-        options = _recursion.plain(locals(), settings)
+        options = _recursion.plain(locals(), settings) | {"decimate": str(decimate)}
         samples = round(warm_up / sample_time) if sample_time > 0 else 0
         return cls._made(options, float(sample_time), samples, record)
 
@@ -163,7 +168,9 @@ class Tracker(_pyhoid.Tracker):
     @property
     def settings(self) -> dict[str, Any]:
         """The keywords that it was made with, defaults included; a prior from a fit by its source."""
-        shared = {name: self._options[name] for name in _recursion.KEYWORDS if name in self._options}
+        shared = {
+            name: self._options[name] for name in _recursion.KEYWORDS if name in self._options
+        }
         settings = shared | self._options["orders"] | self._options["settings"]
         if self._options["fit"] is not None:
             settings["prior"] = self._options["fit"][1]

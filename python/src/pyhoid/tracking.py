@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from . import _options, _pyhoid, _recursion
+from ._decimation import decimated
 from ._options import Order, Progress
 from ._settings import METHODS, SETTINGS
 from ._pickling import Call
@@ -46,6 +47,7 @@ def track(
     update_covariance: bool = False,
     moving_average: float | None = None,
     every: int = 1,
+    decimate: int | str = "auto",
     progress: Progress = False,
     **settings: Unpack[MethodSettings],
 ) -> Trace:
@@ -93,6 +95,10 @@ def track(
         Replace each estimate by the mean over this many seconds.
     every : int
         Keep every n-th sample.
+    decimate : "auto", "off" or int
+        Track every n-th sample behind a linear-phase low-pass filter; ``"auto"``: above 200 Hz by the
+        number that comes nearest to 100 Hz, unless `nk` is given or the method counts samples (its
+        memory or orders are those of a polynomial). ``trace.record`` is the decimated record.
     progress : bool or callable
         As in `identify`.
     **settings
@@ -140,6 +146,13 @@ def track(
         )
     if every < 1:
         raise OptionError(f"every is {every}, expected 1 or more")
+    read = record
+    counts_samples = _pyhoid.counts_samples(options)
+    (record,) = decimated((read,), decimate, counts_samples=counts_samples)
+    if validate is not None:
+        (validate,) = decimated((validate,), decimate, counts_samples=counts_samples)
+    # Rows as far apart as samples of the record were to be.
+    every = max(int(np.floor(every * read.sample_time / record.sample_time + 0.5)), 1)
     rows = None
     if moving_average is not None:
         if not 0 <= moving_average <= len(record) * record.sample_time:
@@ -161,7 +174,7 @@ def track(
         progress=_options.reporter(progress, "candidates"),
     )
     by_run = {"validate": validate, "update_covariance": update_covariance}
-    again = shared | settings | by_run
+    again = shared | settings | by_run | {"every": every, "decimate": "off"}
     return Trace(native, record, shared | settings, Call("track", (record,), again))
 
 

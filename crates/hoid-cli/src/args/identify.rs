@@ -133,6 +133,11 @@ pub enum ModelKind {
 }
 
 impl ModelKind {
+    /// Whether orders and delay are numbers of samples.
+    pub fn counts_samples(self) -> bool {
+        matches!(self, Self::Polynomial(_))
+    }
+
     /// The names that are typed, in the order of the help page.
     fn named() -> impl Iterator<Item = (&'static str, Self)> {
         let structures = Structure::ALL.map(|structure| (structure.name(), Self::Polynomial(structure)));

@@ -2,7 +2,7 @@
 
 use clap::Args;
 use hoid::io::{Offset, QualityIssueKind, Scaling};
-use hoid::model::{Detrend, FaultHandling};
+use hoid::model::{Decimation, Detrend, FaultHandling};
 
 use super::choices::choice_of;
 
@@ -55,17 +55,36 @@ pub struct PrepareArgs {
     /// by band-limited interpolation. May be repeated
     #[arg(long, value_name = "CHANNEL=N|Ss", value_parser = parse_offset, allow_hyphen_values = true)]
     pub offset: Vec<(String, Offset)>,
-    /// Take every M-th sample, behind a low-pass filter on all channels alike (0.8 of the new
-    /// Nyquist frequency pass)
-    #[arg(long, value_name = "M", conflicts_with = "new_fs")]
-    pub decimate: Option<usize>,
+    #[command(flatten)]
+    pub rate: DecimateArgs,
     /// Bring evenly sampled data to another sampling frequency in Hz, behind a low-pass filter on
     /// all channels alike
-    #[arg(long, value_name = "HZ")]
+    #[arg(long, value_name = "HZ", conflicts_with = "decimate")]
     pub new_fs: Option<f64>,
     /// Drop the first seconds of what is read
     #[arg(long, value_name = "S")]
     pub run_in: Option<f64>,
+}
+
+/// Whether the sampling rate is lowered.
+#[derive(Debug, Clone, Copy, Args)]
+pub struct DecimateArgs {
+    /// Keep every M-th sample behind a linear-phase low-pass filter on all channels alike; auto: above
+    /// 200 Hz by the M that comes nearest to 100 Hz, where an operator is fitted or tracked. A
+    /// polynomial structure, and a delay in samples, take the samples as they are unless M is named
+    #[arg(long, value_name = "auto|off|M", default_value_t = Decimation::Auto)]
+    pub decimate: Decimation,
+}
+
+impl DecimateArgs {
+    /// What is done for an estimator; what counts samples is not decimated by itself.
+    pub fn of(self, counts_samples: bool) -> Decimation {
+        if counts_samples {
+            self.decimate.when_named()
+        } else {
+            self.decimate
+        }
+    }
 }
 
 /// What is left out of a record.

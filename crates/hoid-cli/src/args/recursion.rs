@@ -12,7 +12,8 @@ use hoid::model::{ContinuousTransferFunction, Structure};
 use hoid::track::Method;
 
 use super::{
-    ReadArgs, choices::choice_of, figure::FigureArgs, parse_span, settings::SettingArgs, show::ShowArgs, udp::UdpPlaces,
+    ReadArgs, choices::choice_of, figure::FigureArgs, parse_span, reading::DecimateArgs, settings::SettingArgs,
+    show::ShowArgs, udp::UdpPlaces,
 };
 use crate::orders::{DelayRange, parse_delay};
 
@@ -111,6 +112,8 @@ pub struct StreamArgs {
     /// Sampling frequency in Hz
     #[arg(long, value_name = "HZ", value_parser = parse_frequency)]
     pub fs: f64,
+    #[command(flatten)]
+    pub rate: DecimateArgs,
     #[command(flatten)]
     pub recursion: RecursionArgs,
     /// Seconds that are collected before the start fit, for methods that have one [default: 20; none

@@ -8,7 +8,7 @@ use std::{
 use hoid::io::{
     NewRate, Preparation, QualityIssue, ReadOptions, ReadRecord, Repair, Step, read_prepared, read_segments,
 };
-use hoid::model::{Fault, Finding, Record, uncertainty::Estimate};
+use hoid::model::{Decimation, Fault, Finding, Record, SampleTime, uncertainty::Estimate};
 
 use crate::{
     args::{MaskArgs, ReadArgs},
@@ -122,15 +122,61 @@ fn preparation(args: &ReadArgs) -> Result<Preparation, CliError> {
         units: by_channel("--unit", &prepare.unit)?,
         scale: by_channel("--scale", &prepare.scale)?,
         offset: by_channel("--offset", &prepare.offset)?,
-        rate: match (prepare.decimate, prepare.new_fs) {
-            (Some(factor), _) => NewRate::Decimated(factor),
-            (None, Some(hz)) => NewRate::Hz(hz),
-            (None, None) => NewRate::Kept,
-        },
+        // Decimation comes behind the search for faults, which a filter would hide.
+        rate: prepare.new_fs.map_or(NewRate::Kept, NewRate::Hz),
         run_in_s: prepare.run_in.unwrap_or(0.0),
         detrend: args.detrend,
         drop_repeated: prepare.drop_repeated,
     })
+}
+
+/// A record at the rate at which it is used, and what was done; an estimator that counts samples takes
+/// them as they are unless a factor was typed, which is said once of a high rate.
+///
+/// # Errors
+/// Those of the decimation.
+pub fn decimated(record: Record, args: &ReadArgs, counts_samples: bool) -> Result<(Record, Option<Step>), CliError> {
+    if args.prepare.new_fs.is_some() {
+        return Ok((record, None));
+    }
+    let (record, done) = args.prepare.rate.of(counts_samples).of(record)?;
+    Ok((record, done.map(Step::from)))
+}
+
+/// As [`decimated`], for all records.
+///
+/// # Errors
+/// As [`decimated`].
+pub fn all_decimated(read: ReadAll, args: &ReadArgs, counts_samples: bool) -> Result<ReadAll, CliError> {
+    if let Some(record) = read.records.first() {
+        say_kept(record.sample_time(), args, counts_samples);
+    }
+    let mut all = ReadAll {
+        files: read.files,
+        ..ReadAll::default()
+    };
+    for (record, mut account) in read.records.into_iter().zip(read.accounts) {
+        let (record, step) = decimated(record, args, counts_samples)?;
+        account.steps.extend(step);
+        all.records.push(record);
+        all.accounts.push(account);
+    }
+    Ok(all)
+}
+
+/// Says that a high rate was kept because samples are counted.
+pub fn say_kept(sample_time: SampleTime, args: &ReadArgs, counts_samples: bool) {
+    let prepare = &args.prepare;
+    let factor = prepare.rate.decimate.factor(sample_time);
+    if counts_samples && prepare.new_fs.is_none() && prepare.rate.decimate == Decimation::Auto && factor > 1 {
+        let hz = (1e4 / sample_time.s()).round() / 1e4;
+        output::notice(
+            "",
+            format!(
+                "{hz} Hz is kept, since orders and delays count samples here; --decimate {factor} brings it near 100 Hz"
+            ),
+        );
+    }
 }
 
 /// What was typed for each channel; one that is named twice contradicts itself.
@@ -160,6 +206,7 @@ pub fn settings(read: &ReadArgs, with_input: bool) -> Vec<(String, String)> {
             format!("{} to {}", or_all(read.from, "start"), or_all(read.to, "end")),
         ),
         ("detrend".to_owned(), read.detrend.to_string()),
+        ("decimate".to_owned(), read.prepare.rate.decimate.to_string()),
     ];
     if with_input {
         list.insert(0, ("input".to_owned(), read.input.clone()));

@@ -3,13 +3,14 @@
 //! A channel with the offset d was recorded d samples later than it happened: its sample k + d goes
 //! beside sample k of the others, `x'(k) = x(k + d)`. An offset of whole samples moves rows and
 //! changes no number. Between samples the band-limited signal is taken by the windowed sinc of
-//! `kernel`: up to 0.8 of the Nyquist frequency its error is below 1e-4 of the amplitude (80 dB);
+//! [`Kernel`]: up to 0.8 of the Nyquist frequency its error is below 1e-4 of the amplitude (80 dB);
 //! above, the channel is not what it was. Rows for which a channel has no sample, or not all that
 //! the filter needs, are cut.
 
 use std::str::FromStr;
 
-use super::kernel::{Kernel, PASS};
+use hoid_model::resampling::{Kernel, PASS};
+
 use super::record_parts::RecordParts;
 use super::step::Step;
 use crate::IoError;

@@ -46,7 +46,7 @@ impl Preparation {
         parts.declare_units(&self.units)?;
         parts.scale(&self.scale)?;
         parts.offset(&self.offset)?;
-        parts.rate(self.rate)?;
+        let mut parts = parts.rate(self.rate)?;
         parts.run_in(begin_s, self.run_in_s)?;
         parts.detrended(self.detrend)
     }

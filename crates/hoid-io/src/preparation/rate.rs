@@ -1,7 +1,10 @@
 //! Another sampling rate, with a low-pass filter against aliasing; all channels alike.
 //!
-//! Every M-th sample, or a new sampling frequency, is taken from the record by the windowed sinc of
-//! `kernel`. Its pass band ends at 0.8 of the lower one of the old and the new Nyquist frequency,
+//! **Every M-th sample** is the decimation of [`hoid_model::resampling`]: no sample is lost, and the
+//! input is taken in the middle of its longer hold, so that the delay of a model stays.
+//!
+//! **A new sampling frequency** is taken from the record by the windowed sinc of [`Kernel`]. Its pass
+//! band ends at 0.8 of the lower one of the old and the new Nyquist frequency,
 //! where the ripple is below 1e-4 (0.001 dB). When the frequency falls, its stop band begins at the
 //! new Nyquist frequency: what would fold down is 80 dB below. The filter has linear phase, its
 //! delay is compensated, and it is the same for all channels, so that what is between e and u stays
@@ -13,9 +16,11 @@
 //! agree with the data, the delay of the model is shorter by `(T - Ts) / 2` than the one that is
 //! found at the old rate.
 
-use hoid_model::SampleTime;
+use hoid_model::{
+    Detrend, SampleTime,
+    resampling::{Kernel, PASS, STOP_DB},
+};
 
-use super::kernel::{Kernel, PASS, STOP_DB};
 use super::record_parts::RecordParts;
 use super::step::Step;
 use crate::IoError;
@@ -37,26 +42,40 @@ pub enum NewRate {
 }
 
 impl RecordParts {
-    pub(super) fn rate(&mut self, rate: NewRate) -> Result<(), IoError> {
-        let old = self.sample_time;
-        let (step, factor, new) = match rate {
-            NewRate::Kept | NewRate::Decimated(1) => return Ok(()),
-            NewRate::Decimated(0) => return Err(self.error("decimate", "factor 0", "1 or more")),
-            NewRate::Decimated(factor) => ("decimate", factor as f64, SampleTime::new(factor as f64 * old.s())),
-            NewRate::Hz(hz) => {
-                let new = SampleTime::new(1.0 / hz).map_err(|_| {
-                    self.error(
-                        "rate",
-                        format!("{hz} Hz"),
-                        "a positive finite number of samples in a second",
-                    )
-                })?;
-                if new.matches(old) {
-                    return Ok(());
-                }
-                ("new-fs", new.s() / old.s(), Ok(new))
-            }
-        };
+    pub(super) fn rate(mut self, rate: NewRate) -> Result<Self, IoError> {
+        match rate {
+            NewRate::Kept | NewRate::Decimated(1) => {}
+            NewRate::Decimated(factor) => return self.decimated(factor),
+            NewRate::Hz(hz) => self.resample(hz)?,
+        }
+        Ok(self)
+    }
+
+    fn decimated(self, factor: usize) -> Result<Self, IoError> {
+        let (record, mut steps) = self.detrended(Detrend::None)?;
+        let file = record.label().to_owned();
+        let (record, done) = record
+            .decimated(factor)
+            .map_err(|source| IoError::Model { file, source })?;
+        steps.push(done.into());
+        let mut parts = Self::new(record);
+        parts.steps = steps;
+        Ok(parts)
+    }
+
+    fn resample(&mut self, hz: f64) -> Result<(), IoError> {
+        let (step, old) = ("new-fs", self.sample_time);
+        let new = SampleTime::new(1.0 / hz).map_err(|_| {
+            self.error(
+                "rate",
+                format!("{hz} Hz"),
+                "a positive finite number of samples in a second",
+            )
+        })?;
+        if new.matches(old) {
+            return Ok(());
+        }
+        let factor = new.s() / old.s();
         let (length, last) = (self.len(), self.len() as f64 - 1.0);
         if factor < 1.0 / LARGEST_FACTOR {
             return Err(self.error(
@@ -81,7 +100,6 @@ impl RecordParts {
         } else {
             Kernel::interpolating()
         };
-        let new = new.map_err(|_| too_long(self))?;
         let half = kernel.half() as f64;
         // On the grid that begins with the first sample of the record; a bound on a sample, up to
         // rounding, takes that sample.
@@ -108,6 +126,7 @@ impl RecordParts {
             taps: 2 * kernel.half() + 1,
             cut_s,
             delay_s: 0.5 * (new.s() - old.s()),
+            input_lead_s: 0.0,
         });
         Ok(())
     }

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use hoid_model::Detrend;
+use hoid_model::{Decimated, Detrend};
 use serde::Serialize;
 
 use crate::wording::decimal;
@@ -92,6 +92,9 @@ pub enum Step {
         cut_s: (f64, f64),
         /// By how much the delay of a model with a hold is shorter than at the old rate, s.
         delay_s: f64,
+        /// By how much a sample of the input is taken later than that of the output beside it, so that
+        /// the delay is the same at both rates, s.
+        input_lead_s: f64,
     },
     /// The first seconds were dropped.
     RunIn {
@@ -128,6 +131,23 @@ impl Step {
             Self::Rate { .. } => "rate",
             Self::RunIn { .. } => "run-in",
             Self::Detrend { .. } => "detrend",
+        }
+    }
+}
+
+impl From<Decimated> for Step {
+    fn from(done: Decimated) -> Self {
+        Self::Rate {
+            factor: done.factor as f64,
+            from_hz: done.from_hz,
+            to_hz: done.to_hz,
+            pass_hz: done.pass_hz,
+            stop_hz: Some(done.stop_hz),
+            stop_db: done.stop_db,
+            taps: done.taps,
+            cut_s: (0.0, 0.0),
+            delay_s: 0.0,
+            input_lead_s: done.lead_s,
         }
     }
 }
@@ -189,6 +209,28 @@ impl fmt::Display for Step {
                 }
                 write!(f, "; {start} samples cut at the start, {end} at the end")
             }
+            Self::Rate {
+                factor,
+                from_hz,
+                to_hz,
+                pass_hz,
+                stop_hz: Some(stop_hz),
+                stop_db,
+                taps,
+                input_lead_s,
+                ..
+            } if *input_lead_s > 0.0 => write!(
+                f,
+                "{} Hz, filtered and decimated by {} to {} Hz: a linear-phase filter of {taps} samples on all channels, pass band to \
+                 {} Hz, {stop_db} dB from {} Hz; each sample of the input stands in the middle of its hold, {} s later, so that \
+                 the delay is that of the old rate",
+                decimal(*from_hz),
+                decimal(*factor),
+                decimal(*to_hz),
+                decimal(*pass_hz),
+                decimal(*stop_hz),
+                decimal(*input_lead_s)
+            ),
             Self::Rate {
                 from_hz,
                 to_hz,

@@ -72,6 +72,7 @@ pub(super) fn analyse(manifest: &Manifest, base: &Path, entry: &RunEntry, from_c
     let account = account(entry, &files);
     match run_of(files) {
         Ok(run) => {
+            analysis.rows.at_the_rate_of(&run);
             analysis.analyse(&run, from_cell);
             if let Some(form) = from_cell.form.filter(|_| manifest.analysis.each_run) {
                 let paired = read_run(manifest, base, entry, Pairing::InTheLoop);
@@ -95,13 +96,14 @@ pub(super) fn analyse_together(manifest: &Manifest, base: &Path, cell: &Cell<'_>
     let mut analysis = RunAnalysis::new(manifest, &all);
     let read = |pairing| {
         let one = |run: &'_ RunEntry| read_run(manifest, base, run, pairing).ok();
-        let runs = cell
-            .runs
-            .iter()
-            .filter_map(|&run| Some((run.run.as_str(), one(run)?.record)));
+        let runs = cell.runs.iter().filter_map(|&run| Some((run.run.as_str(), one(run)?)));
         runs.unzip()
     };
-    let (names, records): (Vec<&str>, Vec<Record>) = read(Pairing::Recorded);
+    let (names, runs): (Vec<&str>, Vec<Run>) = read(Pairing::Recorded);
+    if let Some(run) = runs.first() {
+        analysis.rows.at_the_rate_of(run);
+    }
+    let records: Vec<Record> = runs.into_iter().map(|run| run.record).collect();
     let late_samples = analysis.rows.condition.offset_samples;
     let people = match (&cell.changes, records.is_empty()) {
         (Some(reason), _) => vec![Person::without(cell.key(), PersonStatus::Changes, reason)],
@@ -114,6 +116,7 @@ pub(super) fn analyse_together(manifest: &Manifest, base: &Path, cell: &Cell<'_>
         // Only where u is late are there others.
         (None, false) if late_samples != 0.0 => {
             let (names, paired) = read(Pairing::InTheLoop);
+            let paired: Vec<Record> = paired.into_iter().map(|run| run.record).collect();
             analysis.family_together(cell.key(), &names, &paired)
         }
         (None, false) => analysis.family_together(cell.key(), &names, &records),
@@ -186,7 +189,8 @@ impl<'a> RunAnalysis<'a> {
                         start: StartAt::Span(Some((windows[0].from_s, windows[0].to_s))),
                         ..TrackOptions::new(method.clone(), structure, orders)
                     };
-                    match track(record, &options, self.settings.trace_every) {
+                    let every = run.samples(self.settings.trace_every as f64).round().max(1.0);
+                    match track(record, &options, every as usize) {
                         Ok(trace) => {
                             self.rows.trace_rows(&trace);
                             for window in &windows[..2] {

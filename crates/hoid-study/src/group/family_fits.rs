@@ -76,7 +76,12 @@ pub(super) fn rows_of_fit(rows: &mut RunRows<'_>, window: Window, label: &str, f
         let vaf = hoid_ident::validation::vaf(&record.output()[simulated.first..], &simulated.values);
         rows.row(Some(window), label, "vaf", Estimate::fixed(vaf));
     }
-    rows.responses_of(label, of.polynomial_fit.model(), record.sample_time().s(), 0.0);
+    rows.responses_of(
+        label,
+        of.polynomial_fit.model(),
+        record.sample_time().s(),
+        rows.input_lead_s,
+    );
     if let Some(measures) = rows.element().and_then(|element| fit.loop_measures(0, element)) {
         rows.row(Some(window), label, "crossover_rad_s", measures.crossover_rad_s);
         rows.row(Some(window), label, "phase_margin_deg", measures.phase_margin_deg);

@@ -28,7 +28,7 @@ use hoid_model::{ContinuousTransferFunction, Detrend, ModelError, Record, uncert
 use super::{
     condition_settings::ConditionSettings,
     manifest::Manifest,
-    reading::{Pairing, read_run},
+    reading::{Pairing, Run, read_run},
     responses::{MedianResponse, ResponseAverages},
     tables::{joined, real, schema, text},
 };
@@ -123,16 +123,20 @@ pub(super) fn frequencies(manifest: &Manifest, base: &Path, fits: &ResponseAvera
             .runs
             .iter()
             .filter(|r| r.counts && (r.subject.as_str(), r.condition.as_str()) == key);
-        let records: Vec<Record> = of_cell
+        let runs: Vec<Run> = of_cell
             .filter_map(|r| read_run(manifest, base, r, Pairing::Recorded).ok())
-            .map(|run| run.record)
             .collect();
+        // A ratio of samples knows no hold: what the input was moved for it is taken back.
+        let late_samples = runs.first().map_or(0.0, |run| {
+            run.samples(facts.offset_samples) + run.input_lead_s / run.record.sample_time().s()
+        });
+        let records: Vec<Record> = runs.into_iter().map(|run| run.record).collect();
         let margins = &mut tables.margins;
         margins.begin();
         margins.text("subject", key.0);
         margins.text("condition", key.1);
         margins.real("runs", records.len() as f64);
-        match of_records(&records, facts, key, fits, &mut tables) {
+        match of_records(&records, (facts, late_samples), key, fits, &mut tables) {
             Ok(()) => tables.margins.text("status", "ok"),
             Err(reason) => {
                 tables.margins.text("status", "failed");
@@ -149,7 +153,7 @@ pub(super) fn frequencies(manifest: &Manifest, base: &Path, fits: &ResponseAvera
 
 fn of_records(
     records: &[Record],
-    facts: &ConditionSettings,
+    (facts, offset_samples): (&ConditionSettings, f64),
     (subject, condition): (&str, &str),
     fits: &ResponseAverages,
     tables: &mut Tables,
@@ -171,7 +175,7 @@ fn of_records(
         excitation: facts.excitation.clone(),
         period_s: facts.period_s,
         controlled_element: element.clone(),
-        offset_samples: facts.offset_samples,
+        offset_samples,
         // It is part of reading.
         detrend: Detrend::None,
         ..DescriptionOptions::default()

@@ -38,6 +38,7 @@ use std::{
 
 use hoid_io::Preparation;
 use hoid_model::ContinuousTransferFunction;
+use hoid_model::Decimation;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -244,6 +245,15 @@ impl Manifest {
     pub fn preparation(&self, condition: &str) -> Result<Preparation, String> {
         let of_condition = self.conditions.get(condition).and_then(|facts| facts.prepare.as_ref());
         self.prepare.preparation(of_condition)
+    }
+
+    /// What a high rate by itself makes of the runs of a condition.
+    ///
+    /// # Errors
+    /// As [`Manifest::preparation`].
+    pub fn by_rate(&self, condition: &str) -> Result<Decimation, String> {
+        let of_condition = self.conditions.get(condition).and_then(|facts| facts.prepare.as_ref());
+        self.prepare.by_rate(of_condition)
     }
 
     /// The manifest as TOML.

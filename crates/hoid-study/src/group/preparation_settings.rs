@@ -5,17 +5,22 @@
 //! [prepare]
 //! scale = { stick = "12.5:deg", e = "rad:deg" }   # as hoid identify --scale
 //! offset = { stick = 1 }                          # samples, or "0.0167s"
-//! decimate = 2                                    # or rate_hz = 50.0
+//! decimate = 2                                    # or "auto", "off", or rate_hz = 50.0
 //! run_in_s = 5.0
 //! drop_repeated = true
 //!
 //! [conditions.so.prepare]
 //! offset = { stick = 0 }
 //! ```
+//!
+//! Where nothing is said of the rate, what is recorded at more than 200 Hz is decimated to about 100
+//! Hz ([`hoid_model::resampling`]); `offset_samples` of a condition counts samples as they were recorded,
+//! behind a factor or a frequency of one's own those of the new rate.
 
 use std::collections::BTreeMap;
 
 use hoid_io::{IoError, NewRate, Offset, Preparation, Scaling};
+use hoid_model::Decimation;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -30,9 +35,10 @@ pub struct PreparationSettings {
     /// By how much a channel was recorded late, in samples, or in s as a text such as "0.0167s".
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub offset: BTreeMap<String, NumberOrText>,
-    /// Every M-th sample; 1 keeps the rate.
+    /// Every M-th sample behind a low-pass filter; "off" or 1 keeps the rate. Default: "auto", above 200
+    /// Hz by the M that comes nearest to 100 Hz.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub decimate: Option<usize>,
+    pub decimate: Option<NumberOrText>,
     /// New sampling frequency, Hz.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rate_hz: Option<f64>,
@@ -69,6 +75,27 @@ impl PreparationSettings {
         *self == Self::default()
     }
 
+    /// What is said of the rate: it is one thing with two keys, and a condition that names one of them
+    /// names the rate.
+    fn rate<'a>(&'a self, condition: Option<&'a Self>) -> (Option<&'a NumberOrText>, Option<f64>) {
+        let of = condition.unwrap_or(self);
+        let named = of.decimate.is_some() || of.rate_hz.is_some();
+        let of = if named { of } else { self };
+        (of.decimate.as_ref(), of.rate_hz)
+    }
+
+    /// What a high rate by itself makes of the runs of a condition: nothing where the rate is named.
+    ///
+    /// # Errors
+    /// The key that has no meaning, and why.
+    pub fn by_rate(&self, condition: Option<&Self>) -> Result<Decimation, String> {
+        let (decimate, rate_hz) = self.rate(condition);
+        Ok(match decimation(decimate)? {
+            Decimation::Auto if rate_hz.is_none() => Decimation::Auto,
+            _ => Decimation::Off,
+        })
+    }
+
     /// What is done to the runs of a condition: what the condition says, and what the group says of
     /// the rest.
     ///
@@ -76,19 +103,15 @@ impl PreparationSettings {
     /// The key that has no meaning, and why.
     pub fn preparation(&self, condition: Option<&Self>) -> Result<Preparation, String> {
         let of = condition.unwrap_or(self);
-        // The rate is one thing with two keys: a condition that names one of them names the rate.
-        let rate = if of.decimate.is_some() || of.rate_hz.is_some() {
-            of
-        } else {
-            self
-        };
-        let rate = match (rate.decimate, rate.rate_hz) {
-            (Some(_), Some(_)) => return Err("decimate and rate_hz both give the rate: keep one".to_owned()),
-            (Some(0), None) => return Err("decimate is 0, expected 1 or more".to_owned()),
-            (Some(factor), None) => NewRate::Decimated(factor),
-            (None, Some(hz)) if hz > 0.0 && hz.is_finite() => NewRate::Hz(hz),
-            (None, Some(hz)) => return Err(format!("rate_hz is {hz}, expected a positive number")),
-            (None, None) => NewRate::Kept,
+        let (decimate, rate_hz) = self.rate(condition);
+        let rate = match (decimation(decimate)?, rate_hz) {
+            (_, Some(_)) if decimate.is_some() => {
+                return Err("decimate and rate_hz both give the rate: keep one".to_owned());
+            }
+            (Decimation::By(factor), None) => NewRate::Decimated(factor),
+            (_, Some(hz)) if hz > 0.0 && hz.is_finite() => NewRate::Hz(hz),
+            (_, Some(hz)) => return Err(format!("rate_hz is {hz}, expected a positive number")),
+            (Decimation::Auto | Decimation::Off, None) => NewRate::Kept,
         };
         let run_in_s = of.run_in_s.or(self.run_in_s).unwrap_or(0.0);
         if !(run_in_s >= 0.0 && run_in_s.is_finite()) {
@@ -103,6 +126,16 @@ impl PreparationSettings {
             ..Preparation::default()
         })
     }
+}
+
+/// A factor, or the words for it; auto where nothing is said.
+fn decimation(typed: Option<&NumberOrText>) -> Result<Decimation, String> {
+    let Some(typed) = typed else {
+        return Ok(Decimation::Auto);
+    };
+    let text = typed.text();
+    text.parse()
+        .map_err(|_| format!("decimate is {text}, expected \"auto\", \"off\", or by how many samples, 1 or more"))
 }
 
 /// What is said of each channel; the second list wins.

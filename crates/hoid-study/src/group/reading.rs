@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use hoid_ident::faults::{Mended, mend};
-use hoid_io::{ColumnKind, ColumnSchema, OutputTable, Preparation, ReadOptions, ReadRecord, Repair, TableSchema};
+use hoid_io::{ColumnKind, ColumnSchema, OutputTable, Preparation, ReadOptions, ReadRecord, Repair, Step, TableSchema};
 use hoid_model::{Detrend, Fault, FaultHandling, Record};
 
 use super::{
@@ -59,11 +59,20 @@ fn read_file(manifest: &Manifest, condition: &str, path: &Path, pairing: Pairing
     };
     let Mended { segments, faults, .. } = mend(&read.record, handling).map_err(|error| error.to_string())?;
     let longest = segments.into_iter().max_by_key(Record::len);
+    let mut read = ReadRecord {
+        record: longest.unwrap_or_else(|| read.record.clone()),
+        ..read
+    };
+    // Faults are found in the samples that were recorded.
+    let (record, done) = manifest
+        .by_rate(condition)?
+        .of(read.record)
+        .map_err(|error| error.to_string())?;
+    read.record = record;
+    read.steps.extend(done.map(Step::from));
     Ok(Looked {
-        read: ReadRecord {
-            record: longest.unwrap_or_else(|| read.record.clone()),
-            ..read
-        },
+        factor: done.map_or(1, |done| done.factor),
+        read,
         faults,
     })
 }
@@ -72,6 +81,8 @@ fn read_file(manifest: &Manifest, condition: &str, path: &Path, pairing: Pairing
 pub(super) struct Looked {
     read: ReadRecord,
     faults: Vec<Fault>,
+    /// By how much its rate was lowered behind what counts samples as they were recorded.
+    factor: usize,
 }
 
 /// The tables of the account: what was done to the runs, one step a row, and what is wrong with
@@ -138,6 +149,17 @@ pub(super) struct Run {
     pub record: Record,
     /// Where the second file begins, s, for a run that is joined of two.
     pub seam_s: Option<f64>,
+    /// By how much its rate was lowered: so many samples of the recording are one.
+    pub factor: usize,
+    /// By how much a sample of the input is taken later than that of the output beside it, s.
+    pub input_lead_s: f64,
+}
+
+impl Run {
+    /// A number of samples of the recording, in samples of the run.
+    pub fn samples(&self, recorded: f64) -> f64 {
+        recorded / self.factor as f64
+    }
 }
 
 /// Reads a run.
@@ -149,10 +171,22 @@ pub(super) fn read_run(manifest: &Manifest, base: &Path, entry: &RunEntry, pairi
 pub(super) fn run_of(files: Vec<ReadFile<'_>>) -> Result<Run, String> {
     let mut run: Option<Run> = None;
     for (_, read) in files {
-        let record = read?.read.record;
+        let Looked { read, factor, .. } = read?;
+        let record = read.record;
+        let lead = |step: &Step| match step {
+            Step::Rate { input_lead_s, .. } => *input_lead_s,
+            _ => 0.0,
+        };
         run = Some(match run {
-            None => Run { record, seam_s: None },
+            None => Run {
+                record,
+                seam_s: None,
+                factor,
+                input_lead_s: read.steps.iter().map(lead).sum(),
+            },
             Some(first) => Run {
+                factor: first.factor,
+                input_lead_s: first.input_lead_s,
                 seam_s: Some(first.record.time_s(first.record.len())),
                 record: first.record.joined(&record).map_err(|error| error.to_string())?,
             },
@@ -167,7 +201,9 @@ pub(super) fn account(entry: &RunEntry, files: &[ReadFile<'_>]) -> [(&'static st
     let [(steps_name, steps), (trouble_name, trouble)] = schemas();
     let (mut steps, mut trouble) = (Rows::new(&steps), Rows::new(&trouble));
     for (file, read) in files {
-        let Ok(Looked { read, faults }) = read else { continue };
+        let Ok(Looked { read, faults, .. }) = read else {
+            continue;
+        };
         for fault in faults {
             begin(&mut trouble, entry, file);
             trouble.text("kind", fault.kind.name());

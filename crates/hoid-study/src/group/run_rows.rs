@@ -12,6 +12,7 @@ use hoid_track::Trace;
 use super::{
     condition_settings::ConditionSettings,
     manifest::{Manifest, RunEntry},
+    reading::Run,
     responses::{followed_phases_deg, grid, responses_schema},
     tables::{real, schema, text},
     traces::{self, TraceColumns},
@@ -45,6 +46,9 @@ pub(super) struct RunRows<'a> {
     entry: &'a RunEntry,
     /// What is known of its condition.
     pub condition: ConditionSettings,
+    /// By how much a sample of the input is taken later than that of the output beside it, s: a ratio of
+    /// samples has it as a phase, which is taken back.
+    pub input_lead_s: f64,
     element: Option<ContinuousTransferFunction>,
     columns: TraceColumns,
     estimates: Rows,
@@ -60,11 +64,18 @@ impl<'a> RunRows<'a> {
             entry,
             element: condition.controlled_element.as_deref().and_then(|e| e.parse().ok()),
             condition,
+            input_lead_s: 0.0,
             estimates: Rows::new(&estimates_schema()),
             responses: Rows::new(&responses_schema()),
             traces: Rows::new(&columns.schema()),
             columns,
         }
+    }
+
+    /// What counts samples of the recording, in those of a run.
+    pub fn at_the_rate_of(&mut self, run: &Run) {
+        self.condition.offset_samples = run.samples(self.condition.offset_samples);
+        self.input_lead_s = run.input_lead_s;
     }
 
     pub fn into_tables(self) -> RunTables {
@@ -115,7 +126,7 @@ impl<'a> RunRows<'a> {
         if window.name != WHOLE {
             return;
         }
-        let advance_s = self.condition.offset_samples * sample_time_s;
+        let advance_s = self.condition.offset_samples * sample_time_s + self.input_lead_s;
         let (omega, response) = self.responses_of(label, fit.model(), sample_time_s, advance_s);
         let Some(element) = &self.element else { return };
         let open_loop: Vec<Complex64> = omega

@@ -115,6 +115,13 @@ impl Method {
         spec(self.inner())
     }
 
+    /// Whether orders, delay or memory are those of a polynomial in samples; else the rate is free, and
+    /// a high one is lowered ([`hoid_model::Decimation`]).
+    pub fn counts_samples(&self) -> bool {
+        let inner = self.inner();
+        !(inner.starts_itself() || inner.is_model_of_change())
+    }
+
     /// Name as on the command line.
     pub fn name(&self) -> &'static str {
         self.inner().about().name

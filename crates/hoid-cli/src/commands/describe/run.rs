@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use hoid::ident::frequency::{Description, DescriptionOptions, describe_runs};
-use hoid::io::Offset;
+use hoid::io::{Offset, Step};
 use hoid::model::{Detrend, Record};
 use hoid::report::figures::describing;
 
@@ -33,8 +33,33 @@ pub fn run(args: &DescribeArgs) -> Result<(), CliError> {
         reading::read_all(&args.records, &read, &args.mask, true)?,
         args.faults.faults,
     )?;
+    let (late_samples, ts_s) = match records.first() {
+        Some(record) => (offset_of_output(record, &offsets)?, record.sample_time().s()),
+        None => (0.0, 1.0),
+    };
+    let ReadAll {
+        files,
+        records,
+        accounts,
+    } = reading::all_decimated(
+        ReadAll {
+            files,
+            records,
+            accounts,
+        },
+        &args.read,
+        false,
+    )?;
+    // A ratio of samples knows no hold: what the input was moved for it is taken back.
+    let moved_s = accounts
+        .iter()
+        .flat_map(|account| &account.steps)
+        .find_map(|step| match step {
+            Step::Rate { input_lead_s, .. } => Some(*input_lead_s),
+            _ => None,
+        });
     let offset_samples = match records.first() {
-        Some(record) => offset_of_output(record, &offsets)?,
+        Some(record) => (late_samples * ts_s + moved_s.unwrap_or(0.0)) / record.sample_time().s(),
         None => 0.0,
     };
     let options = DescriptionOptions {
@@ -54,7 +79,7 @@ pub fn run(args: &DescribeArgs) -> Result<(), CliError> {
         records: &records,
         accounts: &accounts,
         found: &found,
-        settings: settings(args, &options, &found),
+        settings: settings(args, late_samples, &found),
         element: args.controlled_element.as_ref(),
     };
     if let Some(path) = &args.picture.figure {
@@ -73,12 +98,11 @@ pub fn run(args: &DescribeArgs) -> Result<(), CliError> {
 }
 
 /// How to read without moving rows, and the offsets. A row that is cut would leave less than whole
-/// periods, and of what is periodic an offset is a phase. With another sampling rate, which the
+/// periods, and of what is periodic an offset is a phase. With another sampling frequency, which the
 /// offset comes before, it stays with the reading.
 pub fn without_offsets(read: &ReadArgs) -> (ReadArgs, Vec<(String, Offset)>) {
     let mut read = read.clone();
-    let kept = read.prepare.decimate.is_none() && read.prepare.new_fs.is_none();
-    let offsets = if kept {
+    let offsets = if read.prepare.new_fs.is_none() {
         std::mem::take(&mut read.prepare.offset)
     } else {
         Vec::new()
@@ -116,12 +140,12 @@ pub fn offset_of_output(record: &Record, offsets: &[(String, Offset)]) -> Result
     Ok(late)
 }
 
-fn settings(args: &DescribeArgs, options: &DescriptionOptions, found: &Description) -> Vec<(String, String)> {
+fn settings(args: &DescribeArgs, late_samples: f64, found: &Description) -> Vec<(String, String)> {
     let mut list = reading::settings(&args.read, true);
-    if options.offset_samples != 0.0 {
+    if late_samples != 0.0 {
         list.push((
             "offset of the output".to_owned(),
-            format!("{} samples, as a phase", options.offset_samples),
+            format!("{late_samples} samples, as a phase"),
         ));
     }
     list.push(("faults".to_owned(), args.faults.faults.to_string()));

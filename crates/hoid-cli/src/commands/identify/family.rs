@@ -63,7 +63,10 @@ pub fn run(args: &IdentifyArgs, files: &[String], records: &[Record], accounts: 
     let described = described.ok();
     let validation = match &args.validate {
         Some(path) => {
-            let other = reading::read(path, &args.read, true)?.0.detrended(estimator.detrend);
+            let other = reading::read(path, &args.read, true)?.0;
+            let other = reading::decimated(other, &args.read, false)?
+                .0
+                .detrended(estimator.detrend);
             Some((
                 path.display().to_string(),
                 fit.operator(0).polynomial_fit.quality(&[other])?,

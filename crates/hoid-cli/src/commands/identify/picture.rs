@@ -29,8 +29,17 @@ pub fn description(args: &IdentifyArgs, records: &[Record]) -> Result<Descriptio
         (records, 0.0)
     } else {
         let again = reading::read_again(&args.records, &read, &args.mask)?;
-        unmoved = faults::mended_again(again, args.faults.faults)?;
-        let late = unmoved.first().map_or(Ok(0.0), |r| offset_of_output(r, &offsets))?;
+        let again = faults::mended_again(again, args.faults.faults)?;
+        let late = again.first().map_or(Ok(0.0), |r| offset_of_output(r, &offsets))?;
+        let ts_s = again.first().map_or(1.0, |r| r.sample_time().s());
+        // Of what is fitted beside it.
+        let used_s = records.first().map_or(ts_s, |r| r.sample_time().s());
+        let used = |r: Record| {
+            r.decimated((used_s / ts_s).round().max(1.0) as usize)
+                .map(|found| found.0)
+        };
+        unmoved = again.into_iter().map(used).collect::<Result<Vec<_>, _>>()?;
+        let late = late * ts_s / used_s;
         (unmoved.as_slice(), late)
     };
     if args.excitation.as_deref() == Some("none") {

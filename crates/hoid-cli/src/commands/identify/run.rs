@@ -42,14 +42,15 @@ pub fn run(args: &IdentifyArgs) -> Result<(), CliError> {
         ModelKind::Polynomial(structure) => structure.has_input(),
         ModelKind::Family | ModelKind::GreyBox | ModelKind::TimeVarying => true,
     };
+    let read = faults::mended(
+        reading::read_all(&args.records, &args.read, &args.mask, with_input)?,
+        args.faults.faults,
+    )?;
     let ReadAll {
         files,
         records,
         mut accounts,
-    } = faults::mended(
-        reading::read_all(&args.records, &args.read, &args.mask, with_input)?,
-        args.faults.faults,
-    )?;
+    } = reading::all_decimated(read, &args.read, kind.counts_samples())?;
     if kind == ModelKind::TimeVarying {
         return sigmoid::run(args, &files, &records, &mut accounts);
     }
@@ -71,7 +72,8 @@ pub fn run(args: &IdentifyArgs) -> Result<(), CliError> {
     // Read before anything is written: a bad validation file leaves nothing behind.
     let validation = match &args.validate {
         Some(path) => {
-            let mut other = vec![reading::read(path, &args.read, with_input)?.0];
+            let other = reading::read(path, &args.read, with_input)?.0;
+            let mut other = vec![reading::decimated(other, &args.read, kind.counts_samples())?.0];
             if as_read.is_some() {
                 other = without_level(&other);
             }

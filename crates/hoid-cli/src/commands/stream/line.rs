@@ -1,6 +1,6 @@
 //! One line of the output.
 
-use hoid::model::{Finding, VerdictLevel, uncertainty::Estimate};
+use hoid::model::{Decimated, Finding, VerdictLevel, uncertainty::Estimate};
 use hoid::track::{Change, Live, TrackFault, Tracker};
 use serde::{Serialize, Serializer};
 use serde_json::Value;
@@ -48,6 +48,8 @@ struct Line<'a> {
     event: Option<Value>,
     #[serde(skip_serializing_if = "Option::is_none")]
     fault: Option<&'a str>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    decimated: Option<Rate>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
     findings: Vec<Value>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -61,6 +63,26 @@ struct ChangeLine {
     log_odds: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     declared: Option<Value>,
+}
+
+/// The rate at which a fast stream is tracked, and by how much the estimate is behind its line.
+#[derive(Serialize)]
+struct Rate {
+    factor: usize,
+    from_hz: f64,
+    to_hz: f64,
+    behind_s: f64,
+}
+
+impl From<Decimated> for Rate {
+    fn from(done: Decimated) -> Self {
+        Self {
+            factor: done.factor,
+            from_hz: done.from_hz,
+            to_hz: done.to_hz,
+            behind_s: done.lag_s,
+        }
+    }
 }
 
 #[derive(Serialize)]
@@ -113,6 +135,8 @@ pub struct Standing<'a> {
     pub event: Option<TrackFault>,
     /// Faults since the last line.
     pub fault: Option<String>,
+    /// How the rate was lowered.
+    pub decimated: Option<Decimated>,
     /// What makes the whole stream doubtful.
     pub finding: Option<&'a Finding>,
 }
@@ -160,6 +184,7 @@ impl Standing<'_> {
             counts: self.counts,
             event: self.event.as_ref().map(json::track_fault),
             fault: self.fault.as_deref(),
+            decimated: self.decimated.map(Rate::from),
             findings: self.finding.map(json::finding).into_iter().collect(),
             warm_up: match self.live {
                 Live::Collecting(warm_up) => Some(WarmUp {

@@ -24,9 +24,14 @@ use std::{
     time::{Duration, Instant},
 };
 
-use hoid::model::SampleTime;
+use hoid::model::{Decimator, SampleTime};
 
-use crate::{args::StreamArgs, error::CliError, interrupt, output, recursion::Plan};
+use crate::{
+    args::StreamArgs,
+    error::CliError,
+    interrupt, output,
+    recursion::{self, Plan},
+};
 use lines::Lines;
 use session::Session;
 use udp::Udp;
@@ -43,7 +48,14 @@ pub fn run(args: &StreamArgs) -> Result<(), CliError> {
         ));
     }
     let sample_time = SampleTime::new(1.0 / args.fs)?;
-    let plan = Plan::new(&args.recursion, sample_time)?;
+    let decimation = args.rate.of(recursion::counts_samples(&args.recursion)?);
+    let decimator = match decimation.factor(sample_time) {
+        1 => None,
+        // Of the output alone nothing is held.
+        factor => Some(Decimator::new(factor, sample_time, [true, false, false])?),
+    };
+    let tracked = decimator.as_ref().map_or(sample_time, Decimator::sample_time);
+    let plan = Plan::new(&args.recursion, tracked)?;
     if plan.options().method.smooths() {
         return Err(CliError::Usage(
             "--smooth belongs to hoid track: what is still to come cannot say anything of a stream".to_owned(),
@@ -63,7 +75,7 @@ pub fn run(args: &StreamArgs) -> Result<(), CliError> {
         ));
     }
     let udp = args.udp.as_ref().map(Udp::bind).transpose()?;
-    let session = Arc::new(Mutex::new(Session::new(args, plan, sample_time)?));
+    let session = Arc::new(Mutex::new(Session::new(args, plan, sample_time, decimator)?));
     end_on_interrupt(&session);
     match udp {
         Some(udp) => over_udp(&udp, &session),

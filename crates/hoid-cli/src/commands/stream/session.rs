@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 
 use hoid::ident::Choice;
-use hoid::model::{Finding, SampleTime};
+use hoid::model::{Decimator, Finding, SampleTime};
 use hoid::track::{Change, Live, LiveOutcome, Sample, TrackFault, TrackOptions};
 
 use super::{
@@ -32,7 +32,10 @@ pub struct Session {
     columns: Columns,
     clock: Clock,
     live: Live,
+    /// Time between two samples of the stream.
     sample_time: SampleTime,
+    /// What lowers a high rate: error, control, target.
+    decimator: Option<Decimator<3>>,
     /// What e and u are multiplied by.
     scale: (f64, f64),
     every: u64,
@@ -57,9 +60,15 @@ pub struct Session {
 }
 
 impl Session {
-    pub fn new(args: &StreamArgs, plan: Plan, sample_time: SampleTime) -> Result<Self, CliError> {
+    pub fn new(
+        args: &StreamArgs,
+        plan: Plan,
+        sample_time: SampleTime,
+        decimator: Option<Decimator<3>>,
+    ) -> Result<Self, CliError> {
         let length_s = args.warm_up.unwrap_or(USUAL_WARM_UP_S);
-        let samples = (length_s * args.fs).round();
+        let tracked = decimator.as_ref().map_or(sample_time, Decimator::sample_time);
+        let samples = (length_s / tracked.s()).round();
         if !(1.0..=1e7).contains(&samples) {
             return Err(CliError::Usage(format!(
                 "--warm-up {length_s}: expected a time in s of one sample to 10 million"
@@ -68,11 +77,12 @@ impl Session {
         let with_input = recursion::structure(&args.recursion)?.has_input();
         let largest = plan.options().largest;
         let mut session = Self {
-            live: Live::new(plan.options(), samples as usize, sample_time)?,
+            live: Live::new(plan.options(), samples as usize, tracked)?,
             plan,
             columns: Columns::new(&args.input, &args.output, with_input, largest),
             clock: Clock::new(sample_time.s()),
             sample_time,
+            decimator,
             scale: scale(args)?,
             every: args.every as u64,
             lines: 0,
@@ -100,6 +110,10 @@ impl Session {
             self.names = tracker.parameter_names();
         }
         let mut settings = self.plan.settings(options, choice);
+        if let Some(decimator) = &self.decimator {
+            let done = decimator.done();
+            settings.push(("rate".to_owned(), format!("{done}, {:.3} s behind", done.lag_s)));
+        }
         if self.scale != (1.0, 1.0) {
             let (e, u) = self.scale;
             settings.push(("scale".to_owned(), format!("e times {e}, u times {u}")));
@@ -119,7 +133,7 @@ impl Session {
 
     /// Takes what a line means; true when the output has a line for it.
     fn meant(&mut self, meaning: Meaning) -> bool {
-        self.innovation = None;
+        self.forget_innovation();
         match meaning {
             Meaning::Nothing => return false,
             Meaning::Sample(read) => self.timed(read),
@@ -148,7 +162,7 @@ impl Session {
     ) -> Result<(), CliError> {
         match Datagram::of(bytes) {
             Datagram::Sample(sample) => {
-                self.innovation = None;
+                self.forget_innovation();
                 self.timed(sample.read(self.sample_time, self.plan.options().largest));
                 self.lines += 1;
                 if self.lines.is_multiple_of(self.every) {
@@ -243,14 +257,32 @@ impl Session {
         }
     }
 
+    /// An innovation belongs to one sample, which of a decimated stream is the last one for some lines.
+    fn forget_innovation(&mut self) {
+        if self.decimator.is_none() {
+            self.innovation = None;
+        }
+    }
+
     fn sample(&mut self, e: f64, u: f64, reference: Option<f64>) {
         self.counts.samples += 1;
         self.counts.skipped += u64::from(!(e.is_finite() && u.is_finite()));
         if !self.has_time {
             self.t = Some((self.counts.samples - 1) as f64 * self.sample_time.s());
         }
+        let (mut sample, mut tracked, mut behind_s) = (Sample { e, u, reference }, self.sample_time, 0.0);
+        if let Some(decimator) = &mut self.decimator {
+            let Some([e, u, f_t]) = decimator.take([e, u, reference.unwrap_or(f64::NAN)]) else {
+                return;
+            };
+            let reference = Some(f_t).filter(|f| f.is_finite());
+            (sample, tracked) = (Sample { e, u, reference }, decimator.sample_time());
+            behind_s = decimator.behind() as f64 * self.sample_time.s();
+            self.innovation = None;
+        }
+        // The time that the recursion has come to.
+        let t = self.t.map(|t| t - behind_s);
         let plan = &self.plan;
-        let sample = Sample { e, u, reference };
         let LiveOutcome { outcome, started } = self.live.update(sample, &|record| plan.choose(record));
         if let Some(outcome) = outcome {
             self.innovation = outcome.innovation;
@@ -258,13 +290,13 @@ impl Session {
             if let Live::Tracking(tracker) = &self.live {
                 (self.counts.held, self.counts.restarts) = (tracker.counts().held, tracker.counts().restarts);
                 if let Some(event) = tracker.event() {
-                    self.event = Some(event.at(self.t.unwrap_or(f64::NAN), self.sample_time));
+                    self.event = Some(event.at(t.unwrap_or(f64::NAN), tracked));
                 }
             }
             if let Live::Tracking(tracker) = &self.live
                 && let Some(change) = tracker.change()
             {
-                self.change = Some((self.t, change));
+                self.change = Some((t, change));
             }
         }
         if let Some((options, choice)) = started {
@@ -298,6 +330,7 @@ impl Session {
             event: self.event.take(),
             counts: self.counts,
             fault,
+            decimated: self.decimator.as_ref().map(Decimator::done),
             finding: self.rate.as_ref(),
         };
         let unwritable = |e| CliError::Stream(format!("a line of the output cannot be made: {e}"));

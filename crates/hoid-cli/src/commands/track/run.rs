@@ -46,7 +46,19 @@ pub fn run(args: &TrackArgs) -> Result<(), CliError> {
         &[args.report.as_deref()],
     )?;
     let with_input = recursion::structure(&args.recursion)?.has_input();
-    let (record, account) = reading::read(&args.record, &args.read, with_input)?;
+    let (record, mut account) = reading::read(&args.record, &args.read, with_input)?;
+    let counts_samples = recursion::counts_samples(&args.recursion)?;
+    let read_ts = record.sample_time();
+    reading::say_kept(read_ts, &args.read, counts_samples);
+    let (record, step) = reading::decimated(record, &args.read, counts_samples)?;
+    account.steps.extend(step);
+    // Rows as far apart as samples of the file were to be.
+    let every = ((args.every as f64 * read_ts.s() / record.sample_time().s()).round() as usize).max(1);
+    let every = if args.read.prepare.new_fs.is_some() {
+        args.every
+    } else {
+        every
+    };
     let plan = Plan::new(&args.recursion, record.sample_time())?;
     let span_s = start_span(args, &plan, &record)?;
     let span = record.span(span_s.0, span_s.1);
@@ -67,7 +79,7 @@ pub fn run(args: &TrackArgs) -> Result<(), CliError> {
     let validation = match &args.validate {
         Some(path) => Some((
             path.display().to_string(),
-            reading::read(path, &args.read, with_input)?.0,
+            reading::decimated(reading::read(path, &args.read, with_input)?.0, &args.read, counts_samples)?.0,
         )),
         None => None,
     };
@@ -75,17 +87,17 @@ pub fn run(args: &TrackArgs) -> Result<(), CliError> {
     let mut options = options;
     let trace = match &validation {
         Some((_, other)) if args.update_covariance => {
-            track_validated(&record, other, &options, &CovarianceUpdates::default(), args.every)?
+            track_validated(&record, other, &options, &CovarianceUpdates::default(), every)?
         }
         Some((file, other)) => {
             let choice;
             (options, choice) = choose_covariance(&record, other, &options)?;
             covariance = Some((file.clone(), choice));
-            track(&record, &options, args.every)?
+            track(&record, &options, every)?
         }
-        None => track(&record, &options, args.every)?,
+        None => track(&record, &options, every)?,
     };
-    let rows = averaged_rows(args, &record)?;
+    let rows = averaged_rows(args, every, &record)?;
     let trace = trace.moving_average(rows);
 
     let mut settings = plan.settings(&options, choice.as_ref());
@@ -128,11 +140,11 @@ pub fn run(args: &TrackArgs) -> Result<(), CliError> {
         ));
     }
     if rows > 1 {
-        let lag = (rows - 1) as f64 / 2.0 * args.every as f64 * record.sample_time().s();
+        let lag = (rows - 1) as f64 / 2.0 * every as f64 * record.sample_time().s();
         settings.push(("moving average".to_owned(), format!("{rows} rows, lags by {lag:.3} s")));
     }
     settings.extend(reading::settings(&args.read, with_input));
-    settings.push(("rows of the trace".to_owned(), format!("every {} samples", args.every)));
+    settings.push(("rows of the trace".to_owned(), format!("every {every} samples")));
 
     let verdict = trace.verdict(&record, choice.as_ref())?;
     let verdict = verdict.behind(faults::of_quality(&account, &record));
@@ -189,11 +201,11 @@ fn update_from(args: &TrackArgs, record: &Record) -> Result<Option<f64>, CliErro
 }
 
 /// Rows of the moving average.
-fn averaged_rows(args: &TrackArgs, record: &Record) -> Result<usize, CliError> {
+fn averaged_rows(args: &TrackArgs, every: usize, record: &Record) -> Result<usize, CliError> {
     let Some(length) = args.moving_average else {
         return Ok(1);
     };
-    let row = args.every as f64 * record.sample_time().s();
+    let row = every as f64 * record.sample_time().s();
     if !(length >= 0.0 && length <= record.len() as f64 * record.sample_time().s()) {
         return Err(CliError::Usage(format!(
             "--moving-average {length}: expected a length in s up to that of the record"

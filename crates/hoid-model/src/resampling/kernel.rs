@@ -20,18 +20,18 @@ use std::f64::consts::PI;
 /// Attenuation that is designed for, dB.
 const DESIGN_DB: f64 = 90.0;
 /// Attenuation that is stated: of what would fold down, and of the error of interpolation, dB.
-pub(super) const STOP_DB: f64 = 80.0;
+pub const STOP_DB: f64 = 80.0;
 /// Half the width of the transition, as a share of its upper edge.
 const HALF_TRANSITION: f64 = 0.1;
 /// End of the pass band as a share of the lower of both Nyquist frequencies.
-pub(super) const PASS: f64 = 0.8;
+pub const PASS: f64 = 0.8;
 
 /// Distance from a whole sample that is taken for rounding, samples.
 const WHOLE: f64 = 1e-9;
 
 /// Continuous impulse response of a low-pass filter, in samples of the record.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Kernel {
+pub struct Kernel {
     cutoff: f64,
     /// Samples to each side.
     half: usize,
@@ -40,7 +40,7 @@ pub(super) struct Kernel {
 impl Kernel {
     /// Passes up to 0.8 of the Nyquist frequency of the record and stops from 1.2: moves a
     /// band-limited signal by parts of a sample.
-    pub(super) fn interpolating() -> Self {
+    pub fn interpolating() -> Self {
         Self {
             cutoff: 1.0,
             half: half_length(2.0 * (1.0 - PASS)) as usize,
@@ -49,7 +49,7 @@ impl Kernel {
 
     /// Passes up to 0.8 `ratio` and stops from `ratio`, the new Nyquist frequency as a share of the
     /// old one; none where the filter would be longer than `longest` to each side.
-    pub(super) fn limiting(ratio: f64, longest: usize) -> Option<Self> {
+    pub fn limiting(ratio: f64, longest: usize) -> Option<Self> {
         let half = half_length(2.0 * HALF_TRANSITION * ratio);
         // Written so that NaN is none.
         (half <= longest as f64).then_some(Self {
@@ -58,15 +58,28 @@ impl Kernel {
         })
     }
 
+    /// Passes up to 0.8 `ratio` and stops from 1.2 `ratio`, with 6 dB at `ratio`, the new Nyquist
+    /// frequency as a share of the old one: what folds down falls between 0.8 and 1 of it, where it
+    /// takes the place of what the filter has taken, so that noise keeps a spectrum without a hole.
+    /// None where it would be longer than `longest` to each side.
+    pub fn folding(ratio: f64, longest: usize) -> Option<Self> {
+        let half = half_length(2.0 * (1.0 - PASS) * ratio);
+        // Written so that NaN is none.
+        (half <= longest as f64).then_some(Self {
+            cutoff: ratio,
+            half: half as usize,
+        })
+    }
+
     /// Samples that it reaches to each side of the one asked for.
-    pub(super) fn half(self) -> usize {
+    pub fn half(self) -> usize {
         self.half
     }
 
     /// Weights of the samples `floor(t) - half + 1 ..= floor(t) + half` for
     /// `t = floor(t) + fraction`; for a whole t the first is `floor(t) - half`, so that they are
     /// symmetric.
-    fn weights(self, fraction: f64) -> (isize, Vec<f64>) {
+    pub(super) fn weights(self, fraction: f64) -> (isize, Vec<f64>) {
         let half = self.half as isize;
         let first = if fraction == 0.0 { -half } else { 1 - half };
         let mut weights: Vec<f64> = (first..=half).map(|n| self.response(fraction - n as f64)).collect();
@@ -84,7 +97,7 @@ impl Kernel {
 
     /// Values at `t_k = first + k step` for k = 0 .. n, in samples; every t lies [`Kernel::half`]
     /// samples inside.
-    pub(super) fn values(self, samples: &[f64], first: f64, step: f64, n: usize) -> Vec<f64> {
+    pub fn values(self, samples: &[f64], first: f64, step: f64, n: usize) -> Vec<f64> {
         // Of a whole step all fractions are one, and the weights are made once.
         let (mut known, mut offset, mut weights) = (f64::NAN, 0, Vec::new());
         (0..n)
@@ -182,6 +195,30 @@ mod tests {
                         "{delay:e}"
                     );
                 }
+            }
+        }
+    }
+
+    #[test]
+    fn the_filter_of_decimation_folds_into_the_last_fifth_alone() {
+        for factor in [2.0, 3.0, 10.0, 20.0] {
+            let kernel = Kernel::folding(1.0 / factor, 100_000).unwrap();
+            let nyquist = 0.5 / factor;
+            for fraction in [0.0, 0.5] {
+                let weights = kernel.weights(fraction);
+                for i in 1..=400 {
+                    let share = f64::from(i) / 400.0;
+                    let (gain, delay) = response(&weights, share * PASS * nyquist, fraction);
+                    let (leak, _) = response(&weights, 1.2 * nyquist + share * (0.5 - 1.2 * nyquist), fraction);
+                    assert!(
+                        (gain - 1.0).abs() < 5e-5 && leak < 5e-5,
+                        "{factor}, {share}: {gain}, {leak:e}"
+                    );
+                    // Linear phase: symmetric about the place asked for.
+                    assert!(delay.abs() < 1e-10, "{delay:e}");
+                }
+                let (gain, _) = response(&weights, nyquist, fraction);
+                assert!((gain - 0.5).abs() < 1e-3, "{gain}");
             }
         }
     }

@@ -1,0 +1,193 @@
+//! By how much a record is decimated: a choice of the user, or of the rate.
+
+use std::fmt;
+use std::str::FromStr;
+
+use super::kernel::{Kernel, PASS, STOP_DB};
+use crate::{ModelError, SampleTime};
+
+/// Rates above it are decimated by themselves, Hz.
+const HIGHEST_HZ: f64 = 200.0;
+/// The rate that they are brought near to, Hz.
+const WANTED_HZ: f64 = 100.0;
+/// A rate is above another by more than rounding.
+const ROUNDING: f64 = 1e-6;
+
+/// Whether the rate of a record is lowered, and by how much.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Decimation {
+    /// Above 200 Hz by the factor that comes nearest to 100 Hz.
+    #[default]
+    Auto,
+    /// Not at all.
+    Off,
+    /// By this factor.
+    By(usize),
+}
+
+impl Decimation {
+    /// The same for an estimator that takes the samples as they are unless a factor is named: of
+    /// polynomials orders and delays count samples.
+    pub fn when_named(self) -> Self {
+        match self {
+            Self::Auto => Self::Off,
+            other => other,
+        }
+    }
+
+    /// The factor for a sample time: 1 leaves it.
+    pub fn factor(self, sample_time: SampleTime) -> usize {
+        let hz = 1.0 / sample_time.s();
+        match self {
+            Self::By(factor) => factor,
+            Self::Auto if hz > HIGHEST_HZ * (1.0 + ROUNDING) => {
+                let below = (hz / WANTED_HZ).floor();
+                let distance = |factor: f64| (hz / factor - WANTED_HZ).abs();
+                let nearest = if distance(below + 1.0) < distance(below) {
+                    below + 1.0
+                } else {
+                    below
+                };
+                nearest as usize
+            }
+            Self::Auto | Self::Off => 1,
+        }
+    }
+}
+
+/// `auto`, `off`, or a whole number of 1 or more.
+impl FromStr for Decimation {
+    type Err = ModelError;
+
+    /// # Errors
+    /// [`ModelError::Decimation`].
+    fn from_str(text: &str) -> Result<Self, ModelError> {
+        match text.trim().to_ascii_lowercase().as_str() {
+            "auto" => Ok(Self::Auto),
+            "off" => Ok(Self::Off),
+            number => match number.parse() {
+                Ok(factor) if factor > 0 => Ok(Self::By(factor)),
+                _ => Err(ModelError::Decimation {
+                    label: "decimate".to_owned(),
+                    found: format!("{text:?}"),
+                    expected: "auto, off, or by how many samples, as 10".to_owned(),
+                }),
+            },
+        }
+    }
+}
+
+impl fmt::Display for Decimation {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Auto => f.write_str("auto"),
+            Self::Off => f.write_str("off"),
+            Self::By(factor) => factor.fmt(f),
+        }
+    }
+}
+
+/// What a decimation did.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Decimated {
+    /// New sample time by the old one.
+    pub factor: usize,
+    /// Old sampling frequency, Hz.
+    pub from_hz: f64,
+    /// New sampling frequency, Hz.
+    pub to_hz: f64,
+    /// End of the pass band, Hz.
+    pub pass_hz: f64,
+    /// Begin of the stop band, Hz: what lies between folds down above the pass band.
+    pub stop_hz: f64,
+    /// Attenuation in the stop band, dB.
+    pub stop_db: f64,
+    /// Length of the filter, samples of the old rate.
+    pub taps: usize,
+    /// By how much a sample of the input is taken later than that of the output beside it, s.
+    pub lead_s: f64,
+    /// By how much a stream is behind, s.
+    pub lag_s: f64,
+}
+
+impl Decimated {
+    /// By a factor from a sample time, with its filter and the new sample time; none where the filter
+    /// would be longer than `longest` samples to each side.
+    pub(super) fn by(factor: usize, old: SampleTime, longest: usize) -> Option<(Self, Kernel, SampleTime)> {
+        let kernel = Kernel::folding(1.0 / factor as f64, longest)?;
+        let new = SampleTime::new(factor as f64 * old.s()).ok()?;
+        let to_hz = 1.0 / new.s();
+        let done = Self {
+            factor,
+            from_hz: 1.0 / old.s(),
+            to_hz,
+            pass_hz: PASS * 0.5 * to_hz,
+            stop_hz: (2.0 - PASS) * 0.5 * to_hz,
+            stop_db: STOP_DB,
+            taps: 2 * kernel.half() + 1,
+            lead_s: 0.5 * (new.s() - old.s()),
+            lag_s: (kernel.half() + factor / 2) as f64 * old.s(),
+        };
+        Some((done, kernel, new))
+    }
+}
+
+/// The rates, as a phrase without a full stop.
+impl fmt::Display for Decimated {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let hz = |hz: f64| (hz * 1e4).round() / 1e4;
+        write!(
+            f,
+            "{} Hz, filtered and decimated by {} to {} Hz",
+            hz(self.from_hz),
+            self.factor,
+            hz(self.to_hz)
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rates_above_200_hz_come_near_to_100() {
+        for (hz, factor) in [
+            (60.0, 1),
+            (100.0, 1),
+            (200.0, 1),
+            (200.000_01, 1),
+            (201.0, 2),
+            (250.0, 3),
+            (256.0, 3),
+            (1000.0 / 3.0, 3),
+            (500.0, 5),
+            (512.0, 5),
+            (1000.0, 10),
+            (1024.0, 10),
+            (2000.0, 20),
+            (48_000.0, 480),
+        ] {
+            let ts = SampleTime::new(1.0 / hz).unwrap();
+            assert_eq!(Decimation::Auto.factor(ts), factor, "{hz}");
+            assert_eq!(Decimation::Auto.when_named().factor(ts), 1);
+            assert_eq!(Decimation::By(7).when_named().factor(ts), 7);
+        }
+    }
+
+    #[test]
+    fn as_typed() {
+        for (text, found) in [
+            ("auto", Decimation::Auto),
+            (" Off", Decimation::Off),
+            ("10", Decimation::By(10)),
+        ] {
+            assert_eq!(text.parse::<Decimation>().unwrap(), found);
+            assert_eq!(found.to_string().parse::<Decimation>().unwrap(), found);
+        }
+        for bad in ["", "0", "-1", "1.5", "on", "nan"] {
+            let message = bad.parse::<Decimation>().unwrap_err().to_string();
+            assert!(message.contains("expected auto, off"), "{message}");
+        }
+    }
+}

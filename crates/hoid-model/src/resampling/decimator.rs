@@ -1,0 +1,232 @@
+//! Decimation sample by sample, as a stream needs it.
+//!
+//! The value at `k M` is there once what the filter needs beyond it has come: the stream is behind by
+//! half the filter and half of M, about 15 samples of the new rate ([`Decimated::lag_s`]). Up to the
+//! end of what has come its values are those of the decimated record, digit for digit.
+//!
+//! **Values that are not finite** (missing, faulty) are held at the last good one within the filter;
+//! a new sample among whose M old ones is such a one is NaN, so that it is nobody's.
+
+use std::collections::VecDeque;
+
+use hoid_core::state::State;
+
+use super::decimation::Decimated;
+use super::kernel::Kernel;
+use crate::{ModelError, SampleTime};
+
+/// Longest filter of a stream, to each side, samples.
+const LONGEST: usize = 1_000_000;
+
+/// Decimates C channels together.
+#[derive(Debug, Clone)]
+pub struct Decimator<const C: usize> {
+    done: Decimated,
+    kernel: Kernel,
+    sample_time: SampleTime,
+    lanes: [Lane; C],
+    /// Samples that have come.
+    came: u64,
+    /// Samples that have been given.
+    given: u64,
+}
+
+/// The past of one channel.
+#[derive(Debug, Clone)]
+struct Lane {
+    /// Samples from its old sample to the whole one before a new value: 0, or the middle of M.
+    lead: i64,
+    /// Place of the first weight beside that sample, and the weights.
+    offset: i64,
+    weights: Vec<f64>,
+    /// What the filter needs; the first stands at `first` old samples, which the reflection of the
+    /// beginning makes negative.
+    past: VecDeque<f64>,
+    first: i64,
+    /// The last good value.
+    last: f64,
+    /// Whether there was one.
+    seen: bool,
+    /// Which of the samples from the last given one on are not good, by their number.
+    bad: VecDeque<u64>,
+}
+
+impl<const C: usize> Decimator<C> {
+    /// A decimator by a factor of 2 or more; `held` says which channels are inputs that a model holds.
+    ///
+    /// # Errors
+    /// [`ModelError::Decimation`] for a factor without meaning.
+    pub fn new(factor: usize, sample_time: SampleTime, held: [bool; C]) -> Result<Self, ModelError> {
+        let found = (factor > 1)
+            .then(|| Decimated::by(factor, sample_time, LONGEST))
+            .flatten();
+        let Some((done, kernel, new)) = found else {
+            return Err(ModelError::Decimation {
+                label: "stream".to_owned(),
+                found: format!("a factor of {factor}"),
+                expected: "2 to some thousand; decimate off keeps the rate".to_owned(),
+            });
+        };
+        let lane = |held: bool| {
+            let lead = if held { 0.5 * (factor as f64 - 1.0) } else { 0.0 };
+            let (offset, weights) = kernel.weights(lead.fract());
+            Lane {
+                lead: lead.floor() as i64,
+                offset: offset as i64,
+                weights,
+                past: VecDeque::new(),
+                first: 0,
+                last: 0.0,
+                seen: false,
+                bad: VecDeque::new(),
+            }
+        };
+        Ok(Self {
+            done,
+            kernel,
+            sample_time: new,
+            lanes: held.map(lane),
+            came: 0,
+            given: 0,
+        })
+    }
+
+    /// What it does.
+    pub fn done(&self) -> Decimated {
+        self.done
+    }
+
+    /// The sample time behind it.
+    pub fn sample_time(&self) -> SampleTime {
+        self.sample_time
+    }
+
+    /// How many samples the last one given lies behind the last one taken.
+    pub fn behind(&self) -> u64 {
+        let at = self.given.saturating_sub(1) * self.done.factor as u64;
+        self.came.saturating_sub(1).saturating_sub(at)
+    }
+
+    /// All that changes as numbers, for [`Decimator::restore`].
+    pub fn saved(&mut self) -> Vec<f64> {
+        let mut numbers = Vec::new();
+        self.visit(&mut |number| numbers.push(*number));
+        numbers
+    }
+
+    /// Goes on where the one was that [`Decimator::saved`] was asked of; false for numbers of another.
+    #[must_use]
+    pub fn restore(&mut self, numbers: &[f64]) -> bool {
+        let (mut left, mut lacking) = (numbers.iter(), false);
+        self.visit(&mut |number| match left.next() {
+            Some(saved) => *number = *saved,
+            None => lacking = true,
+        });
+        !lacking && left.next().is_none()
+    }
+
+    /// Takes a sample of each channel; gives one when it is time.
+    pub fn take(&mut self, values: [f64; C]) -> Option<[f64; C]> {
+        let (number, factor, half) = (self.came, self.done.factor as u64, self.kernel.half());
+        self.came += 1;
+        for (lane, value) in self.lanes.iter_mut().zip(values) {
+            lane.take(value, number);
+        }
+        // The farthest sample that the next value needs.
+        if self.came <= self.given * factor + factor / 2 + half as u64 {
+            return None;
+        }
+        if self.given == 0 {
+            self.lanes.iter_mut().for_each(|lane| lane.reflect(half));
+        }
+        let at = self.given * factor;
+        let found = self.lanes.each_mut().map(|lane| {
+            let value = lane.value(at, factor);
+            lane.forget(at + factor, half);
+            value
+        });
+        self.given += 1;
+        Some(found)
+    }
+}
+
+impl Lane {
+    fn take(&mut self, value: f64, number: u64) {
+        if value.is_finite() {
+            self.last = value;
+            if !self.seen {
+                // What came before is not known: as the first that is.
+                self.past.iter_mut().for_each(|past| *past = value);
+                self.seen = true;
+            }
+        } else {
+            self.bad.push_back(number);
+        }
+        self.past.push_back(self.last);
+    }
+
+    /// The reflection of the beginning in the first sample.
+    fn reflect(&mut self, half: usize) {
+        let begin = self.past[0];
+        for k in 1..=half {
+            // What was put before it stands in front of the k-th.
+            let value = 2.0 * begin - self.past[2 * k - 1];
+            self.past.push_front(value);
+        }
+        self.first = -(half as i64);
+    }
+
+    /// The new value for the old samples from `at` on.
+    fn value(&mut self, at: u64, factor: u64) -> f64 {
+        if self.bad.iter().any(|bad| (at..at + factor).contains(bad)) {
+            return f64::NAN;
+        }
+        let from = (at as i64 + self.lead + self.offset - self.first).max(0) as usize;
+        let past: &[f64] = self.past.make_contiguous();
+        self.weights
+            .iter()
+            .zip(&past[from.min(past.len())..])
+            .map(|(w, x)| w * x)
+            .sum()
+    }
+
+    /// Lets go what the value at `next` and those behind it do not need.
+    fn forget(&mut self, next: u64, half: usize) {
+        while self.first < next as i64 - half as i64 && self.past.pop_front().is_some() {
+            self.first += 1;
+        }
+        while self.bad.front().is_some_and(|bad| *bad < next) {
+            self.bad.pop_front();
+        }
+    }
+}
+
+impl<const C: usize> State for Decimator<C> {
+    fn visit(&mut self, each: &mut dyn FnMut(&mut f64)) {
+        let most = 2 * self.kernel.half() + 4 * self.done.factor + 4;
+        for count in [&mut self.came, &mut self.given] {
+            let mut number = *count as f64;
+            each(&mut number);
+            *count = number.max(0.0) as u64;
+        }
+        for lane in &mut self.lanes {
+            let mut numbers = [lane.first as f64, lane.last, f64::from(u8::from(lane.seen))];
+            numbers.iter_mut().for_each(&mut *each);
+            lane.first = numbers[0] as i64;
+            lane.last = numbers[1];
+            lane.seen = numbers[2] != 0.0;
+            let mut length = lane.past.len() as f64;
+            each(&mut length);
+            lane.past.resize((length.max(0.0) as usize).min(most), 0.0);
+            lane.past.iter_mut().for_each(&mut *each);
+            let mut bad = lane.bad.len() as f64;
+            each(&mut bad);
+            lane.bad.resize((bad.max(0.0) as usize).min(most), 0);
+            for number in &mut lane.bad {
+                let mut value = *number as f64;
+                each(&mut value);
+                *number = value.max(0.0) as u64;
+            }
+        }
+    }
+}
