@@ -79,7 +79,12 @@ pub fn run(args: &TrackArgs) -> Result<(), CliError> {
     let validation = match &args.validate {
         Some(path) => Some((
             path.display().to_string(),
-            reading::decimated(reading::read(path, &args.read, with_input)?.0, &args.read, counts_samples)?.0,
+            reading::decimated(
+                reading::read(path, &args.read, with_input)?.0,
+                &args.read,
+                counts_samples,
+            )?
+            .0,
         )),
         None => None,
     };
