@@ -131,10 +131,12 @@ def test_segments_between_faults(stalled: Path, cli: Any) -> None:
 def test_track_and_tracker_have_the_same_keywords() -> None:
     track = inspect.signature(pyhoid.track).parameters
     tracker = inspect.signature(pyhoid.Tracker.__new__).parameters
-    for name in KEYWORDS:
+    # The rate is a setting of the samples, not of the recursion.
+    same = [*KEYWORDS, "decimate"]
+    for name in same:
         usual = "population" if name == "method" else track[name].default
         assert tracker[name].default == usual, name
         assert track[name].annotation == tracker[name].annotation, name
     shared = [name for name in track if name in tracker]
-    assert set(KEYWORDS) == set(shared) - {"record", "settings"}
+    assert set(same) == set(shared) - {"record", "settings"}
     assert track["settings"].annotation == tracker["settings"].annotation
