@@ -88,6 +88,8 @@ fn tracked(target: &Path, directory: &Path) -> Result<String, String> {
         "c4.csv",
         "--nk",
         "29",
+        "--replay",
+        "0",
         "--guard",
         "no",
         "--every",

@@ -306,7 +306,8 @@ fn the_default_needs_nothing_and_tells_the_loop() {
     assert!(without == 0 || found["no_crossover_reason"].is_string());
     // Before the data say something of the neuromuscular system, that is said.
     let determined = column(&trace, "omega_nm_determined");
-    assert!(determined[..500].iter().all(|v| *v == 0.0));
+    assert!(determined[..300].iter().all(|v| *v == 0.0));
+    assert!(determined[1500..].iter().all(|v| *v == 1.0));
     assert_eq!(
         found["last"]["operator"]["K_e"]["determined"],
         column(&trace, "K_e_determined").last() == Some(&1.0)

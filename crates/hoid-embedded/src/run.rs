@@ -5,7 +5,10 @@
 
 use core::{ffi::CStr, fmt::Arguments};
 
-use hoid_core::population::{PARAMETERS, PopulationFilter, basis::Basis, usual::Usual};
+use hoid_core::population::{
+    PARAMETERS, PopulationFilter,
+    usual::{GIVEN_DELAY_S, SPREAD, Usual},
+};
 
 /// The file of the samples.
 pub const FILE: &CStr = c"run.csv";
@@ -19,13 +22,13 @@ const SAMPLE_TIME_S: f64 = 0.01;
 const NK: f64 = 29.0;
 /// Samples from one line of output to the next.
 const EVERY: u32 = 100;
-/// Errors that the filter keeps: more than `errors_needed(SAMPLE_TIME_S)`.
-const ERRORS: usize = 128;
+/// Numbers of memory: more than `least_memory(SAMPLE_TIME_S)`, and too few for replays.
+const MEMORY: usize = 3 * 128;
 /// Longest line of input.
 const LONGEST: usize = 80;
 
 /// The recursion, with memory of its own.
-type Filter = PopulationFilter<[f64; ERRORS]>;
+type Filter = PopulationFilter<[f64; MEMORY]>;
 
 /// Bytes that the recursion takes.
 pub const STATE_BYTES: usize = size_of::<Filter>();
@@ -38,10 +41,12 @@ pub fn run(
     read: impl FnMut(&mut [u8]) -> Result<usize, &'static str>,
     mut write: impl FnMut(Arguments<'_>) -> Result<(), &'static str>,
 ) -> Result<(), &'static str> {
-    let supposed = Usual::with_delay((NK - 0.5) * SAMPLE_TIME_S);
-    let basis = Basis::new(supposed.point, SAMPLE_TIME_S).ok_or("there is no basis for this delay")?;
+    let supposed = Usual {
+        spread: [SPREAD[0], SPREAD[1], GIVEN_DELAY_S],
+        ..Usual::with_delay((NK - 0.5) * SAMPLE_TIME_S)
+    };
     let mut filter =
-        Filter::new(basis, supposed.prior(SAMPLE_TIME_S), [0.0; ERRORS]).ok_or("there is no filter for this prior")?;
+        Filter::new(supposed.prior(SAMPLE_TIME_S), [0.0; MEMORY]).ok_or("there is no filter for this prior")?;
     let mut lines = Lines::new(read);
     write(format_args!("{HEADER}"))?;
     let mut samples = 0_u32;

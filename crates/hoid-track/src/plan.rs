@@ -6,15 +6,16 @@ use std::{collections::BTreeMap, ops::RangeInclusive};
 use hoid_model::{Orders, Record, SampleTime, Structure};
 
 use crate::{
-    forgetting::ForgettingRule, methods::Method, options::TrackOptions, person_prior::PersonPrior, setup::StartAt,
+    forgetting::ForgettingRule,
+    methods::Method,
+    options::TrackOptions,
+    person_prior::PersonPrior,
+    setup::{StartAt, USUAL_DELAY_S},
 };
 use hoid_ident::{
     Choice, IdentError, NamedOrders, OrderRanges,
     order_selection::{Criterion, choose_orders_with, default_operator_ranges},
 };
-
-/// Delay of people who track, s.
-const USUAL_DELAY_S: f64 = 0.2;
 
 /// A recursion whose orders may still be ranges.
 #[derive(Debug, Clone, PartialEq)]

@@ -65,11 +65,6 @@ pub(crate) trait Recursion: State + Send + Sync {
     fn change(&self) -> Option<Change> {
         None
     }
-    /// Where at the last sample another estimate took the place of one that was wrong: the samples for
-    /// which that one was told.
-    fn left_behind(&self) -> Option<u64> {
-        None
-    }
     /// Number of fits that failed, and why the last did, for methods that fit.
     fn failures(&self) -> Option<(usize, String)> {
         None

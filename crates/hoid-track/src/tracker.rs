@@ -99,9 +99,7 @@ impl Tracker {
             let before = guard.restarts();
             let guarded = guard.take(&mut *self.recursion, sample, moves);
             self.counts.restarts += guard.restarts() - before;
-            let outcome = self.guarded(guarded, !(e_sound && u_sound));
-            self.counts.restarts += u64::from(self.left_behind().is_some());
-            return outcome;
+            return self.guarded(guarded, !(e_sound && u_sound));
         }
         let sample = Sample {
             e: if e_sound { sample.e } else { self.last_e },
@@ -129,7 +127,6 @@ impl Tracker {
         self.counts.skipped += u64::from(skipped);
         self.counts.shortened += u64::from(taken.shortened);
         self.moved = moves && !skipped;
-        self.counts.restarts += u64::from(self.left_behind().is_some());
         Outcome {
             innovation: (!skipped).then_some(taken.innovation),
             skipped,
@@ -155,15 +152,9 @@ impl Tracker {
         }
     }
 
-    /// What the guard found or did at the last sample, or that the recursion left an estimate that was
-    /// wrong.
+    /// What the guard found or did at the last sample.
     pub fn event(&self) -> Option<GuardEvent> {
-        let of_guard = self.guard.as_ref().and_then(|guard| guard.event());
-        of_guard.or_else(|| self.left_behind().map(GuardEvent::left_behind))
-    }
-
-    fn left_behind(&self) -> Option<u64> {
-        self.moved.then(|| self.recursion.left_behind()).flatten()
+        self.guard.as_ref().and_then(|guard| guard.event())
     }
 
     /// True while the guard lets the estimate stand still.

@@ -131,6 +131,10 @@ class MethodSettings(TypedDict, total=False):
     # population.
     false_alarms: float | None
 
+    # Time that is read again and again; 0 for a recursion that reads each sample once, as a
+    # microcontroller does. For population.
+    replay: float | None
+
     # What is known of the person before the first sample: population, none, NAME=CENTRE:SPREAD
     # of omega_nm, zeta_nm, tau_e, T_I (the spread is relative), or an earlier fit of them, a
     # file that hoid identify --json has printed. For population.
@@ -209,6 +213,9 @@ SETTINGS = """covariance : float
         false_alarms : float
             False alarms in an hour that are accepted: a lower number finds fewer changes,
             later. For population.
+        replay : float
+            Time that is read again and again; 0 for a recursion that reads each sample once, as
+            a microcontroller does. For population.
         prior : str | PathLike[str] | Mapping[str, tuple[float, float]] | OperatorFit
             What is known of the person before the first sample: population, none,
             NAME=CENTRE:SPREAD of omega_nm, zeta_nm, tau_e, T_I (the spread is relative), or an

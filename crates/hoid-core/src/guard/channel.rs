@@ -14,12 +14,21 @@
 //!
 //! The size of an outlier does not enter: one sample moves q by 5 % whatever it is. A quantile in the
 //! tail, and not a median: people's u rests and moves by pulses, and its tails are what the limit
-//! must let pass.
+//! must let pass. p_j is the 90 % quantile, in the same way with g = .02. Samples at which the signal
+//! stands still say nothing of how it moves: they enter neither.
 //!
-//! **Outliers.** A sample is held back where `|r_j| > max(m q_j, floor)` with m = 2.5. For Gaussian
-//! errors these are 6.4 standard deviations, one of 8e9 samples; for Laplacian ones, whose tails are
-//! heavy, it is `.01^2.5`, one of 1e5. The floor is a share of the signal's mean magnitude below
-//! which an outlier is worth nothing.
+//! **Outliers.** A sample is held back where `|r_j| > max(m_j q_j, floor)` with
+//!
+//! `m_j = mean of (q_j/p_j)^2`, at least 2.5 and at most 12,
+//!
+//! the mean over the last 20 s or so, for the quotient of two quantiles that follow the signal is noisy.
+//! A tail like `P(|r| > x) = exp(-(x/s)^k)` (W. Weibull, *Journal of Applied Mechanics* 18 (1951)
+//! 293-297) has its quantiles beyond P at `s (-log P)^(1/k)`. Those at .1 and .01 are apart by the factor
+//! `2^(1/k)`, those at 1e-2 and 1e-8 by `4^(1/k)`, its square: what one sample of 1e8 goes beyond, for
+//! the steady hand (k = 2: m = 2, and for a Gaussian tail 2.45) as for the one that moves in bursts
+//! (k = 1: m = 4; k = .7: m = 7). With m = 2.5 Gaussian errors are held back from 6.4 standard
+//! deviations on, one of 8e9 samples. The floor is a share of the signal's mean magnitude below which an
+//! outlier is worth nothing.
 //!
 //! **While it is held back** the signal goes on along its last slope where that has a meaning (order
 //! 2 or more), damped with a time constant of [`SLOPE_S`], else at its last value. It has come back
@@ -31,12 +40,23 @@ pub const ORDERS: usize = 4;
 /// Probability beyond the quantile, and gain of its approximation.
 const BEYOND: f64 = 0.01;
 const GAIN: f64 = 0.05;
-/// Limit in units of the quantile.
+/// Probability beyond the inner quantile, and gain of its approximation.
+const BEYOND_INNER: f64 = 0.1;
+const INNER_GAIN: f64 = 0.02;
+/// Least and largest limit in units of the quantile.
 const LIMIT: f64 = 2.5;
+const HEAVIEST: f64 = 12.0;
+/// Largest mean magnitude, in units of the inner quantile, of a signal that moves as usual: Gaussian errors have
+/// .49 and Laplacian ones .43, and those of a signal five times as large 2.4 and 2.2.
+const USUAL: f64 = 1.3;
+/// Blocks over which the tails are averaged.
+const AVERAGED: u32 = 20;
+/// Inner quantile over the outer one, of Gaussian errors.
+const GAUSSIAN_INNER: f64 = 1.6449 / 2.5758;
 /// Time constant with which the slope of a signal that is held back is damped, s.
 pub const SLOPE_S: f64 = 0.1;
 /// Quantile over mean magnitude of Gaussian errors: what the first quantiles are made of.
-pub const QUANTILE_OVER_MEAN: f64 = 3.228;
+const QUANTILE_OVER_MEAN: f64 = 3.228;
 
 /// One signal.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -48,6 +68,15 @@ pub struct ChannelGuard {
     known: usize,
     /// Quantiles; those of nothing are zero.
     quantiles: [f64; ORDERS],
+    /// Those further in, from which the tail is foretold.
+    inner: [f64; ORDERS],
+    /// Mean of the squares of the quotients of the two, and what they were averaged over.
+    heavy: [f64; ORDERS],
+    averaged: u32,
+    /// True once outliers are looked for.
+    watching: bool,
+    /// A first difference within which the signal stands still.
+    resting: f64,
     /// Order less one that is used.
     order: usize,
     /// Least limit.
@@ -62,7 +91,7 @@ pub struct ChannelGuard {
 }
 
 crate::state!([] ChannelGuard {
-    last, differences, known, quantiles, order, floor, held, size, base, slope, damping,
+    last, differences, known, quantiles, inner, heavy, averaged, watching, resting, order, floor, held, size, base, slope, damping,
 });
 
 impl ChannelGuard {
@@ -73,6 +102,11 @@ impl ChannelGuard {
             differences: [0.0; ORDERS - 1],
             known: 0,
             quantiles: [0.0; ORDERS],
+            inner: [0.0; ORDERS],
+            heavy: [0.0; ORDERS],
+            averaged: 0,
+            watching: false,
+            resting: 0.0,
             order: 0,
             floor: 0.0,
             held: 0,
@@ -84,15 +118,73 @@ impl ChannelGuard {
     }
 
     /// Quantiles that are known from the past of the signal, of the differences of order 1 to 4;
-    /// one of zero or less is not known.
+    /// one of zero or less is not known. The tails are Gaussian until something else is learnt.
     pub fn set_quantiles(&mut self, quantiles: [f64; ORDERS]) {
-        self.quantiles = quantiles;
+        self.set_tails(quantiles, quantiles.map(|q| GAUSSIAN_INNER * q));
+    }
+
+    /// The same with the 90 % quantiles.
+    pub fn set_tails(&mut self, quantiles: [f64; ORDERS], inner: [f64; ORDERS]) {
+        (self.quantiles, self.inner) = (quantiles, inner);
+        self.averaged = 0;
+        self.average_tails();
+        self.averaged = AVERAGED;
+        self.watch();
+    }
+
+    /// First values of quantiles that are not known, from the mean magnitudes of the differences; they are
+    /// learnt from then on, and nothing is an outlier until [`ChannelGuard::watch`].
+    pub fn begin_learning(&mut self, means: [f64; ORDERS]) {
+        for (j, mean) in means.into_iter().enumerate() {
+            if self.quantiles[j] <= 0.0 {
+                self.quantiles[j] = QUANTILE_OVER_MEAN * mean;
+                self.inner[j] = GAUSSIAN_INNER * self.quantiles[j];
+            }
+        }
+    }
+
+    /// Looks for outliers from now on, if the quantiles are known.
+    pub fn watch(&mut self) {
+        self.watching = self.quantiles[0] > 0.0;
         self.choose();
     }
 
-    /// True once the quantiles are known.
+    /// True once the quantiles are known and outliers are looked for.
     pub fn is_known(&self) -> bool {
-        self.quantiles[0] > 0.0
+        self.watching
+    }
+
+    /// True for samples in a row, the first of them behind a jump, that move as the signal does: the mean
+    /// magnitude of their differences of the order in use is below that of a signal about three times as large.
+    pub fn moves_as_usual(&self, samples: impl Iterator<Item = f64>) -> bool {
+        let (mut past, mut count, mut sum) = ([0.0; ORDERS], 0, 0.0);
+        for x in samples {
+            let mut difference = x;
+            for (j, kept) in past.iter_mut().enumerate() {
+                let next = difference - *kept;
+                *kept = difference;
+                difference = next;
+                if j == self.order {
+                    break;
+                }
+            }
+            count += 1;
+            if count > self.order + 1 {
+                sum += difference.abs();
+            }
+        }
+        let counted = count as f64 - self.order as f64 - 1.0;
+        counted > 0.0 && sum <= USUAL * self.inner[self.order] * counted
+    }
+
+    /// The first difference from which on a sample is a jump.
+    pub fn largest_move(&self) -> f64 {
+        self.limit(0)
+    }
+
+    /// A first difference within which the signal stands still.
+    pub fn set_resting(&mut self, difference: f64) {
+        self.resting = difference;
     }
 
     /// The last sample, or what stands for it.
@@ -138,7 +230,7 @@ impl ChannelGuard {
 
     #[inline(always)]
     fn limit(&self, order: usize) -> f64 {
-        let limit = LIMIT * self.quantiles[order];
+        let limit = self.heavy[order].max(LIMIT) * self.quantiles[order];
         if limit > self.floor { limit } else { self.floor }
     }
 
@@ -149,18 +241,27 @@ impl ChannelGuard {
         let order = self.order_in_use();
         // False for NaN.
         let within = errors[order].abs() <= self.limit(order);
-        !within && (self.quantiles[0] > 0.0 && self.known > 0 || !errors[0].is_finite())
+        !within && (self.watching && self.known > 0 || !errors[0].is_finite())
     }
 
     /// Takes a sample into the prediction as it is, and its errors into the quantiles.
     #[inline(always)]
     pub fn accept(&mut self, x: f64, errors: &[f64; ORDERS]) {
-        for (q, r) in self.quantiles.iter_mut().zip(errors) {
-            *q *= if r.abs() > *q {
-                1.0 + GAIN * (1.0 - BEYOND)
-            } else {
-                1.0 - GAIN * BEYOND
-            };
+        if errors[0].abs() > self.resting {
+            for (q, r) in self.quantiles.iter_mut().zip(errors) {
+                *q *= if r.abs() > *q {
+                    1.0 + GAIN * (1.0 - BEYOND)
+                } else {
+                    1.0 - GAIN * BEYOND
+                };
+            }
+            for (p, r) in self.inner.iter_mut().zip(errors) {
+                *p *= if r.abs() > *p {
+                    1.0 + INNER_GAIN * (1.0 - BEYOND_INNER)
+                } else {
+                    1.0 - INNER_GAIN * BEYOND_INNER
+                };
+            }
         }
         self.follow(x, errors);
     }
@@ -173,8 +274,24 @@ impl ChannelGuard {
         self.known = if self.known < ORDERS { self.known + 1 } else { ORDERS };
     }
 
-    /// Chooses the order of the prediction anew, from time to time.
-    pub fn choose(&mut self) {
+    fn average_tails(&mut self) {
+        self.averaged = self.averaged.saturating_add(1).min(AVERAGED);
+        let weight = 1.0 / f64::from(self.averaged);
+        for ((heavy, q), p) in self.heavy.iter_mut().zip(&self.quantiles).zip(&self.inner) {
+            let quotient = q / p;
+            // A tail of which nothing is known (0/0) is a Gaussian one.
+            let square = (quotient * quotient).clamp(LIMIT, HEAVIEST);
+            *heavy += weight * (square - *heavy);
+        }
+    }
+
+    /// The end of a block: averages the tails and chooses the order of the prediction anew.
+    pub fn end_block(&mut self) {
+        self.average_tails();
+        self.choose();
+    }
+
+    fn choose(&mut self) {
         for (order, q) in self.quantiles.iter().enumerate() {
             if *q < self.quantiles[self.order] {
                 self.order = order;
@@ -336,6 +453,81 @@ mod tests {
             assert!(!channel.is_outlier(&errors), "{t}: {errors:?}");
             channel.accept(signal(t), &errors);
         }
+    }
+
+    /// Weibull's law has m = 4^(1/k): twice the quantile of k = 2, seven times that of k = .7; the largest of
+    /// 1e5 samples is within, one as large as never is not. Rests change nothing.
+    #[test]
+    fn who_moves_in_bursts_has_a_higher_limit_and_a_spike_is_still_one() {
+        for (shape, least, most) in [(2.0, 2.4, 2.6), (1.0, 3.0, 5.5), (0.7, 5.0, 10.5)] {
+            let mut state = 7_u64;
+            let mut uniform = || {
+                state = state
+                    .wrapping_mul(6_364_136_223_846_793_005)
+                    .wrapping_add(1_442_695_040_888_963_407);
+                ((state >> 11) as f64 + 0.5) / (1_u64 << 53) as f64
+            };
+            let mut channel = ChannelGuard::new(0.01);
+            channel.set_quantiles([1.0; ORDERS]);
+            let (mut beyond, mut factor, mut x) = (0, 0.0, 0.0);
+            for t in 0..100_000 {
+                // Moves for half a second, and rests as long.
+                if t / 50 % 2 == 0 {
+                    let size = libm::pow(-libm::log(uniform()), 1.0 / shape);
+                    x += if uniform() < 0.5 { size } else { -size };
+                }
+                let errors = channel.errors(x);
+                if t > 10_000 {
+                    beyond += i32::from(channel.is_outlier(&errors));
+                    factor += channel.limit(0) / channel.quantiles[0] / 89_999.0;
+                    assert!(channel.is_outlier(&channel.errors(x + 40.0 * channel.quantiles[0])));
+                }
+                channel.accept(x, &errors);
+                if t % 100 == 99 {
+                    channel.end_block();
+                }
+            }
+            assert!(beyond <= 1, "{shape}: {beyond}");
+            assert!((least..most).contains(&factor), "{shape}: {factor}");
+        }
+    }
+
+    #[test]
+    fn behind_a_step_a_signal_moves_as_before_and_one_of_another_scale_does_not() {
+        for order in 0..ORDERS {
+            let mut channel = ChannelGuard::new(0.01);
+            let mut state = 3;
+            let mut quantiles = [9.0; ORDERS];
+            quantiles[order] = 2.576;
+            channel.set_quantiles(quantiles);
+            assert_eq!(channel.order, order);
+            // White noise, summed once for each order.
+            let mut sums = [0.0; ORDERS];
+            let signal: [f64; 11] = core::array::from_fn(|_| {
+                let mut x = noise(&mut state);
+                for sum in &mut sums[..=order] {
+                    *sum += x;
+                    x = *sum;
+                }
+                x
+            });
+            assert!(channel.moves_as_usual(signal.iter().map(|x| x + 1e3)), "{order}");
+            assert!(!channel.moves_as_usual(signal.iter().map(|x| 5.0 * x)), "{order}");
+            assert!(!channel.moves_as_usual(signal[..=order].iter().copied()), "{order}");
+        }
+    }
+
+    #[test]
+    fn while_quantiles_are_learnt_nothing_is_held_back() {
+        let mut channel = ChannelGuard::new(0.01);
+        channel.follow(0.0, &[0.0; ORDERS]);
+        channel.begin_learning([0.0; ORDERS]);
+        channel.watch();
+        assert!(!channel.is_known());
+        channel.begin_learning([0.1; ORDERS]);
+        assert!(!channel.is_outlier(&channel.errors(1e9)));
+        channel.watch();
+        assert!(channel.is_known() && channel.is_outlier(&channel.errors(1e9)));
     }
 
     #[test]

@@ -10,6 +10,7 @@
 //! |---|---|
 //! | [`channel`] | one signal: the causal prediction of its next sample, the scale of its errors, samples that are held back |
 //! | [`profile`] | both signals over a second: sizes and smoothness against those of the past; idle, frozen and swapped channels, a model that foretells less than the past of u alone |
+//! | [`resting`] | a stick that rests, told from a channel that is frozen |
 //! | [`mod@reference`] | the model of the start beside the estimate: an estimate that has gone astray |
 //!
 //! What is done with such samples and spans stands where the recursion is at hand, in the crate
@@ -18,3 +19,4 @@
 pub mod channel;
 pub mod profile;
 pub mod reference;
+pub mod resting;

@@ -9,7 +9,7 @@
 //! | what | rule | why |
 //! |---|---|---|
 //! | frozen e | `a_e1 <= A_e1/1000` in a block | the error of somebody who tracks never stands still |
-//! | frozen u | `a_u1 <= A_u1/1000` in three blocks in a row | a hand may rest |
+//! | frozen u | `a_u1 <= A_u1/1000` in three blocks in a row, but for a rest ([`super::resting`]) in which `a_eps` is at most twice its long-run value | a hand may rest |
 //! | idle | e and u each within a range of `M_c/20` in two blocks in a row | silence, with noise |
 //! | larger | `a_c1 > 5 A_c1` and `a_c3 > 5 A_c3` for e and u in two blocks in a row | both signals are what they were, times a factor |
 //! | rescaled | all four `a_cj/A_cj` of one channel above 3.5 and within a factor of 1.5 of each other, those of the other below 2, in two blocks in a row | another unit, a gain that was turned |
@@ -29,7 +29,8 @@ const LEARNT: u32 = 10;
 /// Weight of a block thereafter.
 const WEIGHT: f64 = 1.0 / 60.0;
 /// Limits of the rules.
-const FROZEN: f64 = 1e-3;
+/// Share of the usual mean difference up to which a signal stands still.
+pub const STILL: f64 = 1e-3;
 const FROZEN_U_BLOCKS: u32 = 3;
 const IDLE: f64 = 0.05;
 const IDLE_BLOCKS: u32 = 2;
@@ -317,14 +318,23 @@ impl Profile {
         }
     }
 
-    /// What is wrong with the means of a block, in the light of those before it.
-    pub fn judge(&mut self, block: &Block) -> Option<Trouble> {
+    /// Blocks that a trouble which was just told has lasted for at least.
+    pub fn lasting(&self, trouble: Trouble) -> u32 {
+        match trouble {
+            Trouble::FrozenOutput => self.frozen_u.max(trouble.blocks()),
+            _ => trouble.blocks(),
+        }
+    }
+
+    /// What is wrong with the means of a block, in the light of those before it; `rests` where u stands
+    /// still at its end as the person rests.
+    pub fn judge(&mut self, block: &Block, rests: bool) -> Option<Trouble> {
         if !self.is_known() {
             return None;
         }
         // A channel that never moved (there is no input, or it was never recorded) is not frozen.
         let below = |found: f64, share: f64, usual: f64| usual > 0.0 && found <= share * usual;
-        let still = |c: usize| below(block.differences[c][0], FROZEN, self.usual.differences[c][0]);
+        let still = |c: usize| below(block.differences[c][0], STILL, self.usual.differences[c][0]);
         let silent = |c: usize| below(block.range[c][1] - block.range[c][0], IDLE, self.usual.magnitude[c]);
         let count = |run: u32, is: bool| if is { run.saturating_add(1) } else { 0 };
         let frozen_e = still(0);
@@ -347,13 +357,14 @@ impl Profile {
         let limit = (MISFIT * self.ratio).max(LEAST_RATIO);
         let misfit = self.ratios >= LEARNT && block.ratio().is_some_and(|ratio| ratio > limit);
         // Of somebody who rests the past foretells all, and the model need not be wrong.
-        let misfit = misfit && block.innovation > LEAST_GROWTH * self.innovation;
+        let as_foretold = self.ratios < LEARNT || block.innovation <= LEAST_GROWTH * self.innovation;
+        let misfit = misfit && !as_foretold;
         self.misfits = count(self.misfits, misfit);
         if frozen_e {
             Some(Trouble::FrozenInput)
         } else if self.idle >= IDLE_BLOCKS {
             Some(Trouble::Idle)
-        } else if self.frozen_u >= FROZEN_U_BLOCKS {
+        } else if self.frozen_u >= FROZEN_U_BLOCKS && !(rests && as_foretold) {
             Some(Trouble::FrozenOutput)
         } else if self.larger >= LARGER_BLOCKS {
             Some(Trouble::Larger)
@@ -420,7 +431,7 @@ mod tests {
         let mut profile = Profile::new();
         for _ in 0..20 {
             let usual = block([0.02, 0.1], [0.1, 1.1]);
-            assert_eq!(profile.judge(&usual), None);
+            assert_eq!(profile.judge(&usual, false), None);
             profile.learn(&usual);
         }
         profile
@@ -463,12 +474,37 @@ mod tests {
         for (bad, trouble, after) in cases {
             let mut profile = known();
             for n in 1..=5 {
-                let found = profile.judge(&bad);
+                let found = profile.judge(&bad, false);
                 assert_eq!(found, (n >= after).then_some(trouble), "{n} {trouble:?}");
             }
-            let left = (0..30).find(|_| profile.judge(&usual).is_none());
+            let left = (0..30).find(|_| profile.judge(&usual, false).is_none());
             assert!(left.is_some_and(|n| n <= 12), "{trouble:?}: {left:?}");
         }
+    }
+
+    /// The stick stands where it rests and e goes on; not so where the person does what nobody foretold, or e
+    /// stands too.
+    #[test]
+    fn a_rest_is_not_frozen_but_a_rest_that_does_not_fit_is() {
+        let still = block([0.02, 0.0], [0.1, 1.1]);
+        let quiet = |innovation: f64, e: f64| Block {
+            innovation,
+            ..block([e, 0.0], [0.1, 1.1])
+        };
+        let after = |rests: bool, found: &Block| {
+            let mut profile = known();
+            (1..=20).find_map(|n| profile.judge(found, rests).map(|trouble| (n, trouble)))
+        };
+        assert_eq!(after(false, &still), Some((3, Trouble::FrozenOutput)));
+        assert_eq!(after(true, &quiet(0.0, 0.02)), None);
+        assert_eq!(after(true, &quiet(0.19, 0.02)), None);
+        assert_eq!(after(true, &quiet(0.21, 0.02)), Some((3, Trouble::FrozenOutput)));
+        assert_eq!(after(true, &quiet(0.0, 0.0)), Some((1, Trouble::FrozenInput)));
+        // One that was believed for long has lasted for as long.
+        let mut profile = known();
+        (0..9).for_each(|_| assert_eq!(profile.judge(&quiet(0.0, 0.02), true), None));
+        let told = profile.judge(&quiet(0.0, 0.02), false);
+        assert_eq!(told.map(|trouble| profile.lasting(trouble)), Some(10));
     }
 
     #[test]
@@ -488,7 +524,7 @@ mod tests {
         let mut size = 0.1;
         for n in 0..200 {
             let found = block([size, size], [0.9, 0.9]);
-            assert_eq!(profile.judge(&found), None, "{n}");
+            assert_eq!(profile.judge(&found, false), None, "{n}");
             profile.learn(&found);
             size *= if n % 7 < 4 { 1.5 } else { 0.6 };
         }

@@ -100,7 +100,7 @@ pub struct Basis {
     z: [f64; N],
 }
 
-crate::state!([] Basis { point, columns, taps, monic, delay, part, z });
+crate::state!([] Basis { point, columns, taps, monic, delay, part, scale, z });
 
 impl Basis {
     /// At rest. Ts in s. `None` for numbers that are not positive (the delay: negative), or not

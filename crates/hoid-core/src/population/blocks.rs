@@ -2,12 +2,11 @@
 //!
 //! Behind the whitening filter, with the regressors of gains and level r, those of what is held
 //! `q_j = sum_i theta_i dx_i/dj`, both where the estimate is at that sample, and the held values p of
-//! that sample, about those at the beginning,
+//! that sample, about those of the basis,
 //!
 //! `y = r' s + eps` (what is held is known), `y + q' p = r' s + q' p' + eps` (it is not),
 //!
-//! the second to first order; p does not depend on where the basis was made, which may have moved
-//! meanwhile. Each sample counts as one over the variance of eps and is limited to some standard
+//! the second to first order. Each sample counts as one over the variance of eps and is limited to some standard
 //! deviations about its prediction. Least squares over a span of blocks has the covariance `sigma^2
 //! A^-1` with a variance of its own. What is held has a weak prior at where it is now, the same for all
 //! spans: where the data say nothing of it, two spans do not differ.
@@ -29,7 +28,7 @@ pub(super) struct Row {
     /// Regressors of gains and level, and of what is held.
     pub r: [f64; LINEAR],
     pub q: [f64; HELD],
-    /// What is held, about where it was at the beginning.
+    /// What is held, about where the basis was made.
     pub p: [f64; HELD],
     /// Limited output.
     pub y: f64,
@@ -88,7 +87,7 @@ pub struct Span {
 
 crate::state!([] Span { state, covariance, variance, samples });
 
-/// Gains, level and what is held (about where it was at the beginning) of one of the two spans.
+/// Gains, level and what is held (about where the basis was made) of one of the two spans.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct WholeSpan {
     /// Gains, level, held.

@@ -26,25 +26,22 @@
 //! was, and what changed, is told by the block that leaves least where gains and what is held are free
 //! before it and behind it (R. E. Quandt, *J. American Statistical Association* 53 (1958) 873-880).
 //!
-//! Where samples are not taken for longer than a quarter of a second, or nothing moves, what is beside that
-//! gap is not looked at: the samples before it may have been part of the same fault, and behind it the
-//! filters swing in. From three seconds behind it on, what is behind it is held against what was before.
+//! The blocks are those of the candidate of now (`last_blocks`), all behind its noise model and in its
+//! basis: when another takes over, so do its blocks. From three seconds behind a gap on, what is behind it is held
+//! against what was before.
 //!
 //! Sources: G. C. Chow, *Econometrica* 28 (1960) 591-605; B. L. Welch, *Biometrika* 34 (1947) 28-35;
 //! the mean of the logarithm and the tail: M. Abramowitz and I. A. Stegun, 1964, eq. 6.3.3, 6.3.4, 26.4.5.
 
 use super::{
     basis::Complex,
-    blocks::{Block, EMPTY, Row, Span, WholeSpan},
+    blocks::{Block, Span, WholeSpan},
     cholesky,
     difference::Difference,
+    last_blocks::{BLOCK_S, BLOCKS, LastBlocks},
     sizes::{GAINS, HELD, LINEAR},
 };
 
-/// Blocks that there is room for.
-pub const BLOCKS: usize = 96;
-/// Length of a block, s.
-pub const BLOCK_S: f64 = 0.5;
 /// Which differences, and over which present.
 const STATISTICS: [(Of, usize); 3] = [(Of::Response, SHORT), (Of::All, SHORT), (Of::All, LONG)];
 const SHORT: usize = 0;
@@ -55,9 +52,6 @@ const UNEVEN: f64 = 1.5;
 const MEAN_LOG: f64 = 0.115_931_515_658_412_45;
 /// What both look at together: gains and what is held.
 const OPERATOR: usize = GAINS + HELD;
-/// Time from which samples that are not taken are a gap, and time that is not looked at behind one, s.
-const GAP_S: f64 = 0.25;
-const BEHIND_S: f64 = 1.0;
 /// Blocks behind a gap from which they are held against those before it.
 const FEWEST: usize = 4;
 /// Blocks that the supposed level of T counts for, and the logarithm of that level.
@@ -165,21 +159,13 @@ fn against_chance(x: f64, pairs: u32) -> f64 {
     half - libm::log(sum)
 }
 
-/// The blocks and what they say.
+/// What the blocks say.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Detector {
     what: Detection,
     response: [Complex; GAINS],
-    samples_of_block: u64,
-    block: Block,
-    blocks: [Block; BLOCKS],
-    count: usize,
     statistics: [Statistic; STATISTICS.len()],
-    /// Samples that were not taken, one after another, and those that are not looked at from now on.
-    gap: u64,
-    behind: u64,
-    /// Blocks since the last gap.
-    fresh: usize,
+    /// Blocks since the last change was declared.
     since: u64,
     spans: [Span; 2],
     whole: [WholeSpan; 2],
@@ -188,29 +174,19 @@ pub struct Detector {
     ago: usize,
 }
 
-crate::state!([] Detector {
-    response, block, blocks, count, statistics, gap, behind, fresh, since, spans, whole, declared, difference, ago,
-});
+crate::state!([] Detector { response, statistics, since, spans, whole, declared, difference, ago });
 
 impl Detector {
-    /// Without blocks. `response` is that of the basis at the frequency, Ts in s. `None` where there
-    /// is no room for the blocks.
-    pub fn new(what: Detection, response: [Complex; GAINS], ts: f64) -> Option<Self> {
+    /// Before the first block. `None` where there is no room for the blocks.
+    pub fn new(what: Detection) -> Option<Self> {
         let [short, long] = what.recent;
         let present = short > 0 && short <= long;
         let room = present && what.least > 0 && what.least <= what.most && long + what.most <= BLOCKS;
         let sound = what.held.iter().all(|d| *d > 0.0 && d.is_finite());
         (room && sound).then_some(Self {
             what,
-            response,
-            samples_of_block: libm::round(BLOCK_S / ts).max(1.0) as u64,
-            block: EMPTY,
-            blocks: [EMPTY; BLOCKS],
-            count: 0,
+            response: [[0.0; 2]; GAINS],
             statistics: STATISTICS.map(|(of, _)| Statistic::new(of.pairs())),
-            gap: 0,
-            behind: 0,
-            fresh: BLOCKS,
             since: u64::MAX >> 12,
             spans: [Span::default(); 2],
             whole: [WholeSpan::default(); 2],
@@ -220,55 +196,33 @@ impl Detector {
         })
     }
 
-    /// Takes a sample. True where a change is declared. It is part of a gap where it is the one before again.
-    #[inline]
-    pub(super) fn update(&mut self, row: &Row, moved: bool) -> bool {
-        if !moved {
-            self.skip();
-        } else {
-            (self.declared, self.gap) = (false, 0);
-        }
-        if self.behind > 0 {
-            self.behind -= 1;
-            return false;
-        }
-        self.block.add(row);
-        if self.block.samples >= self.samples_of_block as f64 {
-            self.close(row.p);
-        }
-        self.declared
-    }
-
-    /// Ends a block; `held` is where what is held is now.
-    fn close(&mut self, held: [f64; HELD]) {
-        if self.count == self.what.recent[LONG] + self.what.most {
-            self.blocks.copy_within(1..self.count, 0);
-            self.count -= 1;
-        }
-        self.blocks[self.count] = self.block;
-        self.count += 1;
-        self.block = EMPTY;
+    /// Looks at blocks of which the last is new. `response` is that of the gains at the frequency, `held` where
+    /// what is held is now, about the basis of the blocks.
+    pub(super) fn look(&mut self, last: &LastBlocks, response: [Complex; GAINS], held: [f64; HELD]) {
+        (self.response, self.declared) = (response, false);
         self.since += 1;
-        self.fresh = (self.fresh + 1).min(BLOCKS);
+        // What was before the last change is no measure of what comes.
+        let known = last
+            .all()
+            .len()
+            .min(usize::try_from(self.since).unwrap_or(BLOCKS) + self.ago);
+        let blocks = &last.all()[last.all().len() - known..];
         self.statistics.iter_mut().for_each(|s| s.against_chance = 0.0);
         let mut passed = false;
         // The short present last: its spans are those that are told.
         for present in [LONG, SHORT] {
-            passed |= self.compare(held, present);
+            passed |= self.compare(blocks, last.fresh(), held, present);
         }
         if passed && self.since > self.what.refractory {
             self.declared = true;
             self.since = 0;
             self.statistics.iter_mut().for_each(|s| s.above = 0);
-            self.split(held, self.what.recent[LONG].min(self.fresh));
-            // What was before is no measure of what comes.
-            self.blocks.copy_within(self.count - self.ago..self.count, 0);
-            self.count = self.ago;
+            self.split(blocks, held, self.what.recent[LONG].min(last.fresh()));
         }
     }
 
     /// Holds a present against what was before it; true where a statistic has been above for long enough.
-    fn compare(&mut self, held: [f64; HELD], present: usize) -> bool {
+    fn compare(&mut self, blocks: &[Block], fresh: usize, held: [f64; HELD], present: usize) -> bool {
         let Detection {
             least,
             most,
@@ -276,8 +230,8 @@ impl Detector {
             persistence,
             ..
         } = self.what;
-        let recent = self.what.recent[present].min(self.fresh);
-        let middle = self.count.saturating_sub(recent);
+        let recent = self.what.recent[present].min(fresh);
+        let middle = blocks.len().saturating_sub(recent);
         let of_this = STATISTICS.map(|(of, over)| (over == present).then_some(of));
         if middle < least || recent < FEWEST.min(self.what.recent[SHORT]) {
             let these = self.statistics.iter_mut().zip(of_this).filter(|(_, of)| of.is_some());
@@ -285,8 +239,8 @@ impl Detector {
             return false;
         }
         let sums = [
-            Block::of(&self.blocks[middle.saturating_sub(most)..middle]),
-            Block::of(&self.blocks[middle..self.count]),
+            Block::of(&blocks[middle.saturating_sub(most)..middle]),
+            Block::of(&blocks[middle..]),
         ];
         let [Some(past), Some(now)] = sums.each_ref().map(Block::fit) else {
             return false;
@@ -309,14 +263,12 @@ impl Detector {
     }
 
     /// The spans before and after the block that leave least when the change is supposed to be there.
-    fn split(&mut self, held: [f64; HELD], recent: usize) {
+    fn split(&mut self, blocks: &[Block], held: [f64; HELD], recent: usize) {
         let mut least = f64::MAX;
         self.ago = recent;
-        for after in 1..=recent {
-            let sums = [
-                Block::of(&self.blocks[..self.count - after]),
-                Block::of(&self.blocks[self.count - after..self.count]),
-            ];
+        for after in 1..=recent.min(blocks.len().saturating_sub(1)) {
+            let (past, present) = blocks.split_at(blocks.len() - after);
+            let sums = [Block::of(past), Block::of(present)];
             let [Some(past), Some(present)] = sums.each_ref().map(|sum| sum.fit_whole(held, self.what.held)) else {
                 continue;
             };
@@ -337,11 +289,6 @@ impl Detector {
     /// How long ago the change that was declared last had been, when it was declared, s.
     pub fn ago_s(&self) -> f64 {
         self.ago as f64 * BLOCK_S
-    }
-
-    /// The response of the gains at the frequency is this from now on.
-    pub fn look_at(&mut self, response: [Complex; GAINS]) {
-        self.response = response;
     }
 
     /// T of Y; `None` where the spans say nothing of the frequency.
@@ -406,36 +353,9 @@ impl Detector {
         &self.difference
     }
 
-    /// Begins anew, but for how much this person varies: what was kept is not in the gains of now.
-    pub fn forget(&mut self) {
-        (self.block, self.count) = (EMPTY, 0);
-        for statistic in &mut self.statistics {
-            (statistic.against_chance, statistic.above) = (0.0, 0);
-        }
+    /// No block ended at this sample: no change is declared at it.
+    pub(super) fn pass_over(&mut self) {
         self.declared = false;
-    }
-
-    /// A sample says nothing, and is no fault: no change is declared at it.
-    pub fn pass_over(&mut self) {
-        self.declared = false;
-    }
-
-    /// A sample is not taken: no change is declared at it, and behind many of them nothing is looked at.
-    pub fn skip(&mut self) {
-        self.pass_over();
-        self.gap += 1;
-        let samples = |seconds: f64| (seconds / BLOCK_S * self.samples_of_block as f64) as u64;
-        let (long, behind) = (samples(GAP_S).max(1), samples(BEHIND_S));
-        if self.gap == long {
-            // The block that is open, and the one before it.
-            self.block = EMPTY;
-            self.count = self.count.saturating_sub(1);
-            self.fresh = 0;
-            self.statistics.iter_mut().for_each(|s| s.above = 0);
-        }
-        if self.gap >= long {
-            self.behind = behind;
-        }
     }
 }
 

@@ -1,59 +1,105 @@
-//! The recursion: the one who is believed, their rivals, and the detector.
+//! The recursion: the estimate of now, the replays that mend it, and the detector.
+//!
+//! The candidate of now ([`super::candidate`]) takes each sample as it comes. Beside it another candidate
+//! reads the record again from the start of the memory, [`REPLAYED`] samples with each new one, until it
+//! has caught up. It has the basis where the estimate now points, the noise model of its residuals, and
+//! the dispersion of its innovations. When it has caught up it takes over, and the next one starts. So the
+//! estimate is, a few seconds late, that of a prediction error method of all data since the start of the
+//! memory that is repeated again and again, at a bounded cost for each sample and with the same digits
+//! whatever the machine.
+//!
+//! Every second replay starts elsewhere. It is repeated [`STAGES`] times from where it ended, and takes over
+//! only if its evidence is better by [`BETTER`].
+//!
+//! With no more memory than the longest delay needs nothing is replayed: basis and noise model are then
+//! those of the start, but for corrections, and the noise model is renewed in place.
+
+use core::ops::Range;
 
 use super::{
+    alternatives::Alternatives,
     basis::{Basis, Complex, Point},
-    blocks::Row,
-    contest::Contest,
+    candidate::{Candidate, LARGEST, LATEST_S},
     detector::Detector,
-    ends::Ends,
-    follower::{Follower, LARGEST, LATEST_S, Learnt, Past},
-    gains::Gains,
+    history::{History, Use},
     known::Known,
+    mixture::{ChangePrior, Mixture, NoiseScales},
     noise::NoiseModel,
     prior::PopulationPrior,
-    sizes::{GAINS, HELD, LARGEST_ORDER, LINEAR, PARAMETERS, STATES},
+    saturation::Saturation,
+    sizes::{GAINS, HELD, LINEAR, STATES},
 };
 use crate::{
     recursion::Step,
     state::{State, visit_all},
 };
 
-/// Time from which blocks are kept for the detector: before that D is what was supposed, s.
-const SETTLED_S: f64 = 5.0;
+/// Samples that are read again with each new one.
+pub const REPLAYED: usize = 50;
+/// Replays of a start that is elsewhere, and the evidence by which it must be better, nats.
+const STAGES: u64 = 3;
+const BETTER: f64 = 3.0;
+/// Evidence by which a replay of the estimate itself may be worse: it started with what was known less
+/// well.
+const WORSE: f64 = 20.0;
+/// Trust region of the corrections in a replay: shares of omega and zeta, and s.
+const NEAR: [f64; HELD] = [0.15, 0.3, 0.03];
+/// Time from which a replay learns nothing, s: its filters start at rest, and the person did not.
+const AT_REST_S: f64 = 2.0;
+/// Samples that a first estimate needs, in orders of the noise model.
+const FEWEST: u64 = 3;
+/// Time from which nothing is learnt of signals that do not move, s.
+const STILL_S: f64 = 0.1;
+/// Time after that until the filters have settled, s.
+const SETTLING_S: f64 = 2.0;
 
-/// The recursion. E is the memory for past errors.
+/// The recursion. E is the memory for past samples.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PopulationFilter<E> {
     prior: PopulationPrior,
-    origin: Point,
-    believed: Follower,
-    contest: Contest,
+    origin: Basis,
+    known: Option<Known>,
+    supposed: NoiseModel,
+    live: Candidate,
+    began: bool,
+    trial: Candidate,
+    /// 0: nothing is replayed; 1: the estimate; from 2 on: a start elsewhere.
+    stage: u64,
+    /// The next sample of the replay.
+    at: u64,
+    replays: u64,
+    alternatives: Alternatives,
     detector: Detector,
-    errors: E,
-    newest: usize,
-    u: [f64; LARGEST_ORDER],
-    ends: Ends,
+    history: History<E>,
+    saturation: Saturation,
+    powers: [f64; 2],
     restarts: u64,
-    /// Samples for which there has been an estimate that began where this one did, and those of the
-    /// one that was left at the last sample.
     age: u64,
-    left: u64,
+    /// Samples in which neither signal has moved.
+    still: u64,
+    /// Samples since then.
+    settling: u64,
 }
 
 impl<E: AsMut<[f64]>> State for PopulationFilter<E> {
     fn visit(&mut self, each: &mut dyn FnMut(&mut f64)) {
-        self.errors.as_mut().visit(each);
         visit_all(
             &mut [
-                &mut self.believed,
-                &mut self.contest,
+                &mut self.history,
+                &mut self.live,
+                &mut self.began,
+                &mut self.trial,
+                &mut self.stage,
+                &mut self.at,
+                &mut self.replays,
+                &mut self.alternatives,
                 &mut self.detector,
-                &mut self.newest,
-                &mut self.u,
-                &mut self.ends,
+                &mut self.saturation,
+                &mut self.powers,
                 &mut self.restarts,
                 &mut self.age,
-                &mut self.left,
+                &mut self.still,
+                &mut self.settling,
             ],
             each,
         );
@@ -61,316 +107,473 @@ impl<E: AsMut<[f64]>> State for PopulationFilter<E> {
 }
 
 impl<E: AsRef<[f64]> + AsMut<[f64]>> PopulationFilter<E> {
-    /// At rest. `errors` is memory for [`errors_needed`] numbers. `None` for numbers that make no
-    /// sense, or too little memory.
-    pub fn new(basis: Basis, prior: PopulationPrior, mut errors: E) -> Option<Self> {
-        let ts = prior.gains.sample_time;
-        if !prior.is_sound() || basis.point().tau > LATEST_S || errors.as_ref().len() < errors_needed(ts) {
+    /// At rest. `memory` is for [`memory_needed`] numbers, or fewer for no replays, but never fewer than
+    /// [`least_memory`]. `None` for numbers that make no sense, or too little memory.
+    pub fn new(prior: PopulationPrior, memory: E) -> Option<Self> {
+        let ts = prior.sample_time;
+        if !prior.is_sound() || prior.person.tau > LATEST_S || memory.as_ref().len() < least_memory(ts) {
             return None;
         }
-        errors.as_mut().fill(0.0);
-        let origin = basis.point();
-        let response = basis.response(prior.detection.frequency, basis.point());
-        let detector = Detector::new(prior.detection, response, ts)?;
-        let believed = Follower::new(basis, &prior)?;
-        let u = [0.0; LARGEST_ORDER];
-        let mut contest = Contest::new(&believed);
-        let past = Past {
-            errors: errors.as_ref(),
-            newest: 0,
-            u: &u,
+        let basis = Basis::new(prior.person, ts)?;
+        let detector = Detector::new(prior.detection)?;
+        let supposed = NoiseModel::new(prior.order, prior.noise_memory, ts)?;
+        let scales = NoiseScales {
+            unit: 1.0,
+            size: 1.0,
+            sample_time: ts,
+            dispersion: 1.0,
         };
-        contest.begin(&prior, &believed, &past, false);
+        let mixture = Mixture::new(&prior.changes, &basis, &scales, variances(&prior));
+        let live = Candidate::new(
+            basis.clone(),
+            &supposed,
+            supposed.clone(),
+            mixture,
+            scales,
+            &prior.changes,
+            0,
+        );
         Some(Self {
             prior,
-            origin,
-            believed,
-            contest,
+            origin: basis,
+            known: None,
+            supposed,
+            trial: live.clone(),
+            live,
+            began: false,
+            stage: 0,
+            at: 0,
+            replays: 0,
+            alternatives: Alternatives::NONE,
             detector,
-            errors,
-            newest: 0,
-            u,
-            ends: Ends::new(),
+            history: History::new(memory),
+            saturation: Saturation::new(),
+            powers: [0.0; 2],
             restarts: 0,
             age: 0,
-            left: 0,
+            still: 0,
+            settling: 0,
         })
     }
 
-    /// Begins at once, at what is known of the person, without rivals until a change is declared. `None`
-    /// for numbers that make no sense.
-    pub fn knowing(mut self, known: &Known) -> Option<Self> {
-        let sound = self.believed.knowing(known, self.prior.gains.sample_time);
-        self.contest.end();
-        sound.then_some(self)
+    /// Starts at once, at what is known of the person. `None` for numbers that make no sense.
+    pub fn with_initial_estimate(mut self, known: &Known) -> Option<Self> {
+        if !known.is_sound() || !known.place_in(&mut self.supposed, self.prior.sample_time) {
+            return None;
+        }
+        self.known = Some(*known);
+        self.live = self.candidate(self.origin.point(), &self.supposed, 1.0)?;
+        self.began = true;
+        Some(self)
+    }
+
+    /// Scales by the data so far.
+    fn scales(&self, dispersion: f64) -> NoiseScales {
+        let [e, u] = self.powers;
+        let samples = self.history.samples().max(1) as f64;
+        let measured = NoiseScales {
+            unit: libm::sqrt(u / e),
+            size: libm::sqrt(u / samples),
+            sample_time: self.prior.sample_time,
+            dispersion,
+        };
+        match &self.known {
+            Some(known) => NoiseScales {
+                unit: known.unit,
+                size: measured.size.max(libm::sqrt(known.covariance[GAINS][GAINS])),
+                ..measured
+            },
+            None => measured,
+        }
+    }
+
+    /// One that starts at the oldest sample that a replay reads.
+    fn candidate(&self, point: Point, d: &NoiseModel, dispersion: f64) -> Option<Candidate> {
+        let (ts, changes) = (self.prior.sample_time, &self.prior.changes);
+        let basis = Basis::new(point, ts)?;
+        let scales = self.scales(dispersion);
+        let mixture = match &self.known {
+            Some(known) => {
+                let scale: [f64; GAINS] = core::array::from_fn(|i| self.origin.scale()[i] / basis.scale()[i]);
+                let of = |i: usize| scale.get(i).copied().unwrap_or(1.0);
+                let mut covariance = known.covariance;
+                for (i, row) in covariance.iter_mut().enumerate() {
+                    for (j, c) in row.iter_mut().enumerate() {
+                        *c *= of(i) * of(j);
+                    }
+                }
+                let mut state: [f64; STATES] = core::array::from_fn(|i| known.state[i] * of(i));
+                let from = self.origin.point();
+                for (s, moved) in state[LINEAR..].iter_mut().zip([
+                    from.omega - point.omega,
+                    from.zeta - point.zeta,
+                    from.tau - point.tau,
+                ]) {
+                    *s += moved;
+                }
+                Mixture::at(changes, state, covariance, known.variance)
+            }
+            None => {
+                let held = match self.replays_anything() {
+                    true => trusted(point),
+                    false => variances(&self.prior),
+                };
+                Mixture::new(changes, &basis, &scales, held)
+            }
+        };
+        let start = self.history.samples().saturating_sub(self.window());
+        let empty = NoiseModel::new(self.prior.order, self.prior.noise_memory, ts)?;
+        let there = self.history.samples().saturating_sub(start);
+        let skipped = (libm::round(AT_REST_S / ts) as u64).min(there / 2);
+        Some(Candidate::new(basis, d, empty, mixture, scales, changes, start).skipping(skipped))
+    }
+
+    /// Samples that a replay reads.
+    pub(super) fn window(&self) -> u64 {
+        let delay = errors_needed(self.prior.sample_time);
+        self.history.room().saturating_sub(2 * delay) as u64
+    }
+
+    fn replays_anything(&self) -> bool {
+        self.window() > 0
     }
 
     /// Takes a sample. Both must be finite.
     pub fn step(&mut self, e: f64, u: f64) -> Step {
         self.respond(e);
-        if let Some(step) = self.at_an_end(u) {
-            return step;
+        let end = self.saturation.end(u).filter(|_| self.began);
+        self.saturation.remember(u);
+        self.detector.pass_over();
+        if let Some(end) = end {
+            // It was there a sample ago: so much was not known then, but the next replay knows it.
+            self.history.revise_previous(end);
+            return self.pass(u, end);
         }
-        let past = Past {
-            errors: self.errors.as_ref(),
-            newest: self.newest,
-            u: &self.u,
-        };
-        let Some(learnt) = self.believed.step(&self.prior, &past, u) else {
+        if self.stands_still(u) {
+            return self.pass(u, Use::Follow);
+        }
+        self.powers[0] += e * e;
+        self.powers[1] += u * u;
+        if !self.began {
+            self.keep(u);
+            self.begin();
+            return Step {
+                innovation: 0.0,
+                shortened: false,
+            };
+        }
+        let white = self.live.whitened(u);
+        let innovation = self.live.innovation(&white);
+        if !self.live.learn(&white, u, &self.prior.changes) {
             self.rest();
             return Step {
                 innovation: 0.0,
                 shortened: true,
             };
-        };
-        self.age += u64::from(self.believed.began);
-        if self.contest.is_open() && self.contest.step(&self.prior, &past, u, &mut self.believed, &learnt) {
-            (self.left, self.age) = (self.age, 0);
-            self.detector.forget();
-        } else {
-            if self.look_for_changes(&learnt, u) {
-                let past = Past {
-                    errors: self.errors.as_ref(),
-                    newest: self.newest,
-                    u: &self.u,
-                };
-                self.contest.begin(&self.prior, &self.believed, &past, true);
-            }
         }
-        self.remember(u);
+        self.age += 1;
+        self.keep(u);
+        match self.replays_anything() {
+            true => self.replay(),
+            false => self.live.renew(),
+        }
+        if self.live.blocks.closed() {
+            self.look_for_changes();
+        }
         Step {
-            innovation: learnt.innovation,
+            innovation,
             shortened: false,
         }
     }
 
-    /// Nothing is learnt of a stick that stands at its end ([`super::ends`]).
-    #[inline(always)]
-    fn at_an_end(&mut self, u: f64) -> Option<Step> {
-        let ends = self.ends;
-        self.ends.remember(u);
-        if !self.believed.began || ends.beyond(u, u).is_none() {
-            return None;
+    /// The first estimate: the best of all starts over the samples so far.
+    fn begin(&mut self) {
+        let (ts, n) = (self.prior.sample_time, self.history.samples());
+        let enough = n as f64 * ts >= self.prior.hold && n >= FEWEST * self.prior.order as u64;
+        if !enough || !self.powers.iter().all(|p| *p > 0.0) {
+            return;
         }
-        let innovation = self.foretold(u);
-        let u = ends.beyond(u, u - innovation)?;
-        self.detector.pass_over();
-        self.keep(u, innovation);
-        Some(Step {
-            innovation,
-            shortened: false,
-        })
+        if !self.replays_anything() {
+            if let Some(live) = self.candidate(self.prior.person, &self.supposed, 1.0) {
+                self.live = live;
+                self.began = true;
+            }
+            return;
+        }
+        let mut best: Option<(f64, Candidate)> = None;
+        for start in self.prior.starts {
+            let Some(mut candidate) = self.candidate(start, &self.supposed, 1.0) else {
+                continue;
+            };
+            if !read(
+                &self.history,
+                &self.saturation,
+                &self.prior.changes,
+                &mut candidate,
+                0..n,
+            ) {
+                continue;
+            }
+            let evidence = candidate.evidence + self.plausibility(start);
+            if evidence.is_finite() && best.as_ref().is_none_or(|(least, _)| evidence > *least) {
+                best = Some((evidence, candidate));
+            }
+        }
+        if let Some((_, mut candidate)) = best {
+            self.suppose(&mut candidate);
+            (self.live, self.began) = (candidate, true);
+        }
+    }
+
+    /// Logarithm of the prior density of a point, but for a constant.
+    fn plausibility(&self, point: Point) -> f64 {
+        let (p, is) = (self.prior.person, variances(&self.prior));
+        let away = [point.omega - p.omega, point.zeta - p.zeta, point.tau - p.tau];
+        -0.5 * away.iter().zip(is).map(|(a, v)| a * a / v).sum::<f64>()
+    }
+
+    /// Reads on with the trial, and starts another when it is done.
+    fn replay(&mut self) {
+        if self.stage == 0 {
+            self.start_replay();
+            return;
+        }
+        let to = (self.at + REPLAYED as u64).min(self.history.samples());
+        let sound = read(
+            &self.history,
+            &self.saturation,
+            &self.prior.changes,
+            &mut self.trial,
+            self.at..to,
+        );
+        self.at = to;
+        if !sound {
+            self.stage = 0;
+        } else if self.at >= self.history.samples() {
+            self.decide();
+        }
+    }
+
+    fn start_replay(&mut self) {
+        self.replays += 1;
+        let elsewhere = self.replays.is_multiple_of(2) && self.known.is_none();
+        let (point, stage) = match elsewhere {
+            true => (self.prior.starts[self.turn()], 2),
+            false => (self.live.point(), 1),
+        };
+        let live = self.live.clone();
+        self.start_from(&live, point, stage);
+    }
+
+    /// The start of this replay, or of the last one that was elsewhere.
+    fn turn(&self) -> usize {
+        (self.replays / 2) as usize % self.prior.starts.len()
+    }
+
+    /// A trial at a point, with what another has learnt.
+    fn start_from(&mut self, from: &Candidate, point: Point, stage: u64) {
+        let mut d = from.noise.clone();
+        d.solve();
+        let Some(trial) = self.candidate(point, &d, from.dispersion()) else {
+            self.stage = 0;
+            return;
+        };
+        let later = (trial.start.saturating_sub(from.start)) / from.block_samples().max(1);
+        let guide = from.mixture.history();
+        let basis = trial.basis().clone();
+        self.trial = trial.guided(guide.carried(later, |state| from.carried(&basis, state)));
+        (self.stage, self.at) = (stage, self.trial.start);
+    }
+
+    /// What becomes of a trial that has caught up.
+    fn decide(&mut self) {
+        let mut trial = self.trial.clone();
+        trial.unguided();
+        let evidence = trial.evidence;
+        let stage = core::mem::replace(&mut self.stage, 0);
+        if !(evidence.is_finite() && trial.mixture.mean().iter().all(|s| s.is_finite())) {
+            return;
+        }
+        let same = trial.start == self.live.start;
+        self.suppose(&mut trial);
+        if stage > 1 && stage <= STAGES {
+            let point = trial.point();
+            self.start_from(&trial, point, stage + 1);
+            return;
+        }
+        let takes_over = match stage {
+            1 => !same || evidence > self.live.evidence - WORSE,
+            _ => same && evidence > self.live.evidence + BETTER,
+        };
+        if stage > 1 && same {
+            let loser = if takes_over { &self.live } else { &trial };
+            let behind = (evidence - self.live.evidence).abs();
+            self.alternatives
+                .put(self.turn(), loser.operator(), behind, self.history.samples());
+        }
+        if takes_over {
+            self.live = trial;
+        }
+    }
+
+    /// Puts what is supposed of people in the place of the trust region of a replay.
+    fn suppose(&self, candidate: &mut Candidate) {
+        if self.known.is_some() {
+            return;
+        }
+        let (p, at) = (self.prior.person, candidate.basis().point());
+        let mean = [p.omega - at.omega, p.zeta - at.zeta, p.tau - at.tau];
+        candidate.mixture.suppose(trusted(at), variances(&self.prior), mean);
+    }
+
+    /// Nothing is learnt while neither signal moves: it would be that of a recording that stands, or of a
+    /// person who rests, and the innovation variance would vanish.
+    #[inline(always)]
+    fn stands_still(&mut self, u: f64) -> bool {
+        let samples = self.history.samples();
+        let moved = samples < 2 || {
+            let (newest, before) = (samples - 1, samples - 2);
+            self.history.error(newest, 0) != self.history.error(before, 0) || u != self.history.output(before).0
+        };
+        let seconds = |samples: u64| samples as f64 * self.prior.sample_time;
+        if !moved {
+            self.still += 1;
+        } else if seconds(self.still) > STILL_S && seconds(self.settling) < SETTLING_S {
+            // What went on meanwhile is not in the filters.
+            self.settling += 1;
+        } else {
+            (self.still, self.settling) = (0, 0);
+        }
+        seconds(self.still) > STILL_S
+    }
+
+    /// A sample from which nothing is learnt.
+    fn pass(&mut self, u: f64, use_of_it: Use) -> Step {
+        let innovation = self.live.innovation(&self.live.whitened(u));
+        let through = through_filters(&self.saturation, use_of_it, u, u - innovation);
+        if innovation.abs() < LARGEST && through.abs() < LARGEST {
+            self.history.complete(u, use_of_it);
+            remember(&mut self.live, use_of_it, through);
+            return Step {
+                innovation,
+                shortened: false,
+            };
+        }
+        self.rest();
+        Step {
+            innovation: 0.0,
+            shortened: true,
+        }
     }
 
     /// As [`PopulationFilter::step`], but the estimate stays: only the filters move on.
     pub fn step_without_update(&mut self, e: f64, u: f64) -> Step {
         self.respond(e);
-        self.detector.skip();
-        let innovation = self.foretold(u);
-        self.keep(u, innovation);
-        Step {
-            innovation,
-            shortened: false,
-        }
+        self.detector.pass_over();
+        self.pass(u, Use::Follow)
     }
 
     /// As [`PopulationFilter::step_without_update`] where the output is missing: the one-step
     /// prediction takes its place.
     pub fn bridge(&mut self, e: f64) {
         self.respond(e);
-        self.detector.skip();
-        let u = -self.foretold(0.0);
-        self.keep(u, u);
-    }
-
-    fn foretold(&self, u: f64) -> f64 {
-        let past = Past {
-            errors: self.errors.as_ref(),
-            newest: self.newest,
-            u: &self.u,
-        };
-        let white = self.believed.whitened(&past, u);
-        self.believed.gains.innovation(white.y, &white.regressors, white.level)
-    }
-
-    fn keep(&mut self, u: f64, innovation: f64) {
-        if innovation.abs() < LARGEST && u.abs() < LARGEST {
-            self.remember(u);
-        } else {
-            self.rest();
-        }
+        self.detector.pass_over();
+        self.pass(0.0, Use::Missing);
     }
 
     /// The signals of a sample.
     #[inline(always)]
     fn respond(&mut self, e: f64) {
-        self.left = 0;
-        let errors = self.errors.as_mut();
-        self.newest = if self.newest + 1 >= errors.len() {
-            0
-        } else {
-            self.newest + 1
-        };
-        errors[self.newest] = e;
-        let past = Past {
-            errors: self.errors.as_ref(),
-            newest: self.newest,
-            u: &self.u,
-        };
-        self.believed.respond(&past);
-        if self.contest.is_open() {
-            self.contest.respond(&past);
-        }
+        self.history.push(e);
+        let newest = self.history.samples() - 1;
+        let history = &self.history;
+        self.live.respond(|age| history.error(newest, age));
     }
 
-    /// What the detector says of a sample, with the responses where the corrections point.
-    #[inline(always)]
-    fn look_for_changes(&mut self, learnt: &Learnt, u: f64) -> bool {
-        let Some(state) = learnt.state else { return false };
-        let past = Past {
-            errors: self.errors.as_ref(),
-            newest: self.newest,
-            u: &self.u,
-        };
-        let moved = past.error(0) != past.error(1) || u != self.u[0];
-        let (p, believed) = (&self.prior, &mut self.believed);
-        let Learnt {
-            white, innovation: eps, ..
-        } = learnt;
-        if believed.is_renewed() {
-            self.detector.look_at(believed.responses(p.detection.frequency));
-        }
-        if (believed.samples as f64) * p.gains.sample_time < SETTLED_S {
-            return false;
-        }
-        let most = p.gains.limit * libm::sqrt(believed.variance[1]);
-        let limited = white.y - eps + eps.max(-most).min(most);
-        let (mut r, mut q) = ([0.0; LINEAR], [0.0; HELD]);
-        for i in 0..GAINS {
-            r[i] = white.regressors.x[i];
-            for j in 0..HELD {
-                let by = white.regressors.by[j][i];
-                r[i] += state[LINEAR + j] * by;
-                q[j] += state[i] * by;
-            }
-        }
-        r[GAINS] = white.level;
-        let Point { omega, zeta, tau, .. } = believed.place.basis().point();
-        let at = self.origin;
-        let changed = self.detector.update(
-            &Row {
-                r,
-                q,
-                p: [
-                    omega - at.omega + state[LINEAR],
-                    zeta - at.zeta + state[LINEAR + 1],
-                    tau - at.tau + state[LINEAR + 2],
-                ],
-                y: limited,
-                innovation: *eps,
-                variance: believed.variance[1],
-            },
-            moved,
-        );
-        if changed {
-            believed.gains.open(p.jump * believed.unit);
-            let [_, system, delay] = self.detector.difference().changed;
-            if system || delay {
-                believed.gains.open_held(believed.place.basis().point());
-            }
-        }
-        changed
+    fn keep(&mut self, u: f64) {
+        self.history.complete(u, Use::Learn);
+        self.live.remember(u);
     }
 
-    fn remember(&mut self, u: f64) {
-        self.u.copy_within(0..LARGEST_ORDER - 1, 1);
-        self.u[0] = u;
-        self.believed.remember();
-        if self.contest.is_open() {
-            self.contest.remember();
-        }
+    /// What the detector says of the last blocks.
+    fn look_for_changes(&mut self) {
+        let held = core::array::from_fn(|j| self.live.mixture.mean()[LINEAR + j]);
+        let response = self.live.responses(self.prior.detection.frequency);
+        self.detector.look(&self.live.blocks, response, held);
     }
 
-    /// Brings the filters to rest where a signal has overflowed.
+    /// Starts again where a signal has overflowed.
     fn rest(&mut self) {
-        self.believed.place.rest();
-        self.contest.end();
-        self.errors.as_mut().fill(0.0);
-        self.u = [0.0; LARGEST_ORDER];
-        self.detector.skip();
+        self.history.clear();
+        self.detector.pass_over();
+        self.saturation = Saturation::new();
+        (self.powers, self.stage, self.age, self.replays) = ([0.0; 2], 0, 0, 0);
+        self.alternatives = Alternatives::NONE;
         self.restarts += 1;
+        self.began = false;
+        if let Some(live) = self.candidate(self.origin.point(), &self.supposed, 1.0) {
+            self.live = live;
+            self.began = self.known.is_some();
+        }
     }
 
     /// True from when on there is an estimate.
     pub fn began(&self) -> bool {
-        self.believed.began
+        self.began
     }
 
-    /// Samples that the estimate of now has seen.
+    /// Samples that the estimate has learnt from.
     pub fn samples(&self) -> u64 {
-        self.believed.samples
+        self.age
     }
 
-    /// True from when on neuromuscular system and delay are corrected.
-    pub fn corrects(&self) -> bool {
-        self.believed.reopened
-    }
-
-    /// True where an earlier fit of the person stood at the beginning of the estimate of now.
+    /// True where an earlier fit of the person is where the estimate started.
     pub fn is_known(&self) -> bool {
-        self.believed.is_known()
-    }
-
-    /// How far people are from the basis before the first sample: shares of omega and zeta, and s for the
-    /// delay.
-    pub fn spread(&self) -> [f64; HELD] {
-        self.prior.gains.held
+        self.known.is_some()
     }
 
     /// s.
     pub fn sample_time(&self) -> f64 {
-        self.prior.gains.sample_time
+        self.prior.sample_time
     }
 
     /// The basis.
     pub fn basis(&self) -> &Basis {
-        self.believed.place.basis()
+        self.live.basis()
     }
 
-    /// The gains.
-    pub fn gains(&self) -> &Gains {
-        &self.believed.gains
+    pub(super) fn alternatives(&self) -> &Alternatives {
+        &self.alternatives
     }
 
-    pub(super) fn believed(&self) -> &Follower {
-        &self.believed
+    /// Samples of the record so far.
+    pub(super) fn read(&self) -> u64 {
+        self.history.samples()
     }
 
-    /// How far the operators of others are who foretell u about as well, those that are told and those that
-    /// compete: means of the products of their distances.
-    pub fn scatter(&self) -> [[f64; PARAMETERS]; PARAMETERS] {
-        self.contest.scatter()
+    pub(super) fn live(&self) -> &Candidate {
+        &self.live
     }
 
     /// Where what is held is now, the corrections included: never outside of where the basis may be.
     pub fn held(&self) -> Point {
-        self.believed.corrected(&self.believed.gains.state())
+        self.live.point()
     }
 
     /// The response of each gain at a frequency in rad/s, for what is held now.
     pub fn responses(&self, omega_rad_s: f64) -> [Complex; GAINS] {
-        self.believed.responses(omega_rad_s)
+        self.live.responses(omega_rad_s)
     }
 
     /// Y at a frequency in rad/s.
     pub fn response(&self, omega_rad_s: f64) -> Complex {
-        self.believed.response(omega_rad_s)
+        self.live.response(omega_rad_s)
     }
 
     /// Y at a frequency in rad/s, with the derivatives of its real and its imaginary part by gains,
     /// level and corrections: exact by the gains, differences by the corrections.
     pub fn response_with_derivatives(&self, omega_rad_s: f64) -> (Complex, [[f64; STATES]; 2]) {
-        self.believed.response_with_derivatives(omega_rad_s)
+        self.live.response_with_derivatives(omega_rad_s)
     }
 
     /// The detector.
@@ -378,39 +581,104 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> PopulationFilter<E> {
         &self.detector
     }
 
-    /// Coefficients of D behind the 1.
+    /// Coefficients of D after the 1.
     pub fn d(&self) -> &[f64] {
-        self.believed.noise.d()
+        self.live.d()
     }
 
     /// The noise model.
     pub fn noise(&self) -> &NoiseModel {
-        &self.believed.noise
+        &self.live.noise
     }
 
-    /// Variance of eps of the last seconds.
+    /// Variance of eps.
     pub fn variance(&self) -> f64 {
-        self.believed.variance[0]
+        self.live.mixture.variance()
     }
 
     /// How often a signal overflowed and the filters were brought to rest.
     pub fn restarts(&self) -> u64 {
         self.restarts
     }
+}
 
-    /// Where at the last sample an estimate that began elsewhere took the place of another: the samples
-    /// for which that one was told.
-    pub fn left_behind(&self) -> Option<u64> {
-        (self.left > 0).then_some(self.left)
+/// Reads samples of the history; false where a number has overflowed.
+fn read<E: AsRef<[f64]> + AsMut<[f64]>>(
+    history: &History<E>,
+    saturation: &Saturation,
+    changes: &ChangePrior,
+    candidate: &mut Candidate,
+    samples: Range<u64>,
+) -> bool {
+    for sample in samples {
+        candidate.respond(|age| history.error(sample, age));
+        let (u, use_of_it) = history.output(sample);
+        let through = match use_of_it {
+            Use::Learn => {
+                let white = candidate.whitened(u);
+                if !candidate.learn(&white, u, changes) {
+                    return false;
+                }
+                u
+            }
+            Use::Follow => u,
+            _ => {
+                let predicted = u - candidate.innovation(&candidate.whitened(u));
+                through_filters(saturation, use_of_it, u, predicted)
+            }
+        };
+        remember(candidate, use_of_it, through);
     }
+    true
+}
 
-    /// Where the first basis was made; the detector's values of what is held are about it.
-    pub fn origin(&self) -> Point {
-        self.origin
+fn remember(candidate: &mut Candidate, use_of_it: Use, u: f64) {
+    match use_of_it {
+        Use::Learn => {}
+        Use::Follow | Use::Missing => candidate.blocks.skip(),
+        Use::AtMost | Use::AtLeast => candidate.blocks.pass_over(),
+    }
+    match use_of_it {
+        Use::Learn | Use::Follow => candidate.remember(u),
+        _ => candidate.remember_prediction(u),
     }
 }
 
-/// Errors that are kept, for a sample time in s: those of the longest delay.
+/// The output that goes on in the filters.
+fn through_filters(saturation: &Saturation, use_of_it: Use, u: f64, predicted: f64) -> f64 {
+    match use_of_it {
+        Use::Missing => predicted,
+        _ => saturation.beyond(use_of_it, u, predicted),
+    }
+}
+
+/// Variances of what is supposed of the corrections.
+fn variances(prior: &PopulationPrior) -> [f64; HELD] {
+    let [omega, zeta, tau] = prior.spread;
+    [omega * prior.person.omega, zeta * prior.person.zeta, tau].map(|s| s * s)
+}
+
+/// Variances of the trust region of a replay.
+fn trusted(point: Point) -> [f64; HELD] {
+    let [omega, zeta, tau] = NEAR;
+    [omega * point.omega, zeta * point.zeta, tau].map(|s| s * s)
+}
+
+/// Errors that are kept for the longest delay, for a sample time in s.
 pub fn errors_needed(sample_time: f64) -> usize {
     libm::ceil(LATEST_S / sample_time) as usize + 4
+}
+
+/// Numbers of memory without which nothing can be estimated, for a sample time in s.
+pub fn least_memory(sample_time: f64) -> usize {
+    3 * errors_needed(sample_time)
+}
+
+/// Samples that are replayed at most.
+const MOST_REPLAYED: f64 = 12_000.0;
+
+/// Numbers of memory for replays of so many seconds, for a sample time in s.
+pub fn memory_needed(sample_time: f64, seconds: f64) -> usize {
+    let samples = (seconds / sample_time).clamp(0.0, MOST_REPLAYED);
+    3 * (2 * errors_needed(sample_time) + libm::ceil(samples) as usize)
 }

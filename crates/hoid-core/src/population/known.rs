@@ -1,17 +1,15 @@
-//! What an earlier fit of the same person left: the recursion begins there, with its covariance.
+//! What an earlier fit of the person left: the recursion starts there, with its covariance.
 //!
-//! The gains, and the corrections of what is held, begin at the estimate of the fit with its
-//! covariance, and are followed from the first sample on. The noise model begins with the products
-//! that a span with the remnant of the fit would have left, so that the first seconds do not have to
-//! find it.
+//! Gains and corrections start at the estimate of the fit with its covariance, and are followed from the
+//! first sample on. The noise model starts with the products that a span with the remnant of the fit would
+//! have left, so that the first seconds do not have to find it.
 
 use super::{
-    gains::Gains,
     noise::{Lags, NoiseModel},
     sizes::{GAINS, STATES},
 };
 
-/// An estimate that stands at the beginning.
+/// An estimate that is there before the first sample.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Known {
     /// Gains, level, and corrections of the basis.
@@ -28,21 +26,21 @@ pub struct Known {
 }
 
 impl Known {
-    /// Puts gains and noise model there; false for numbers that make no sense.
-    pub(super) fn place_in(&self, gains: &mut Gains, noise: &mut NoiseModel, sample_time: f64) -> bool {
+    /// True for numbers that make sense.
+    pub(super) fn is_sound(&self) -> bool {
         let finite = |x: &f64| x.is_finite();
-        let sound = self.state.iter().all(finite)
+        self.state.iter().all(finite)
             && self.covariance.iter().flatten().all(finite)
             && (0..STATES).all(|i| self.covariance[i][i] >= 0.0)
             && self.covariance[GAINS][GAINS] > 0.0
             && self.variance > 0.0
             && self.unit > 0.0
             && self.variance.is_finite()
-            && self.unit.is_finite();
-        if !sound {
-            return false;
-        }
-        gains.begin_at(&self.state, &self.covariance);
+            && self.unit.is_finite()
+    }
+
+    /// Puts the remnant into a noise model; false for numbers that make no sense.
+    pub(super) fn place_in(&self, noise: &mut NoiseModel, sample_time: f64) -> bool {
         match &self.remnant {
             Some((lags, seconds)) => noise.suppose(lags, seconds / sample_time),
             None => true,

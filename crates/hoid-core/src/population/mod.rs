@@ -14,25 +14,25 @@
 //!
 //! which is linear in the gains. Data of a minute do determine omega, zeta and tau: corrections of
 //! them are estimated with the gains, to first order, and where they have grown the basis moves
-//! there (`place`). The lag stays. A gain with a lead but without a lag is in the span: then
+//! there. The lag stays. A gain with a lead but without a lag is in the span: then
 //! `N = (K_e + K_e_dot s)(T_I s + 1)`, and is weighed against any numerator.
 //!
-//! - **Noise** ([`noise`]). D is a long autoregression by least squares with a slow memory. At each
-//!   sample all its lags are made with the same gains, so that a move of the gains leaves no step in
-//!   it. The level of eps follows with a time constant of its own: a remnant that grows makes the
-//!   gains slower, not faster.
-//! - **Gains** ([`gains`]). Extended Kalman filters of `[theta, level, corrections]` differ in form and
-//!   in how much the gains drift: hardly, somewhat, much, or just changed. Weights follow the
-//!   likelihood, forgotten slowly. While nothing changes the one that hardly drifts wins, and the
-//!   precision grows. (D. T. Magill, IEEE Trans. Automatic Control 10 (1965) 434-439.) The likelihood
-//!   and the gain are those of a Student distribution, so that an outlier says little.
-//! - **Rivals** (`contest`). Others begin at other delays and poles, at the start and after each
-//!   change; the one that foretells best is believed.
-//! - **The end of the stick** (`ends`). Nothing is learnt of an output that stands there.
-//! - **Changes** ([`detector`]). Declared from the difference of Y at one frequency, or of gains
-//!   and what is held, between the last seconds and the time before ([`blocks`]), each fitted by least squares with
-//!   a variance of its own (G. C. Chow, Econometrica 28 (1960) 591-605; unequal variances: B. L. Welch,
-//!   Biometrika 34 (1947) 28-35), in units of how much the same person varies without a change. What
+//! - **Candidates** (`candidate`). One basis and one noise model read the data sample by sample: that is the
+//!   prediction error method for given D and a linearisation. The candidate of now answers; beside it another one
+//!   reads the record again ([`PopulationFilter`]), from where the estimate points, with what has been learnt of the
+//!   noise, and takes over when it has caught up. Every second one starts elsewhere. So the estimate is that of a
+//!   batch fit which is repeated again and again, at a bounded cost for each sample.
+//! - **Changes** ([`mixture`]). Within a candidate, hypotheses say when the operator last changed: they are born
+//!   in each block, weighed by what they predicted, and pruned. Of each there are forms and drifts.
+//! - **Noise** ([`noise`], `volatility`). D is a long autoregression of the residuals, by least squares. How
+//!   unevenly the innovations come says how many samples count for one.
+//! - **What else predicts as well** (`alternatives`). Other poles and delays that predict u about as well are in
+//!   the errors that are told.
+//! - **The end of the stick** (`saturation`). An output that stands there says that it would be at least so far.
+//! - **Declared changes** ([`detector`]). From the difference of Y at one frequency, or of gains
+//!   and what is held, between the last seconds and the time before ([`blocks`], `last_blocks`), each fitted by
+//!   least squares with a variance of its own (G. C. Chow, Econometrica 28 (1960) 591-605; unequal variances: B. L.
+//!   Welch, Biometrika 34 (1947) 28-35), in units of how much the same person varies without a change. What
 //!   changed is told by [`difference`].
 //!
 //! Nothing has to be fitted before: the estimate begins with the first second, whose ratio of
@@ -43,26 +43,29 @@ pub mod basis;
 pub mod blocks;
 pub mod detector;
 pub mod difference;
-pub mod gains;
 pub mod known;
+pub mod mixture;
 pub mod noise;
 pub mod usual;
 
+mod alternatives;
+mod candidate;
 mod cholesky;
-mod contest;
 mod elimination;
-mod ends;
 mod filter;
-mod follower;
-mod kalman;
+mod history;
+mod hypothesis;
+mod last_blocks;
+mod moments;
 mod operator;
 mod pair;
 mod past;
-mod place;
 mod prior;
+mod saturation;
 mod sizes;
+mod volatility;
 
-pub use filter::{PopulationFilter, errors_needed};
+pub use filter::{PopulationFilter, REPLAYED, errors_needed, least_memory, memory_needed};
 pub use operator::through;
 pub use prior::PopulationPrior;
-pub use sizes::{DRIFTS, FORMS, GAINS, HELD, LARGEST_ORDER, LINEAR, PARAMETERS, RIVALS, SIGNALS, STATES};
+pub use sizes::{GAINS, HELD, HYPOTHESES, LARGEST_ORDER, LINEAR, PARAMETERS, SIGNALS, STARTS, STATES};

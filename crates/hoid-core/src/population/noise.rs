@@ -93,12 +93,6 @@ impl NoiseModel {
         &self.d[..self.order]
     }
 
-    /// The same with zeros behind, up to a multiple of four.
-    #[inline(always)]
-    pub(super) fn padded_d(&self) -> &[f64] {
-        &self.d[..self.order.next_multiple_of(4).min(LARGEST_ORDER)]
-    }
-
     /// Largest lag.
     pub fn order(&self) -> usize {
         self.order

@@ -6,33 +6,31 @@
 //! exactly those of a person who has a gain and a lead. They are linear in the state s, so that their
 //! covariance is `M C M'`.
 //!
-//! That is the covariance of one corrected estimate about its own top of the likelihood. Poles and delay have
-//! others, and what people do below 10 rad/s says little of which is right: on simulated people tau_e had been
-//! beyond four of these errors in a third of the runs, and omega_nm in a tenth. So the scatter of the operators of
-//! all who compete (`contest`) counts too.
+//! Their covariance is that of the mixture over changes ([`super::mixture`]) at the basis of now, and the
+//! scatter of other operators that predict u about as well ([`super::alternatives`]).
 
 use super::{
     PopulationFilter,
-    follower::NEAR_RAD_S,
+    candidate::NEAR_RAD_S,
     sizes::{GAINS, HELD, LINEAR, PARAMETERS, STATES},
     usual::HOLD_S,
 };
 
 /// In the first seconds the noise model has not been seen for long, and the errors of what it whitens are
-/// too small: they are told `1 + UNLEARNT_S/t` times as large after t seconds. Set on virtual people of
+/// too small: they are reported `1 + UNLEARNT_S/t` times as large after t seconds. Set on virtual people of
 /// another seed than those of the test (`tests/first_seconds.rs` of `hoid-track`).
 const UNLEARNT_S: f64 = 4.0;
 
 impl<E: AsRef<[f64]> + AsMut<[f64]>> PopulationFilter<E> {
     /// K_e, K_e_dot, omega_nm in rad/s, zeta_nm, and tau_e in s.
     pub fn operator(&self) -> [f64; PARAMETERS] {
-        let [k_e, k_e_dot, omega, zeta, tau] = self.believed().operator();
+        let [k_e, k_e_dot, omega, zeta, tau] = self.live().operator();
         // The error of a sample is held: half a sample of the delay is the hold's.
         let hold = 0.5 * self.sample_time();
         [k_e, k_e_dot, omega, zeta, (tau - hold).max(0.0)]
     }
 
-    /// Their covariance, with the scatter of the operators of others who foretell u about as well.
+    /// Their covariance, with the scatter of other operators that predict u about as well.
     pub fn operator_covariance(&self) -> [[f64; PARAMETERS]; PARAMETERS] {
         let mut rows = [[0.0; STATES]; PARAMETERS];
         for (row, gains) in rows.iter_mut().zip(self.gain_and_lead()) {
@@ -41,30 +39,25 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> PopulationFilter<E> {
         for j in 0..HELD {
             rows[2 + j][LINEAR + j] = 1.0;
         }
-        let (own, scatter) = (through(&rows, &self.state_covariance()), self.scatter());
+        let own = through(&rows, &self.state_covariance());
+        let scatter = self
+            .alternatives()
+            .scatter(&self.live().operator(), self.read(), self.window());
         core::array::from_fn(|i| core::array::from_fn(|j| own[i][j] + scatter[i][j]))
     }
 
-    /// K_e and K_e_dot by the gains.
+    /// K_e and K_e_dot by the gains of the basis.
     pub fn gain_and_lead(&self) -> [[f64; GAINS]; 2] {
         self.basis().gain_and_lead(&NEAR_RAD_S)
     }
 
-    /// Covariance of gains, level and corrections, as it is told. Before the corrections are estimated
-    /// they are as uncertain as before the first sample.
+    /// Covariance of gains, level and corrections, as it is reported.
     pub fn state_covariance(&self) -> [[f64; STATES]; STATES] {
-        let mut c = self.gains().covariance();
+        let mut c = self.live().mixture.covariance();
         if !self.is_known() {
             let seconds = self.samples() as f64 * self.sample_time();
             let wider = 1.0 + UNLEARNT_S / seconds.max(HOLD_S);
             c.iter_mut().flatten().for_each(|c| *c *= wider * wider);
-        }
-        if !self.corrects() {
-            let point = self.basis().point();
-            for (j, of) in [point.omega, point.zeta, 1.0].into_iter().enumerate() {
-                let spread = of * self.spread()[j];
-                c[LINEAR + j][LINEAR + j] += spread * spread;
-            }
         }
         c
     }

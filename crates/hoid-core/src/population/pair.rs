@@ -27,25 +27,8 @@ impl Pair {
     }
 
     #[inline(always)]
-    pub fn map(self, of: impl Fn(f64) -> f64) -> Self {
-        Self(self.0.map(of))
-    }
-
-    #[inline(always)]
     fn with(self, other: Self, of: impl Fn(f64, f64) -> f64) -> Self {
         Self(core::array::from_fn(|i| of(self.0[i], other.0[i])))
-    }
-
-    /// The larger; the bound where it is not a number.
-    #[inline(always)]
-    pub fn at_least(self, bound: Self) -> Self {
-        self.with(bound, |x, bound| if x > bound { x } else { bound })
-    }
-
-    /// The smaller; the bound where it is not a number.
-    #[inline(always)]
-    pub fn at_most(self, bound: Self) -> Self {
-        self.with(bound, |x, bound| if x < bound { x } else { bound })
     }
 
     /// Their sum.

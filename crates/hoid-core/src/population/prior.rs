@@ -1,31 +1,32 @@
 //! What is supposed of a person and their changes.
 
-use super::{basis::Point, detector::Detection, gains::GainPrior, sizes::RIVALS};
+use super::{
+    basis::Point,
+    detector::Detection,
+    mixture::ChangePrior,
+    sizes::{HELD, STARTS},
+};
 
 /// What is supposed of a person and their changes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PopulationPrior {
-    /// Drifts, outliers and weights.
-    pub gains: GainPrior,
+    /// What is held of the person, and how far they may be from it: shares of omega and zeta, and s for
+    /// the delay.
+    pub person: Point,
+    /// See `person`.
+    pub spread: [f64; HELD],
+    /// Ts, s.
+    pub sample_time: f64,
     /// Order of the noise model.
     pub order: usize,
     /// Its memory, s.
     pub noise_memory: f64,
-    /// Time constants of the variance of eps for the gains and for the detector, s.
-    pub level_memory: [f64; 2],
-    /// Drifts of the level of u in one second, over the root mean square of u: of the filter whose
-    /// gains hardly move, and of the others.
-    pub offset_drift: [f64; 2],
-    /// Time after which the estimate begins, s: the ratio of u to e in it gives the prior of the
-    /// gains.
+    /// Time after which the estimate starts, s: the ratio of u to e in it gives the prior of the gains.
     pub hold: f64,
-    /// Time after which what is held is corrected, s. What was learnt before counts no more than the
-    /// prior then: the noise model was not known.
-    pub reopen: f64,
-    /// What a declared change adds to the gains, over |Y| at the reference.
-    pub jump: f64,
-    /// Where else somebody may begin; their lags are those of the basis.
-    pub rivals: [Point; RIVALS],
+    /// How the operator changes.
+    pub changes: ChangePrior,
+    /// Where estimates start when there are data for the first time; their lags are that of the person.
+    pub starts: [Point; STARTS],
     /// The detector.
     pub detection: Detection,
 }
@@ -34,10 +35,8 @@ impl PopulationPrior {
     /// True for numbers that make sense.
     pub(super) fn is_sound(&self) -> bool {
         let positive = |x: f64| x > 0.0 && x.is_finite();
-        self.level_memory.iter().all(|m| positive(*m))
-            && positive(self.hold)
-            && self.reopen >= self.hold
-            && self.offset_drift.iter().all(|d| *d >= 0.0)
-            && self.jump >= 0.0
+        [self.sample_time, self.hold].into_iter().all(positive)
+            && self.spread.into_iter().all(positive)
+            && self.changes.is_sound()
     }
 }

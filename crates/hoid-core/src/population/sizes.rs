@@ -1,4 +1,4 @@
-//! How many there are: of gains, forms, filters, and lags of the noise model.
+//! How many there are: of gains, states, signals, hypotheses, and lags of the noise model.
 
 /// Gains of the numerator.
 pub const GAINS: usize = 3;
@@ -8,19 +8,19 @@ pub const HELD: usize = 3;
 pub const LINEAR: usize = GAINS + 1;
 /// Gains, level and corrections.
 pub const STATES: usize = LINEAR + HELD;
-/// Parameters of the operator that is told: K_e, K_e_dot and what is held.
+/// Parameters of the operator that is reported: K_e, K_e_dot and what is held.
 pub const PARAMETERS: usize = 2 + HELD;
 /// Signals of the basis: the states of its filter and their derivative.
 pub const SIGNALS: usize = 6;
-/// Forms of the numerator: any, and a gain with a lead.
-pub const FORMS: usize = 2;
-/// Filters with different drifts for each form.
-pub const DRIFTS: usize = 3;
-/// Filters for each form in which somebody has just changed.
-pub const NEWBORNS: usize = 2;
-/// Filters for each form.
-pub const FILTERS: usize = DRIFTS + NEWBORNS;
+/// Signals and level.
+pub const INPUTS: usize = SIGNALS + 1;
+/// Hypotheses of the mixture.
+pub const HYPOTHESES: usize = 28;
+/// Classes of hypotheses: two forms of the numerator, each with two drifts of the gains.
+pub const CLASSES: usize = 4;
+/// Changes that a hypothesis remembers.
+pub const SEGMENTS: usize = 6;
 /// Largest order of the noise model.
 pub const LARGEST_ORDER: usize = 24;
-/// Those who are followed beside.
-pub const RIVALS: usize = 10;
+/// Points at which a first estimate starts.
+pub const STARTS: usize = 8;

@@ -8,10 +8,11 @@
 
 use super::{
     basis::Point,
-    detector::{BLOCK_S, Detection},
-    gains::GainPrior,
+    detector::Detection,
+    last_blocks::BLOCK_S,
+    mixture::ChangePrior,
     prior::PopulationPrior,
-    sizes::{DRIFTS, HELD, RIVALS},
+    sizes::{HELD, STARTS},
 };
 
 /// Lag T_I in s, natural frequency in rad/s and damping of the usual person.
@@ -20,59 +21,54 @@ pub const LAG_S: f64 = 3.0;
 pub const OMEGA_RAD_S: f64 = 11.0;
 /// Its damping.
 pub const ZETA: f64 = 0.25;
-/// How far people are from that: shares of omega and zeta, and s for the delay.
-pub const SPREAD: [f64; HELD] = [0.3, 0.5, 0.02];
+/// How far people are from that: shares of omega and zeta, and s for the delay, where that is not given
+/// and where it is.
+pub const SPREAD: [f64; HELD] = [0.3, 0.5, 0.1];
+/// See [`SPREAD`].
+pub const GIVEN_DELAY_S: f64 = 0.02;
 /// Order of the noise model.
 pub const ORDER: usize = 16;
-/// Limit of an innovation in standard deviations.
-pub const LIMIT: f64 = 3.5;
-/// Time after which the estimate begins, s.
+/// Limit of an innovation in standard deviations: of people with a dead zone the pulses are the response, so
+/// that it is far out.
+pub const LIMIT: f64 = 8.0;
+/// Time after which the estimate starts, s.
 pub const HOLD_S: f64 = 1.0;
+/// Time that is replayed, s.
+pub const REPLAYED_S: f64 = 100.0;
 
-/// Standard deviations of the gains' drift in one second, over |Y| at 2 rad/s, and what is supposed
-/// of their weights.
-const DRIFT: [f64; DRIFTS] = [0.0005, 0.07, 0.3];
-const SHARES: [f64; DRIFTS] = [0.9, 0.05, 0.05];
-/// Those who have just changed: their drift, the size of the change, their odds, the births that these are
-/// worth against what is learnt of the person, and their life, s.
-const NEWBORN: [f64; 2] = [0.1, 1.0];
-const ODDS: f64 = 0.01;
-const BIRTHS: f64 = 60.0;
-const LIFE_S: f64 = 2.0;
-/// Degrees of freedom of the innovations.
-const FREEDOM: f64 = 5.0;
-/// Time constants with which the weights of forms and of drifts are forgotten, s.
-const FORM_MEMORY_S: f64 = 5.0;
-const DRIFT_MEMORY_S: f64 = 5.0;
+/// How the operator changes.
+const CHANGES: ChangePrior = ChangePrior {
+    block: 0.32,
+    between: 60.0,
+    jump: [0.3, 0.4],
+    drift: [0.003, 0.05],
+    settling: [0.1, 3.0],
+    level: 0.01,
+    variance: [20.0, 2.0],
+    steady: 0.6,
+    any: 0.4,
+    protected: 4,
+    limit: LIMIT,
+    look: DETECTOR_LIMIT,
+};
 /// Memory of the noise model, s.
-const NOISE_MEMORY_S: f64 = 40.0;
-/// Time constants of the innovations' variance for the gains and for the detector, s.
-const LEVEL_MEMORY_S: [f64; 2] = [5.0, 10.0];
-/// Drifts of the level of u in one second, over the root mean square of u: where the gains hardly
-/// move, and else.
-const OFFSET_DRIFT: [f64; 2] = [0.005, 0.01];
-/// Time after which neuromuscular system and delay are corrected, s.
-const REOPEN_S: f64 = 6.0;
-/// Time in which the gains do not walk once these are corrected, s.
-const STEADY_S: f64 = 9.0;
-/// Where else somebody may begin: delay, s more than that of nk; natural frequency, rad/s; damping.
-/// Corrections find from one of them to what lies between. The first is the usual person.
-const ELSEWHERE: [[f64; 3]; RIVALS] = [
+const NOISE_MEMORY_S: f64 = 100.0;
+/// Limit of an innovation in the detector, in standard deviations.
+const DETECTOR_LIMIT: f64 = 3.5;
+/// Where estimates start: delay, s more than that of the person; natural frequency, rad/s; damping. A delay
+/// that is given is kept.
+const ELSEWHERE: [[f64; 3]; STARTS] = [
     [0.0, OMEGA_RAD_S, ZETA],
-    [-0.1, OMEGA_RAD_S, ZETA],
-    [-0.05, OMEGA_RAD_S, ZETA],
-    [0.05, OMEGA_RAD_S, ZETA],
-    [0.1, OMEGA_RAD_S, ZETA],
-    [0.15, OMEGA_RAD_S, ZETA],
-    [0.0, 7.5, 0.45],
-    [0.05, 7.5, 0.45],
-    [0.0, 16.0, 0.2],
-    [-0.05, 16.0, 0.2],
+    [0.1, 11.0, 0.3],
+    [0.2, 9.0, 0.4],
+    [-0.08, 11.0, 0.3],
+    [0.0, 7.0, 0.5],
+    [0.1, 8.0, 0.5],
+    [0.0, 16.0, 0.25],
+    [0.1, 16.0, 0.3],
 ];
 /// Shortest delay of them, s.
 const EARLIEST_S: f64 = 0.03;
-/// What a declared change adds to the gains, over |Y| at 2 rad/s.
-const JUMP: f64 = 0.3;
 /// Frequency in which changes are looked for, rad/s; seconds that are now, a short and a long present;
 /// seconds before, at least and at most; blocks that must agree; seconds after a change in which none is
 /// declared.
@@ -131,30 +127,20 @@ impl Usual {
     /// What is supposed of them, at a sample time in s.
     pub fn prior(&self, sample_time: f64) -> PopulationPrior {
         let blocks = |seconds: f64| libm::round(seconds / BLOCK_S) as usize;
+        let given = self.spread[2] < SPREAD[2];
         PopulationPrior {
-            gains: GainPrior {
-                drifts: DRIFT,
-                shares: SHARES,
-                newborn: NEWBORN,
-                odds: ODDS,
-                births: BIRTHS,
-                life: LIFE_S,
-                steady: STEADY_S,
-                freedom: FREEDOM,
-                limit: self.limit,
-                forgotten: [FORM_MEMORY_S, DRIFT_MEMORY_S].map(|memory| (sample_time / memory).min(1.0)),
-                held: self.spread,
-                sample_time,
-            },
+            person: self.point,
+            spread: self.spread,
+            sample_time,
             order: self.order,
             noise_memory: NOISE_MEMORY_S,
-            level_memory: LEVEL_MEMORY_S,
-            offset_drift: OFFSET_DRIFT,
             hold: HOLD_S,
-            reopen: REOPEN_S,
-            jump: JUMP,
-            rivals: ELSEWHERE.map(|[later, omega, zeta]| Point {
-                tau: (self.point.tau + later).max(EARLIEST_S),
+            changes: ChangePrior {
+                limit: self.limit,
+                ..CHANGES
+            },
+            starts: ELSEWHERE.map(|[later, omega, zeta]| Point {
+                tau: (self.point.tau + if given { 0.0 } else { later }).max(EARLIEST_S),
                 omega,
                 zeta,
                 ..self.point
@@ -191,9 +177,9 @@ mod tests {
     }
 
     #[test]
-    fn rivals_of_a_short_delay_stay_where_a_basis_can_be_made() {
+    fn starts_of_a_short_delay_stay_where_a_basis_can_be_made() {
         let prior = Usual::with_delay(0.05).prior(0.01);
         assert!(prior.is_sound());
-        assert!(prior.rivals.iter().all(|rival| rival.tau >= EARLIEST_S));
+        assert!(prior.starts.iter().all(|start| start.tau >= EARLIEST_S));
     }
 }

@@ -1,8 +1,8 @@
 //! The end of a block: what is judged, learnt and kept once a second.
 
 use hoid_core::guard::{
-    channel::{ChannelGuard, QUANTILE_OVER_MEAN},
-    profile::{Block, CHANNELS, Trouble},
+    channel::ChannelGuard,
+    profile::{Block, CHANNELS, STILL, Trouble},
 };
 
 use super::{FLOOR, Guard, LARGEST, LEAST_AGE, SOUND_EVERY, event::GuardKind};
@@ -12,7 +12,7 @@ impl Guard {
     /// A second is over.
     #[cold]
     pub(super) fn end_block(&mut self, recursion: &mut dyn Recursion) {
-        self.channels.iter_mut().for_each(ChannelGuard::choose);
+        self.channels.iter_mut().for_each(ChannelGuard::end_block);
         let block = self.block.means();
         let enough = 2 * block.samples >= self.block_length;
         self.block = Block::default();
@@ -21,7 +21,7 @@ impl Guard {
             self.sound_blocks = 0;
             return;
         }
-        let trouble = self.profile.judge(&block);
+        let trouble = self.profile.judge(&block, self.resting.is_rest());
         if let Some(reference) = &mut self.reference {
             if self.pause.kind > 0 {
                 reference.begin();
@@ -41,12 +41,14 @@ impl Guard {
         match trouble {
             Some(trouble) => {
                 let (kind, channel) = named(trouble);
-                let seen = u64::from(trouble.blocks()) * u64::from(self.block_length);
+                let blocks = self.profile.lasting(trouble);
+                let seen = u64::from(blocks) * u64::from(self.block_length);
                 self.go_back(recursion, seen);
                 self.begin_pause(kind, channel, seen.min(self.samples), 0.0);
             }
             None if self.in_ring == 0 => {
                 self.profile.learn(&block);
+                self.learn_tails(&block);
                 self.set_limits();
                 self.sound_blocks = if self.profile.is_calm() {
                     self.sound_blocks + 1
@@ -61,6 +63,15 @@ impl Guard {
                 }
             }
             None => {}
+        }
+    }
+
+    /// The tails of signals of which nothing is known begin to be learnt.
+    fn learn_tails(&mut self, block: &Block) {
+        if !self.profile.is_known() {
+            for (channel, means) in self.channels.iter_mut().zip(block.differences) {
+                channel.begin_learning(means);
+            }
         }
     }
 
@@ -102,11 +113,14 @@ impl Guard {
             let size = usual.magnitude[c];
             self.largest[c] = if size > 0.0 { LARGEST * size } else { f64::INFINITY };
             self.channels[c].set_floor(FLOOR[c] * size);
+            let still = STILL * usual.differences[c][0];
+            self.channels[c].set_resting(still);
             if !self.channels[c].is_known() {
-                let mean = usual.differences[c];
-                self.channels[c].set_quantiles(mean.map(|m| QUANTILE_OVER_MEAN * m));
+                self.channels[c].begin_learning(usual.differences[c]);
+                self.channels[c].watch();
             }
         }
+        self.resting.set_tolerance(STILL * usual.differences[1][0]);
     }
 }
 

@@ -23,11 +23,9 @@ pub enum GuardKind {
     Misfit,
     /// An estimate that foretells u worse than the start fit does.
     Astray,
-    /// An estimate that foretells u worse than one that began elsewhere.
-    Outdone,
 }
 
-hoid_model::named_choice!(GuardKind, "kind of fault", 10, {
+hoid_model::named_choice!(GuardKind, "kind of fault", 9, {
     Outlier => "spike",
     Step => "step",
     Missing => "missing",
@@ -37,7 +35,6 @@ hoid_model::named_choice!(GuardKind, "kind of fault", 10, {
     Swapped => "exchanged",
     Misfit => "misfit",
     Astray => "astray",
-    Outdone => "outdone",
 });
 
 /// What was done.
@@ -55,18 +52,15 @@ pub enum GuardAction {
     Restarted,
     /// The estimate moves again, from the start of the recursion.
     Relearnt,
-    /// Another estimate has taken its place.
-    Replaced,
 }
 
-hoid_model::named_choice!(GuardAction, "action", 7, {
+hoid_model::named_choice!(GuardAction, "action", 6, {
     Held => "held",
     Accepted => "accepted",
     Paused => "paused",
     Resumed => "resumed",
     Restarted => "restarted",
     Relearnt => "relearnt",
-    Replaced => "replaced",
 });
 
 /// Which signal.
@@ -122,18 +116,6 @@ pub struct TrackFault {
 }
 
 impl GuardEvent {
-    /// An estimate was told for so many samples, and is left.
-    pub(crate) fn left_behind(samples: u64) -> Self {
-        Self {
-            kind: GuardKind::Outdone,
-            channel: GuardChannel::Both,
-            ago: samples.saturating_sub(1),
-            samples,
-            size: 0.0,
-            action: GuardAction::Replaced,
-        }
-    }
-
     /// In times, for what was told at a sample at `now_s`.
     pub fn at(&self, now_s: f64, sample_time: SampleTime) -> TrackFault {
         let ts = sample_time.s();

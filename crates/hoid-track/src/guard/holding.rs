@@ -3,7 +3,7 @@
 use hoid_core::guard::profile::CHANNELS;
 
 use super::{
-    Guard, Guarded, Raw,
+    Guard, Guarded, PULSE, Raw,
     event::{GuardAction, GuardKind},
 };
 use crate::recursion::{Recursion, Sample};
@@ -34,8 +34,13 @@ impl Guard {
                 let errors = channel.errors(x[c]);
                 channel.accept(x[c], &errors);
             } else if held > 0 && channel.is_back(x[c]) {
-                let size = channel.size();
+                let (size, largest_move) = (channel.size(), channel.largest_move());
                 channel.resume(x[c]);
+                if c == 1 && self.is_pulse(place, held, size, x[c], largest_move) {
+                    let first = place.saturating_sub(held as usize);
+                    self.ring[first..place].iter_mut().for_each(|raw| raw.held[c] = false);
+                    continue;
+                }
                 self.tell(GuardKind::Outlier, c, u64::from(held), size, GuardAction::Held, 1);
             } else {
                 clean[c] = channel.hold(x[c]);
@@ -71,6 +76,18 @@ impl Guard {
             outcome: None,
             held: true,
         }
+    }
+
+    /// True for an excursion of u, over with sample x at a place of the ring, that a hand makes: out by a jump, and
+    /// back over several samples.
+    fn is_pulse(&self, place: usize, held: u32, size: f64, x: f64, largest_move: f64) -> bool {
+        let Some(last) = place.checked_sub(1).map(|k| self.ring[k].values[1]) else {
+            return false;
+        };
+        held >= self.shortest_pulse
+            && size <= PULSE * self.profile.usual().magnitude[1]
+            && (x - last).abs() <= largest_move
+            && (x - last).abs() <= 0.5 * size
     }
 
     /// Both signals are back: the recursion takes the samples since before they went, those that were
@@ -167,8 +184,14 @@ impl Guard {
                 [_, false] => recursion.bridge(taken),
             }
         }
+        // e jumps with its target and moves as before, while the person answers only after their delay.
+        let ring = &self.ring[..self.in_ring];
+        let behind = ring[self.in_ring - held as usize..].iter().map(|raw| raw.values[0]);
+        let is_target = c == 0 && !ring.iter().any(|raw| raw.held[1]) && self.channels_before[0].moves_as_usual(behind);
         self.in_ring = 0;
-        self.tell(GuardKind::Step, c, held, size, GuardAction::Accepted, 0);
+        if !is_target {
+            self.tell(GuardKind::Step, c, held, size, GuardAction::Accepted, 0);
+        }
         Guarded { outcome, held: false }
     }
 }

@@ -4,11 +4,18 @@
 //! | found | what reaches the recursion | estimate | afterwards |
 //! |---|---|---|---|
 //! | outlier of up to [`LONGEST_S`] | the prediction of e; the recursion's own prediction of u | stays | the recursion is put back to before it and takes the samples again, those that were held back interpolated |
-//! | a jump that stays | the same | stays | the recursion is put back to before it and takes the samples as they came: the result is that without a guard |
+//! | a jump that stays, a pulse of the hand | the same | stays | the recursion is put back to before it and takes the samples as they came: the result is that without a guard |
 //! | no numbers for longer | the same | stays | goes on once the filters have settled |
 //! | 30 times the usual magnitude | the long-run mean of e, the prediction of u | stays | goes on from there once the filters have settled |
 //! | frozen, idle, larger or rescaled, swapped, misfit (by blocks of a second) | the samples, into the filters alone | is put back to before it | goes on from there once the span is over and the filters have settled |
 //! | an estimate that has gone astray by [`hoid_core::guard::reference`] | the samples, into the filters alone | is put back to the start | goes on from there once the filters have settled |
+//!
+//! **Steps and pulses.** `e = r - y`: a step of the target moves e by the same within one sample, and y goes
+//! on; so does u, for the person answers after their delay. A jump of e that stays, behind which e moves as it did
+//! while u goes on as foretold, is tracking and is not told. A sensor that is disturbed lets go as fast as it took hold: what comes back by a
+//! jump is an outlier. A hand that is fast goes out of a dead zone at once but comes back over several samples:
+//! an excursion of u of [`PULSE_S`] or more within [`PULSE`] times its mean magnitude, whose last step is within
+//! what u moves anyway, is a pulse, taken as it came.
 //!
 //! **Putting back.** The numbers of a recursion are few ([`hoid_core::state`]). They are kept when a
 //! sample is first held back, every [`SOUND_EVERY`] blocks in which all was well (the last two are
@@ -49,6 +56,7 @@ use hoid_core::{
         channel::ChannelGuard,
         profile::{Block, CHANNELS, Profile},
         reference::ReferenceModel,
+        resting::Resting,
     },
     state::{State, visit_all},
 };
@@ -75,6 +83,9 @@ const LARGEST: f64 = 30.0;
 /// Least limit of outliers in units of the mean magnitude: e passes a low-pass filter before it
 /// meets an innovation, u stands in the innovation itself.
 const FLOOR: [f64; CHANNELS] = [0.3, 1e-3];
+/// A pulse of the hand takes no less, s, and goes no further, in units of the mean magnitude.
+const PULSE_S: f64 = 0.03;
+const PULSE: f64 = 6.0;
 /// A misfit or swapped channels of so long are the new usual, s.
 const GIVEN_UP_S: f64 = 120.0;
 
@@ -126,11 +137,13 @@ impl Pause {
 pub(crate) struct Guard {
     block_length: u32,
     longest: u32,
+    shortest_pulse: u32,
     settle: u64,
     sample_time: SampleTime,
     samples: u64,
     channels: [ChannelGuard; CHANNELS],
     profile: Profile,
+    resting: Resting,
     /// What was usual before it was learnt anew.
     former: Profile,
     block: Block,
@@ -162,6 +175,7 @@ impl State for Guard {
                 &mut self.samples,
                 &mut self.channels,
                 &mut self.profile,
+                &mut self.resting,
                 &mut self.former,
                 &mut self.block,
                 &mut self.in_block,
@@ -203,11 +217,13 @@ impl Guard {
         let mut guard = Self {
             block_length: (BLOCK_S / ts).round().max(4.0) as u32,
             longest,
+            shortest_pulse: (PULSE_S / ts).round().max(2.0) as u32,
             settle: nk as u64 + (SETTLE_S / ts).round() as u64,
             sample_time,
             samples: 0,
             channels: [channel; CHANNELS],
             profile: Profile::new(),
+            resting: Resting::new(ts),
             former: Profile::new(),
             block: Block::default(),
             in_block: 0,
@@ -240,6 +256,7 @@ impl Guard {
         self.samples += 1;
         self.event = None;
         let x = [sample.e, sample.u];
+        self.resting.take(x[1]);
         let errors = [self.channels[0].errors(x[0]), self.channels[1].errors(x[1])];
         let outliers = [
             self.channels[0].is_outlier(&errors[0]),

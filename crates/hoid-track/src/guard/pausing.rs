@@ -34,6 +34,7 @@ impl Guard {
     /// A sample of a pause: into the filters, where it can be.
     #[cold]
     pub(super) fn paused(&mut self, recursion: &mut dyn Recursion, sample: Sample) -> Guarded {
+        self.resting.doubt();
         let mut values = [sample.e, sample.u];
         let mut good = [true; CHANNELS];
         let mut errors = [[0.0; 4]; CHANNELS];

@@ -3,11 +3,12 @@
 //! Of each mean of a block ([`hoid_core::guard::profile`]) the median over all blocks is taken, and
 //! of each difference the largest of three estimates of its 99 % quantile: itself, and those that
 //! follow from the 50 and 95 % quantiles of Gaussian errors. A few outliers in the span change
-//! neither; heavy tails count.
+//! neither; heavy tails count. Samples at which a signal stands still are left out of the quantiles, as
+//! they are while it runs ([`hoid_core::guard::channel`]); where u rested is learnt too.
 
 use hoid_core::guard::{
     channel::ORDERS,
-    profile::{Block, CHANNELS, Profile},
+    profile::{Block, CHANNELS, Profile, STILL},
 };
 use hoid_model::Record;
 
@@ -15,6 +16,8 @@ use super::Guard;
 
 /// Quantiles of the magnitude of a Gaussian number, in standard deviations.
 const QUANTILES: [(f64, f64); 3] = [(0.5, 0.6745), (0.95, 1.96), (0.99, 2.5758)];
+/// The quantile further in, by its own count.
+const INNER: f64 = 0.9;
 /// Least blocks of a record that says what is usual.
 const LEAST: usize = 5;
 
@@ -31,14 +34,22 @@ impl Guard {
             input => input,
         };
         let signals = [input, output];
-        let mut quantiles = [[0.0; ORDERS]; CHANNELS];
+        let (mut outer, mut inner) = ([[0.0; ORDERS]; CHANNELS], [[0.0; ORDERS]; CHANNELS]);
         for (c, signal) in signals.iter().enumerate() {
             let mut differences = signal.to_vec();
-            for quantile in &mut quantiles[c] {
+            let moves = moving(signal);
+            for j in 0..ORDERS {
                 differences = differences.windows(2).map(|w| w[1] - w[0]).collect();
-                *quantile = tail(&differences);
+                let of_moves: Vec<f64> = differences
+                    .iter()
+                    .zip(&moves[j..])
+                    .filter_map(|(d, moves)| moves.then_some(d.abs()))
+                    .collect();
+                outer[c][j] = tail(&of_moves);
+                inner[c][j] = quantile(of_moves, INNER);
             }
         }
+        output.iter().for_each(|u| self.resting.take(*u));
         let length = self.block_length as usize;
         if output.len() < LEAST * length {
             return;
@@ -71,8 +82,8 @@ impl Guard {
             ..Block::default()
         };
         self.profile = Profile::of(&usual);
-        for (channel, quantiles) in self.channels.iter_mut().zip(quantiles) {
-            channel.set_quantiles(quantiles);
+        for (c, channel) in self.channels.iter_mut().enumerate() {
+            channel.set_tails(outer[c], inner[c]);
         }
         self.set_limits();
     }
@@ -91,6 +102,13 @@ fn quantile(mut values: Vec<f64>, share: f64) -> f64 {
         .get(place.min(values.len().saturating_sub(1)))
         .copied()
         .unwrap_or(0.0)
+}
+
+/// True for each first difference that is more than a signal that stands still has.
+fn moving(signal: &[f64]) -> Vec<bool> {
+    let sizes: Vec<f64> = signal.windows(2).map(|w| (w[1] - w[0]).abs()).collect();
+    let mean = sizes.iter().sum::<f64>() / sizes.len().max(1) as f64;
+    sizes.iter().map(|size| *size > STILL * mean).collect()
 }
 
 /// The 99 % quantile of the magnitudes, by its own count or by those further in.

@@ -19,7 +19,6 @@
 //! | `held-back` | outliers that the guard held back (a note), in more than 1 % of the samples (a doubt) |
 //! | `hostile-span` | spans that no tracking makes, at which the estimate stood still |
 //! | `restarted` | the guard began the estimate again |
-//! | `start-left` | an estimate that was left for one that began elsewhere, for a quarter of the samples or more (a doubt), or less (a note) |
 //! | `steps-in-signals` | jumps of e or u that stayed (a note) |
 //! | `gain-sign` | K_e is significantly positive in some rows and negative in others |
 //! | `negative-lead` | K_e and K_e_dot have significantly opposite signs in more than a tenth of the rows |

@@ -11,8 +11,6 @@ use crate::{
 
 /// Share of samples held back beyond which it is a doubt.
 const HELD: f64 = 0.01;
-/// Share of the samples with an estimate that was left beyond which it is a doubt.
-const LEFT: f64 = 0.25;
 /// Spans that are named one by one.
 const NAMED: usize = 3;
 /// Lengths of the end of the record at which the last row is held against it, s.
@@ -55,18 +53,7 @@ impl Trace {
             );
             all.push(Finding::note("steps-in-signals", words));
         }
-        let left = of(&|f| f.kind == GuardKind::Outdone);
-        if !left.is_empty() {
-            let words = format!(
-                "the estimate was left for one that began elsewhere and foretells u better ({}): it was wrong there",
-                named(&left)
-            );
-            all.push(match samples(&left) > LEFT * self.counts().samples as f64 {
-                true => Finding::doubt("start-left", words),
-                false => Finding::note("start-left", words),
-            });
-        }
-        let spans = of(&|f| !matches!(f.kind, GuardKind::Outlier | GuardKind::Step | GuardKind::Outdone));
+        let spans = of(&|f| !matches!(f.kind, GuardKind::Outlier | GuardKind::Step));
         if !spans.is_empty() {
             all.push(Finding::doubt(
                 "hostile-span",

@@ -52,7 +52,7 @@ impl Trace {
         let end = self.times_s()[row] + ts;
         let changed = self.changes().last().map(|(t, change)| t - change.seconds_ago);
         // What was no tracking is in the filter until it has faded.
-        let outliers = [GuardKind::Outlier, GuardKind::Step, GuardKind::Outdone];
+        let outliers = [GuardKind::Outlier, GuardKind::Step];
         let hostile = self.faults().iter().filter(|fault| !outliers.contains(&fault.kind));
         let rest = hostile.fold(record.time_s(0), |last, fault| last.max(fault.to_s));
         let from = (rest + SETTLING_S)

@@ -55,7 +55,7 @@ fn a_change_inside_the_start_span_is_told() {
 fn a_method_that_starts_itself_says_what_it_supposes() {
     let record = simulated(Condition::C1);
     let options = TrackOptions::usual(Method::population(), 29);
-    let short = judged(&record.span(0.0, 8.0).unwrap(), &options);
+    let short = judged(&record.span(0.0, 3.0).unwrap(), &options);
     assert!(kinds(&short).contains(&"supposed"), "{short}");
     assert!(!kinds(&short).contains(&"not-convertible"), "{short}");
     let mut tracker = Tracker::new(&options, None, record.sample_time()).unwrap();

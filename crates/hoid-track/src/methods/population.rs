@@ -18,7 +18,7 @@ use hoid_core::{
     population::{
         GAINS, HELD, LARGEST_ORDER, LINEAR, PARAMETERS, PopulationFilter,
         basis::Basis,
-        errors_needed, through,
+        memory_needed, through,
         usual::{self, Usual},
     },
     state::{State, visit_all},
@@ -38,7 +38,7 @@ use crate::{
     recursion::{Recursion, Sample, StepOutcome},
     reported::Reported,
     response::Response,
-    setup::{Setup, StartAt},
+    setup::{Setup, StartAt, USUAL_DELAY_S},
     start::StartState,
 };
 
@@ -49,8 +49,11 @@ settings! {
         #[setting(unit("1/h"), bounds(Bounds::PositiveFinite))]
         pub false_alarms: f64 = 1.0,
         /// Standard deviations beyond which an innovation moves the estimate no further
-        #[setting(bounds(Bounds::Positive), default("3.5"))]
+        #[setting(bounds(Bounds::Positive), default("8"))]
         pub limit: Option<f64> = None,
+        /// Time that is read again and again; 0 for a recursion that reads each sample once, as a microcontroller does
+        #[setting(unit("s"), bounds(Bounds::NonNegative))]
+        pub replay: f64 = usual::REPLAYED_S,
         /// What is known of the person before the first sample: population, none, NAME=CENTRE:SPREAD of
         /// omega_nm, zeta_nm, tau_e, T_I (the spread is relative), or an earlier fit of them, a file that
         /// hoid identify --json has printed
@@ -146,12 +149,12 @@ impl RecursiveMethod for PopulationOptions {
     fn spread_before(&self) -> Option<[f64; HELD]> {
         // What a fit determined is known, whatever the data say.
         let known = self.prior.fit().is_some();
-        let Beginning { point, spread } = Beginning::of(&self.prior, 0.0, SampleTime::HUNDREDTH).ok()?;
+        let Beginning { point, spread } = Beginning::of(&self.prior, 0.0, false, SampleTime::HUNDREDTH).ok()?;
         (!known).then_some([spread[0] * point.omega, spread[1] * point.zeta, spread[2]])
     }
 
     fn lag_of_basis_s(&self) -> Option<f64> {
-        let Beginning { point, .. } = Beginning::of(&self.prior, 0.0, SampleTime::HUNDREDTH).ok()?;
+        let Beginning { point, .. } = Beginning::of(&self.prior, 0.0, false, SampleTime::HUNDREDTH).ok()?;
         Some(point.lag)
     }
 
@@ -180,7 +183,9 @@ impl PopulationRecursion {
     ) -> Result<Self, IdentError> {
         let ts = sample_time.s();
         let nk = setup.orders.nk;
-        let beginning = Beginning::of(&options.prior, (nk as f64 - 0.5) * ts, sample_time)?;
+        // A delay that is not the default one has been given.
+        let is_given = nk != sample_time.nk(USUAL_DELAY_S);
+        let beginning = Beginning::of(&options.prior, (nk as f64 - 0.5) * ts, is_given, sample_time)?;
         let point = beginning.point;
         let basis = Basis::new(point, ts).ok_or_else(|| unusable(&format!("a delay of {} s", point.tau)))?;
         let fit = options.prior.fit();
@@ -196,10 +201,10 @@ impl PopulationRecursion {
             limit: options.limit(),
             false_alarms: options.false_alarms,
         };
-        let supposed = supposed.prior(ts);
-        let model = PopulationFilter::new(basis, supposed, vec![0.0; errors_needed(ts)]);
+        let memory = vec![0.0; memory_needed(ts, options.replay)];
+        let model = PopulationFilter::new(supposed.prior(ts), memory);
         let model = match &known {
-            Some(known) => model.and_then(|model| model.knowing(known)),
+            Some(known) => model.and_then(|model| model.with_initial_estimate(known)),
             None => model,
         };
         let model = model.ok_or_else(|| unusable("its delay, sample time, prior or options"))?;
@@ -229,7 +234,7 @@ impl PopulationRecursion {
     fn of_change(&self) -> [[Estimate; PARAMETERS]; 2] {
         let detector = self.model.detector();
         let map = self.model.gain_and_lead();
-        let (at, hold) = (self.model.origin(), 0.5 * self.reported.sample_time_s());
+        let (at, hold) = (self.model.basis().point(), 0.5 * self.reported.sample_time_s());
         let beginning = [at.omega, at.zeta, at.tau - hold];
         // The spans are compared in units of how much this person varies without a change.
         let [of_response, of_all] = detector.usual_levels();
@@ -376,10 +381,6 @@ impl Recursion for PopulationRecursion {
             z: [z(0), z(1), z(2), z(3), level, z(4)],
             of_operator: true,
         })
-    }
-
-    fn left_behind(&self) -> Option<u64> {
-        self.model.left_behind()
     }
 
     fn response(&self, omega_rad_s: f64) -> Option<Response> {

@@ -18,17 +18,15 @@ use hoid_core::population::{
     basis::{Basis, Point, REFERENCE},
     known::Known,
     noise::Lags,
-    usual::{LAG_S, Usual},
+    usual::{GIVEN_DELAY_S, LAG_S, Usual},
 };
 use hoid_ident::IdentError;
 use hoid_model::{Complex64, FittedOperator, SampleTime, operator_family::Coordinate, uncertainty::variance_along};
 
 use crate::person_prior::PersonPrior;
 
-/// Spread of what is held where nothing is known: shares of omega and zeta, and s for the delay. With a
-/// wider one the corrections, which are of first order, end at another person: with 60 %, 100 % and 80 ms
-/// at half the delay of C1.
-const WIDE: [f64; HELD] = [0.45, 0.75, 0.03];
+/// Spread of what is held where nothing is known: shares of omega and zeta, and s for the delay.
+const WIDE: [f64; HELD] = [0.45, 0.75, 0.15];
 /// Frequencies at which the gains of a fit are found, rad/s: the range, and how many.
 const FREQUENCIES: ([f64; 2], usize) = ([0.3, 8.0], 24);
 /// Lags that a basis may have, s: beyond the longest a lag cannot be told from an integration.
@@ -51,17 +49,19 @@ pub(super) struct Beginning {
 }
 
 impl Beginning {
-    /// Of what is known; `tau_s` is the delay that is usual, for an error that is straight between
-    /// samples.
-    pub fn of(prior: &PersonPrior, tau_s: f64, sample_time: SampleTime) -> Result<Self, IdentError> {
+    /// Of what is known; `tau_s` is the delay, for an error that is straight between samples, and whether it
+    /// has been given.
+    pub fn of(prior: &PersonPrior, tau_s: f64, is_given: bool, sample_time: SampleTime) -> Result<Self, IdentError> {
         let Usual {
             mut point, mut spread, ..
         } = Usual::with_delay(tau_s);
         // An error that is held comes half a sample later than one that is straight.
         let hold = 0.5 * sample_time.s();
+        let of_delay = |otherwise: f64| if is_given { GIVEN_DELAY_S } else { otherwise };
+        spread[2] = of_delay(spread[2]);
         match prior {
             PersonPrior::Population => {}
-            PersonPrior::Nothing => spread = WIDE,
+            PersonPrior::Nothing => spread = [WIDE[0], WIDE[1], of_delay(WIDE[2])],
             PersonPrior::Named(_) => {
                 let places = [&mut point.omega, &mut point.zeta];
                 for ((name, place), spread) in ["omega_nm", "zeta_nm"].into_iter().zip(places).zip(&mut spread) {
@@ -423,14 +423,14 @@ mod tests {
             .with("prior", "omega_nm=9:0.2,tau_e=0.25:0.1")
             .unwrap();
         let prior = named.person_prior().unwrap();
-        let found = Beginning::of(prior, 0.205, SampleTime::HUNDREDTH).unwrap();
+        let found = Beginning::of(prior, 0.205, false, SampleTime::HUNDREDTH).unwrap();
         assert_eq!(
             (found.point.omega, found.point.zeta, found.point.lag),
             (9.0, usual::ZETA, LAG_S)
         );
         assert!((found.point.tau - 0.255).abs() < 1e-12);
         assert_eq!(found.spread, [0.2, usual::SPREAD[1], 0.025]);
-        let wide = Beginning::of(&PersonPrior::Nothing, 0.205, SampleTime::HUNDREDTH).unwrap();
+        let wide = Beginning::of(&PersonPrior::Nothing, 0.205, false, SampleTime::HUNDREDTH).unwrap();
         assert!(wide.spread.iter().zip(usual::SPREAD).all(|(a, b)| *a > b));
     }
 }

@@ -1,0 +1,97 @@
+//! Other operators that predict u about as well.
+//!
+//! The covariance of an estimate is that about one top of the likelihood. Poles and delay have others, and
+//! what people do below 10 rad/s says little of which is right. So the operators at which the starts elsewhere
+//! have ended count too, each with the weight `w = exp(-behind/SLOWLY) f^2`, where `behind` is by how much
+//! its evidence was less and f the share of the samples of now that there were then: the scatter about the estimate is `sum w d d'/(1 + sum w)`.
+//! The evidence is tempered, for it supposes that the model is right (P. Grunwald and T. van Ommen, *Bayesian
+//! Analysis* 12 (2017) 1069-1103); and what they left open, more samples have made narrower.
+
+use super::sizes::{PARAMETERS, STARTS};
+
+/// Evidence by which another is worse when it counts for 1/e of the estimate, nats.
+const SLOWLY: f64 = 3.0;
+
+/// Where a start has ended.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Alternative {
+    operator: [f64; PARAMETERS],
+    behind: f64,
+    samples: u64,
+    known: bool,
+}
+
+crate::state!([] Alternative { operator, behind, samples, known });
+
+/// Those of all starts.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Alternatives {
+    all: [Alternative; STARTS],
+}
+
+crate::state!([] Alternatives { all });
+
+impl Alternatives {
+    pub const NONE: Self = Self {
+        all: [Alternative {
+            operator: [0.0; PARAMETERS],
+            behind: 0.0,
+            samples: 0,
+            known: false,
+        }; STARTS],
+    };
+
+    /// Where a start has ended after so many samples, and by how much its evidence is less than that of the
+    /// estimate.
+    pub fn put(&mut self, start: usize, operator: [f64; PARAMETERS], behind: f64, samples: u64) {
+        if let Some(place) = self.all.get_mut(start) {
+            *place = Alternative {
+                operator,
+                behind: behind.max(0.0),
+                samples,
+                known: true,
+            };
+        }
+    }
+
+    /// Their scatter about an operator after so many samples, of which the last `window` are read again.
+    pub fn scatter(&self, about: &[f64; PARAMETERS], samples: u64, window: u64) -> [[f64; PARAMETERS]; PARAMETERS] {
+        let mut scatter = [[0.0; PARAMETERS]; PARAMETERS];
+        let mut weights = 1.0;
+        for other in self.all.iter().filter(|other| other.known) {
+            let since = samples.saturating_sub(other.samples) as f64;
+            let share = (1.0 - since / samples.min(window).max(1) as f64).max(0.0);
+            let weight = libm::exp(-other.behind / SLOWLY) * share * share;
+            weights += weight;
+            for i in 0..PARAMETERS {
+                for j in 0..PARAMETERS {
+                    scatter[i][j] += weight * (other.operator[i] - about[i]) * (other.operator[j] - about[j]);
+                }
+            }
+        }
+        scatter.map(|row| row.map(|s| s / weights))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn those_that_predict_as_well_count_and_those_that_do_not_do_not() {
+        let about = [0.1, 0.04, 11.0, 0.3, 0.28];
+        let mut all = Alternatives::NONE;
+        assert_eq!(all.scatter(&about, 100, 150), [[0.0; PARAMETERS]; PARAMETERS]);
+        let mut other = about;
+        other[2] = 13.0;
+        all.put(0, other, 0.0, 100);
+        assert!((all.scatter(&about, 100, 150)[2][2] - 2.0).abs() < 1e-12);
+        // When half of what is read is new, it is one of weight 1/4; when all is, of none.
+        assert!((all.scatter(&about, 175, 150)[2][2] - 0.8).abs() < 1e-12);
+        assert_eq!(all.scatter(&about, 250, 150)[2][2], 0.0);
+        // The same again, far behind.
+        all.put(0, other, 300.0, 200);
+        assert!(all.scatter(&about, 200, 150)[2][2] < 1e-9);
+        all.put(STARTS, other, 0.0, 200);
+    }
+}

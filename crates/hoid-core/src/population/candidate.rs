@@ -1,0 +1,439 @@
+//! One way to read the data: a basis, a noise model, and a mixture about what the gains did.
+//!
+//! A candidate reads samples one after another. Its whitening filter D and its basis stay as they are, so
+//! that it is the prediction error method for given D and a linearisation; what it learns for the next one
+//! is a better point of the basis (the corrections), a better noise model (`noise`, by the residuals) and how
+//! unevenly the innovations come (`volatility`). [`super::filter`] runs one after another over the data.
+//!
+//! `evidence` is the sum of the logarithms of the densities that it gave to blocks before it saw them (A. P.
+//! Dawid, *J. Royal Statistical Society* A 147 (1984) 278-292): by it candidates of the same data are compared.
+//! Each block was predicted from what was before it only, so that more parameters are no advantage. The
+//! density is that of Student with the variance of the last seconds and as many degrees of freedom as the block
+//! has samples, so that a change, which nobody predicts, decides nothing; and old evidence is forgotten, so
+//! that it is about what has been learnt and not about how fast.
+
+use super::{
+    basis::{Basis, Complex, Point, Regressors},
+    blocks::Row,
+    last_blocks::LastBlocks,
+    mixture::{ChangePrior, Mixture, NoiseScales, Segments},
+    moments::Moments,
+    noise::NoiseModel,
+    pair::Pair,
+    past::{Paired, PastSignals, paired},
+    sizes::{GAINS, HELD, LARGEST_ORDER, LINEAR, PARAMETERS, SIGNALS, STATES},
+    volatility::Volatility,
+};
+use crate::state::{State, visit_all};
+
+/// Magnitude beyond which the filters are brought to rest.
+pub(super) const LARGEST: f64 = 1e100;
+/// Where the basis may be: omega in rad/s, zeta, tau in s; and how far it moves at once, in shares of omega
+/// and zeta and in s.
+const RANGE: [[f64; 2]; HELD] = [[3.0, 35.0], [0.05, 1.4], [0.01, 0.85]];
+const FAR: [[f64; 2]; HELD] = [[-0.3, 0.4], [-0.4, 0.6], [-0.05, 0.05]];
+/// Longest delay, s.
+pub(super) const LATEST_S: f64 = 0.9;
+/// Frequencies at which gain and lead are nearest, rad/s.
+pub(super) const NEAR_RAD_S: [f64; 3] = [1.0, 2.0, 4.0];
+/// Time before which blocks are no evidence, s.
+const UNSETTLED_S: f64 = 2.0;
+/// Time of the energies of which [`Volatility`] takes one, s.
+const BURST_S: f64 = 1.28;
+/// Memory of the variance that the evidence supposes, s.
+const LEVEL_S: f64 = 20.0;
+/// Time constant with which evidence is forgotten, s.
+const EVIDENCE_S: f64 = 20.0;
+/// Time between two solutions of the noise model where nothing is replayed, s.
+const RENEWED_S: f64 = 1.28;
+/// Variances beyond which the square of an innovation counts no more in the noise model.
+const CLIPPED: f64 = 100.0;
+/// Power of u that the variance never falls below, as a share.
+const LEAST: f64 = 1e-24;
+
+/// A sample after the whitening filter.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Whitened {
+    pub y: f64,
+    pub signals: [f64; SIGNALS],
+    pub level: f64,
+}
+
+/// The state of the reader.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Candidate {
+    basis: Basis,
+    now: [f64; SIGNALS],
+    past: PastSignals,
+    outputs: [f64; LARGEST_ORDER],
+    d: [f64; LARGEST_ORDER],
+    pub noise: NoiseModel,
+    moments: Moments,
+    block: u64,
+    pub mixture: Mixture,
+    pub scales: NoiseScales,
+    guide: Segments,
+    skipped: u64,
+    volatility: Volatility,
+    level: [f64; 2],
+    pub evidence: f64,
+    samples: u64,
+    /// Samples until no prediction is left among the past outputs.
+    predicted: u64,
+    pub blocks: LastBlocks,
+    /// Sample of the record at which it started.
+    pub start: u64,
+}
+
+impl State for Candidate {
+    fn visit(&mut self, each: &mut dyn FnMut(&mut f64)) {
+        visit_all(
+            &mut [
+                &mut self.basis,
+                &mut self.now,
+                &mut self.past,
+                &mut self.outputs,
+                &mut self.d,
+                &mut self.noise,
+                &mut self.moments,
+                &mut self.mixture,
+                &mut self.scales,
+                &mut self.guide,
+                &mut self.skipped,
+                &mut self.volatility,
+                &mut self.level,
+                &mut self.evidence,
+                &mut self.samples,
+                &mut self.predicted,
+                &mut self.blocks,
+                &mut self.start,
+            ],
+            each,
+        );
+    }
+}
+
+impl Candidate {
+    /// At rest. `d` is the noise model to begin with, solved.
+    pub fn new(
+        basis: Basis,
+        d: &NoiseModel,
+        empty: NoiseModel,
+        mixture: Mixture,
+        scales: NoiseScales,
+        prior: &ChangePrior,
+        start: u64,
+    ) -> Self {
+        let block = libm::round(prior.block / scales.sample_time).max(1.0);
+        let mut padded = [0.0; LARGEST_ORDER];
+        padded[..d.order()].copy_from_slice(d.d());
+        Self {
+            basis,
+            now: [0.0; SIGNALS],
+            past: PastSignals::ZERO,
+            outputs: [0.0; LARGEST_ORDER],
+            d: padded,
+            noise: empty,
+            moments: Moments::NONE,
+            block: block as u64,
+            mixture,
+            scales,
+            guide: Segments::NONE,
+            skipped: 0,
+            volatility: Volatility::new(libm::round(BURST_S / (block * scales.sample_time)).max(1.0) as u64),
+            level: [0.02 * scales.size * scales.size, 20.0],
+            evidence: 0.0,
+            samples: 0,
+            predicted: 0,
+            blocks: LastBlocks::new(scales.sample_time),
+            start,
+        }
+    }
+
+    /// Where the residuals of the noise model come from, in place of the mixture's mean.
+    pub fn guided(mut self, guide: Segments) -> Self {
+        self.guide = guide;
+        self
+    }
+
+    /// Learns nothing from so many samples: the filters start at rest, but what they filter did not.
+    pub fn skipping(mut self, samples: u64) -> Self {
+        self.skipped = samples;
+        self
+    }
+
+    /// Goes on without a guide.
+    pub fn unguided(&mut self) {
+        self.guide = Segments::NONE;
+    }
+
+    pub fn basis(&self) -> &Basis {
+        &self.basis
+    }
+
+    pub fn block_samples(&self) -> u64 {
+        self.block
+    }
+
+    /// Samples that count for one, by the innovations so far.
+    pub fn dispersion(&self) -> f64 {
+        self.volatility.dispersion()
+    }
+
+    /// The signals of a sample, from the errors of so many samples ago.
+    #[inline(always)]
+    pub fn respond(&mut self, error: impl Fn(usize) -> f64) {
+        let l = self.basis.delay();
+        self.now = self.basis.step([error(l), error(l + 1), error(l + 2)]);
+    }
+
+    /// `D u`, D times the signals, and D at zero.
+    #[inline(always)]
+    pub fn whitened(&self, u: f64) -> Whitened {
+        let (mut y, mut z, mut level) = (u, paired(&self.now), 1.0);
+        let order = self.noise.order().next_multiple_of(4).min(LARGEST_ORDER);
+        for ((d, u), before) in self.d[..order].iter().zip(&self.outputs).zip(self.past.newest_first()) {
+            y += d * u;
+            level += d;
+            for (z, before) in z.iter_mut().zip(before) {
+                *z += Pair::both(*d) * *before;
+            }
+        }
+        Whitened {
+            y,
+            signals: core::array::from_fn(|i| z[i / 2].0[i % 2]),
+            level,
+        }
+    }
+
+    /// Innovation of a whitened sample by the mean of the mixture.
+    #[inline(always)]
+    pub fn innovation(&self, white: &Whitened) -> f64 {
+        let state = self.mixture.mean();
+        let w = self.basis.weights(state);
+        white.y - state[GAINS] * white.level - (0..SIGNALS).map(|k| w[k] * white.signals[k]).sum::<f64>()
+    }
+
+    /// Learns from a sample; false where a number has overflowed.
+    #[inline(always)]
+    pub fn learn(&mut self, white: &Whitened, u: f64, prior: &ChangePrior) -> bool {
+        let sound = |x: &f64| x.abs() < LARGEST;
+        if !(sound(&white.y) && white.signals.iter().all(sound)) {
+            return false;
+        }
+        if self.predicted > 0 {
+            // The noise of the outputs that were predicted is not known: the first samples after them have
+            // innovations as large as the noise itself.
+            self.predicted -= 1;
+            self.blocks.pass_over();
+            return true;
+        }
+        self.samples += 1;
+        let order = self.noise.order() as u64;
+        if self.samples <= order.max(self.skipped) {
+            return true;
+        }
+        self.take_residual(u);
+        let row = self.row(white, prior.look);
+        self.blocks.take(&row);
+        self.moments
+            .add(&white.signals, white.level, self.limited(white, prior.limit));
+        if self.moments.samples as u64 >= self.block {
+            self.end_of_block(prior);
+        }
+        true
+    }
+
+    /// The output with its innovation at most so many standard deviations.
+    #[inline(always)]
+    fn limited(&self, white: &Whitened, limit: f64) -> f64 {
+        let most = limit * libm::sqrt(self.level[0]);
+        if most == f64::INFINITY {
+            return white.y;
+        }
+        let innovation = self.innovation(white);
+        white.y - innovation + innovation.max(-most).min(most)
+    }
+
+    /// What the sample says to the detector.
+    #[inline(always)]
+    fn row(&self, white: &Whitened, limit: f64) -> Row {
+        let Regressors { x, by } = self.basis.regressors(&white.signals);
+        let state = self.mixture.mean();
+        let (mut r, mut q) = ([0.0; LINEAR], [0.0; HELD]);
+        for i in 0..GAINS {
+            r[i] = x[i];
+            for j in 0..HELD {
+                r[i] += state[LINEAR + j] * by[j][i];
+                q[j] += state[i] * by[j][i];
+            }
+        }
+        r[GAINS] = white.level;
+        Row {
+            r,
+            q,
+            p: core::array::from_fn(|j| state[LINEAR + j]),
+            y: self.limited(white, limit),
+            innovation: self.innovation(white),
+            variance: self.level[0],
+        }
+    }
+
+    /// v with all its lags by the gains of the guide, or of now.
+    #[inline(always)]
+    fn take_residual(&mut self, u: f64) {
+        let order = self.noise.order();
+        if self.samples <= 2 * order as u64 {
+            return;
+        }
+        let state = self.guide.at(self.mixture.blocks).unwrap_or(self.mixture.mean());
+        let level = state[GAINS];
+        let weights = paired(&self.basis.weights(state));
+        let left = |u: f64, z: &Paired| {
+            let response = weights[0] * z[0] + weights[1] * z[1] + weights[2] * z[2];
+            u - level - response.sum()
+        };
+        let mut v = [0.0; LARGEST_ORDER + 1];
+        v[0] = left(u, &paired(&self.now));
+        for ((v, u), z) in v[1..=order].iter_mut().zip(&self.outputs).zip(self.past.newest_first()) {
+            *v = left(*u, z);
+        }
+        // What is not the noise's, as the seconds after a change, counts no more than it would if it were.
+        let eps = v[0] + self.d.iter().zip(&v[1..]).map(|(d, v)| d * v).sum::<f64>();
+        let excess = eps * eps / (CLIPPED * self.level[0]);
+        self.noise.update(&v, 1.0 / excess.max(1.0));
+    }
+
+    fn end_of_block(&mut self, prior: &ChangePrior) {
+        let moments = core::mem::replace(&mut self.moments, Moments::NONE);
+        let (n, ts) = (moments.samples, self.scales.sample_time);
+        let least = LEAST * self.scales.size * self.scales.size;
+        let energy = moments.energy(&self.basis, self.mixture.mean()).max(n * least);
+        let settled = self.samples as f64 * ts > UNSETTLED_S;
+        let [level, rests_on] = &mut self.level;
+        if settled {
+            let density = -0.5 * n * (libm::log(*level) + 2.0 * libm::log1p(energy / (n * *level)));
+            self.evidence = density + libm::exp(-n * ts / EVIDENCE_S) * self.evidence;
+        }
+        *rests_on = (*rests_on + n).min(LEVEL_S / ts).max(n);
+        *level = (*level + n / *rests_on * (energy / n - *level)).max(least);
+        let left = self.mixture.update(&moments, &self.basis, prior, &self.scales);
+        if settled {
+            self.volatility.take(left, n);
+        }
+    }
+
+    /// Takes over what it has learnt of the noise: where nothing is replayed, in place of the next candidate.
+    pub fn renew(&mut self) {
+        let every = (libm::round(RENEWED_S / self.scales.sample_time).max(1.0)) as u64;
+        if self.samples.is_multiple_of(every) {
+            self.noise.solve();
+            let order = self.noise.order();
+            self.d[..order].copy_from_slice(self.noise.d());
+            self.scales.dispersion = self.volatility.dispersion();
+        }
+    }
+
+    /// Ends a sample.
+    #[inline(always)]
+    pub fn remember(&mut self, u: f64) {
+        self.outputs.copy_within(0..LARGEST_ORDER - 1, 1);
+        self.outputs[0] = u;
+        self.past.push(&self.now);
+    }
+
+    /// Ends a sample whose output is a prediction, or was moved to where it must be.
+    pub fn remember_prediction(&mut self, u: f64) {
+        // As many as were predicted one after another, no more than D reaches back.
+        self.predicted = (self.predicted + 1).min(self.noise.order() as u64);
+        self.remember(u);
+    }
+
+    /// The noise model that whitens.
+    pub fn d(&self) -> &[f64] {
+        &self.d[..self.noise.order()]
+    }
+
+    /// Where what is held is by a state: never outside of where the basis may be.
+    pub fn corrected(&self, state: &[f64; STATES]) -> Point {
+        let at = self.basis.point();
+        let of = [at.omega, at.zeta, 1.0];
+        let [omega, zeta, tau] = core::array::from_fn(|j| {
+            let [down, up] = FAR[j].map(|far| far * of[j]);
+            let [low, high] = RANGE[j];
+            let from = [at.omega, at.zeta, at.tau][j];
+            (from + state[LINEAR + j].max(down).min(up)).max(low).min(high)
+        });
+        Point { omega, zeta, tau, ..at }
+    }
+
+    /// Where the corrections point.
+    pub fn point(&self) -> Point {
+        self.corrected(self.mixture.mean())
+    }
+
+    /// K_e, K_e_dot, omega, zeta and tau.
+    pub fn operator(&self) -> [f64; PARAMETERS] {
+        let (map, state) = (self.basis.gain_and_lead(&NEAR_RAD_S), self.mixture.mean());
+        let Point { omega, zeta, tau, .. } = self.point();
+        let gain = |i: usize| (0..GAINS).map(|k| map[i][k] * state[k]).sum();
+        [gain(0), gain(1), omega, zeta, tau]
+    }
+
+    /// The response of each gain at a frequency in rad/s, for what is held now.
+    pub fn responses(&self, omega_rad_s: f64) -> [Complex; GAINS] {
+        self.basis.response(omega_rad_s, self.point())
+    }
+
+    /// Y at a frequency in rad/s.
+    pub fn response(&self, omega_rad_s: f64) -> Complex {
+        let (state, h) = (self.mixture.mean(), self.responses(omega_rad_s));
+        [0, 1].map(|part| (0..GAINS).map(|i| state[i] * h[i][part]).sum())
+    }
+
+    /// As [`Candidate::response`], with the derivatives of its real and its imaginary part by gains, level
+    /// and corrections: exact by the gains, differences by the corrections.
+    pub fn response_with_derivatives(&self, omega_rad_s: f64) -> (Complex, [[f64; STATES]; 2]) {
+        let (state, point) = (self.mixture.mean(), self.point());
+        let h = self.basis.response(omega_rad_s, point);
+        let of = |h: &[Complex; GAINS]| [0, 1].map(|part| (0..GAINS).map(|i| state[i] * h[i][part]).sum::<f64>());
+        let mut by = [[0.0; STATES]; 2];
+        for part in 0..2 {
+            for i in 0..GAINS {
+                by[part][i] = h[i][part];
+            }
+        }
+        for (j, size) in [point.omega, point.zeta, 0.1].into_iter().enumerate() {
+            let step = 1e-5 * size;
+            let at = |sign: f64| {
+                let mut by = [0.0; HELD];
+                by[j] = sign * step;
+                of(&self.basis.response(omega_rad_s, point.moved(by)))
+            };
+            let (up, down) = (at(1.0), at(-1.0));
+            for part in 0..2 {
+                by[part][LINEAR + j] = (up[part] - down[part]) / (2.0 * step);
+            }
+        }
+        (of(&h), by)
+    }
+
+    /// A state in the coordinates of another basis: the same gains in the same units, and corrections from
+    /// its point, where that is near.
+    pub fn carried(&self, to: &Basis, state: &[f64; STATES]) -> [f64; STATES] {
+        let (from, there) = (self.basis.point(), to.point());
+        let mut carried = *state;
+        for i in 0..GAINS {
+            carried[i] *= self.basis.scale()[i] / to.scale()[i];
+        }
+        let moved = [from.omega - there.omega, from.zeta - there.zeta, from.tau - there.tau];
+        for (c, moved) in carried[LINEAR..].iter_mut().zip(moved) {
+            *c += moved;
+        }
+        let [omega, _, tau] = [carried[LINEAR], carried[LINEAR + 1], carried[LINEAR + 2]];
+        if tau.abs() > 0.03 || omega.abs() > 0.3 * there.omega {
+            carried[LINEAR..].fill(0.0);
+        }
+        carried
+    }
+}

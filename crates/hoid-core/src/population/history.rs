@@ -1,0 +1,157 @@
+//! The last samples of the record, in memory of the caller.
+//!
+//! Errors, outputs, and what becomes of each sample, in three rings of the same length.
+
+use crate::state::State;
+
+/// Their order.
+const ERRORS: usize = 0;
+const OUTPUTS: usize = 1;
+const USES: usize = 2;
+
+/// What becomes of a sample.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Use {
+    /// The estimate learns from it.
+    Learn,
+    /// It passes through the filters.
+    Follow,
+    /// Its output is missing: the prediction takes its place.
+    Missing,
+    /// The stick is at its upper end: the output is at least as large.
+    AtMost,
+    /// The stick is at its lower end.
+    AtLeast,
+}
+
+impl Use {
+    const ALL: [Self; 5] = [Self::Follow, Self::Learn, Self::Missing, Self::AtMost, Self::AtLeast];
+
+    fn of(number: f64) -> Self {
+        Self::ALL.get(number as usize).copied().unwrap_or(Self::Follow)
+    }
+
+    fn number(self) -> f64 {
+        Self::ALL.iter().position(|of| *of == self).unwrap_or(0) as f64
+    }
+}
+
+/// The rings.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct History<E> {
+    memory: E,
+    samples: u64,
+}
+
+impl<E: AsMut<[f64]>> State for History<E> {
+    fn visit(&mut self, each: &mut dyn FnMut(&mut f64)) {
+        self.memory.as_mut().visit(each);
+        self.samples.visit(each);
+    }
+}
+
+impl<E: AsRef<[f64]> + AsMut<[f64]>> History<E> {
+    pub fn new(mut memory: E) -> Self {
+        memory.as_mut().fill(0.0);
+        Self { memory, samples: 0 }
+    }
+
+    /// Samples that there is room for.
+    pub fn room(&self) -> usize {
+        self.memory.as_ref().len() / 3
+    }
+
+    /// Samples so far.
+    pub fn samples(&self) -> u64 {
+        self.samples
+    }
+
+    /// The place of a sample in one of the rings.
+    #[inline(always)]
+    fn place(&self, ring: usize, sample: u64) -> Option<usize> {
+        let room = self.room();
+        (room > 0).then(|| ring * room + (sample % room as u64) as usize)
+    }
+
+    #[inline(always)]
+    fn put(&mut self, ring: usize, sample: u64, value: f64) {
+        if let Some(place) = self.place(ring, sample) {
+            self.memory.as_mut()[place] = value;
+        }
+    }
+
+    #[inline(always)]
+    fn get(&self, ring: usize, sample: u64) -> f64 {
+        self.place(ring, sample)
+            .map_or(0.0, |place| self.memory.as_ref()[place])
+    }
+
+    /// Takes the error of a sample; [`History::complete`] takes the rest.
+    #[inline(always)]
+    pub fn push(&mut self, error: f64) {
+        self.put(ERRORS, self.samples, error);
+        self.samples += 1;
+    }
+
+    /// The output of the newest sample, and what becomes of it.
+    #[inline(always)]
+    pub fn complete(&mut self, output: f64, use_of_it: Use) {
+        let newest = self.samples.saturating_sub(1);
+        self.put(OUTPUTS, newest, output);
+        self.put(USES, newest, use_of_it.number());
+    }
+
+    /// Says something else of the sample before the newest, from which had been learnt.
+    pub fn revise_previous(&mut self, use_of_it: Use) {
+        if let Some(previous) = self.samples.checked_sub(2)
+            && self.output(previous).1 == Use::Learn
+        {
+            self.put(USES, previous, use_of_it.number());
+        }
+    }
+
+    /// The error so many samples before a sample; zero before the record.
+    #[inline(always)]
+    pub fn error(&self, sample: u64, age: usize) -> f64 {
+        sample.checked_sub(age as u64).map_or(0.0, |at| self.get(ERRORS, at))
+    }
+
+    /// The output of a sample, and what becomes of it.
+    #[inline(always)]
+    pub fn output(&self, sample: u64) -> (f64, Use) {
+        (self.get(OUTPUTS, sample), Use::of(self.get(USES, sample)))
+    }
+
+    /// Forgets all.
+    pub fn clear(&mut self) {
+        self.memory.as_mut().fill(0.0);
+        self.samples = 0;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_last_samples_are_there_and_nothing_before_the_record() {
+        let mut history = History::new([9.0; 30]);
+        for k in 0..25_u32 {
+            history.push(f64::from(k));
+            history.complete(-f64::from(k), Use::ALL[k as usize % 5]);
+        }
+        assert_eq!((history.room(), history.samples()), (10, 25));
+        for k in 15..25_u64 {
+            assert_eq!(history.error(24, (24 - k) as usize), k as f64);
+            assert_eq!(history.output(k), (-(k as f64), Use::ALL[k as usize % 5]));
+        }
+        assert_eq!(history.error(3, 4), 0.0);
+        history.clear();
+        assert_eq!((history.samples(), history.error(0, 0)), (0, 0.0));
+        // No room at all is no panic.
+        let mut none = History::new([0.0; 2]);
+        none.push(1.0);
+        none.complete(1.0, Use::Learn);
+        assert_eq!(none.output(0), (0.0, Use::Follow));
+    }
+}

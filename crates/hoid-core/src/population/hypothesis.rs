@@ -1,0 +1,305 @@
+//! A hypothesis: the operator last changed at its birth, and has been the same, or nearly, since.
+//!
+//! It is an extended Kalman filter of `s = [gains, level, corrections]` that takes a block of samples at a
+//! time ([`super::moments`]). With the prediction s, P before the block and the innovation variance
+//! `sigma^2`,
+//!
+//! `P+ = (I + P A/sigma^2)^-1 P`, `s+ = s + P+ b/sigma^2`,
+//! `ln p = -1/2 ln det(I + P A/sigma^2) - (E - b' P+ b/sigma^2)/2 sigma^2 + ..`
+//!
+//! (Y. Bar-Shalom, X. R. Li and T. Kirubarajan, *Estimation with Applications to Tracking and
+//! Navigation*, 2001, section 7.2, in information form). The form with `(I + P A)^-1` takes a covariance
+//! that is singular, as that of a gain with a lead is in three gains.
+//!
+//! Its innovation variance is its own, so that a remnant that changes is part of a change. It is not known
+//! better than the samples allow: what the block has in common for all hypotheses has a Student density,
+//! with the degrees of freedom of the variance (A. Zellner, *An Introduction to Bayesian Inference in
+//! Econometrics*, 1971, section 3.2).
+
+use super::{
+    basis::Basis,
+    moments::Moments,
+    sizes::{SEGMENTS, STATES},
+};
+
+pub(super) type Covariance = [[f64; STATES]; STATES];
+
+/// What held before a change: up to which block, and the state at its end.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Segment {
+    pub until: u64,
+    pub state: [f64; STATES],
+}
+
+crate::state!([] Segment { until, state });
+
+/// A hypothesis.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Hypothesis {
+    pub state: [f64; STATES],
+    pub covariance: Covariance,
+    /// Innovation variance, and the samples that it rests on.
+    pub variance: f64,
+    pub residuals: f64,
+    pub log_weight: f64,
+    /// Block of its birth, zero for those of the beginning.
+    pub born: u64,
+    pub class: usize,
+    segments: [Segment; SEGMENTS],
+    changes: usize,
+}
+
+crate::state!([] Hypothesis { state, covariance, variance, residuals, log_weight, born, class, segments, changes });
+
+/// What a block left.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Left {
+    /// Sum of the squares that are left after the update, those of the prediction's error included.
+    pub energy: f64,
+    /// `ln det(I + P A/sigma^2)`.
+    log_determinant: f64,
+}
+
+impl Left {
+    pub const NOTHING: Self = Self {
+        energy: 0.0,
+        log_determinant: 0.0,
+    };
+}
+
+impl Hypothesis {
+    pub fn new(state: [f64; STATES], covariance: Covariance, variance: f64, class: usize, log_weight: f64) -> Self {
+        Self {
+            state,
+            covariance,
+            variance,
+            residuals: 20.0,
+            log_weight,
+            born: 0,
+            class,
+            segments: [Segment {
+                until: 0,
+                state: [0.0; STATES],
+            }; SEGMENTS],
+            changes: 0,
+        }
+    }
+
+    pub fn weight(&self) -> f64 {
+        libm::exp(self.log_weight)
+    }
+
+    /// The segments before the last change, the oldest first.
+    pub fn segments(&self) -> &[Segment] {
+        &self.segments[..self.changes.min(SEGMENTS)]
+    }
+
+    /// One that says that the operator changes after this block.
+    pub fn child(&self, block: u64) -> Self {
+        let mut child = *self;
+        let changes = self.changes.min(SEGMENTS);
+        if changes == SEGMENTS {
+            child.segments.copy_within(1.., 0);
+        }
+        let last = changes.min(SEGMENTS - 1);
+        child.segments[last] = Segment {
+            until: block,
+            state: self.state,
+        };
+        (child.changes, child.born) = (last + 1, block);
+        child
+    }
+
+    /// The update by a block, each of whose samples counts for `1/dispersion` of one.
+    pub fn update(&mut self, moments: &Moments, basis: &Basis, dispersion: f64) -> Left {
+        let about = moments.about(basis, &self.state);
+        let per = 1.0 / (self.variance * dispersion);
+        let mut matrix: Covariance = core::array::from_fn(|i| {
+            core::array::from_fn(|j| {
+                let product: f64 = (0..STATES)
+                    .map(|k| self.covariance[i][k] * about.information[k][j])
+                    .sum();
+                product * per
+            })
+        });
+        (0..STATES).for_each(|i| matrix[i][i] += 1.0);
+        let mut after = self.covariance;
+        let log_determinant = solve(&mut matrix, &mut after);
+        for i in 0..STATES {
+            for j in 0..i {
+                let mean = 0.5 * (after[i][j] + after[j][i]);
+                (after[i][j], after[j][i]) = (mean, mean);
+            }
+        }
+        let sound = after.iter().flatten().all(|p| p.is_finite()) && (0..STATES).all(|i| after[i][i] >= 0.0);
+        if !sound {
+            return Left {
+                energy: about.energy,
+                ..Left::NOTHING
+            };
+        }
+        let mut explained = 0.0;
+        for i in 0..STATES {
+            let step: f64 = (0..STATES).map(|k| after[i][k] * about.score[k]).sum();
+            self.state[i] += per * step;
+            explained += per * about.score[i] * step;
+        }
+        self.covariance = after;
+        Left {
+            energy: (about.energy - explained).max(0.0),
+            log_determinant,
+        }
+    }
+
+    /// The logarithm of the density of the block, and the update of the variance; `common` is the least
+    /// energy that any hypothesis left.
+    pub fn weigh(&mut self, left: &Left, samples: f64, common: f64, dispersion: f64, memory: f64) {
+        let (n, nu) = (samples / dispersion, self.residuals);
+        let over = common / (self.variance * dispersion);
+        self.log_weight += libm::lgamma(0.5 * (nu + n))
+            - libm::lgamma(0.5 * nu)
+            - 0.5 * n * libm::log(nu * self.variance)
+            - 0.5 * (nu + n) * libm::log1p(over / nu)
+            - 0.5 * left.log_determinant
+            - 0.5 * (left.energy - common) / (self.variance * dispersion);
+        self.variance = (nu * self.variance + left.energy / dispersion) / (nu + n);
+        self.residuals = (nu + n).min(memory / dispersion);
+    }
+}
+
+/// The solution X of `M X = B` in the place of B, by elimination with row pivots, and `ln |det M|`.
+pub(super) fn solve(m: &mut Covariance, b: &mut Covariance) -> f64 {
+    let mut log_determinant = 0.0;
+    for i in 0..STATES {
+        let mut pivot = i;
+        for r in i + 1..STATES {
+            if m[r][i].abs() > m[pivot][i].abs() {
+                pivot = r;
+            }
+        }
+        m.swap(i, pivot);
+        b.swap(i, pivot);
+        let (row, right, size) = (m[i], b[i], m[i][i]);
+        log_determinant += libm::log(size.abs());
+        for r in i + 1..STATES {
+            let factor = m[r][i] / size;
+            for c in i..STATES {
+                m[r][c] -= factor * row[c];
+            }
+            for c in 0..STATES {
+                b[r][c] -= factor * right[c];
+            }
+        }
+    }
+    for i in (0..STATES).rev() {
+        let size = m[i][i];
+        b[i].iter_mut().for_each(|x| *x /= size);
+        let right = b[i];
+        for r in 0..i {
+            let factor = m[r][i];
+            for c in 0..STATES {
+                b[r][c] -= factor * right[c];
+            }
+        }
+    }
+    log_determinant
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use crate::population::{
+        basis::Point,
+        sizes::{GAINS, LINEAR, SIGNALS},
+    };
+
+    fn basis() -> Basis {
+        let point = Point {
+            tau: 0.2,
+            omega: 10.0,
+            zeta: 0.3,
+            lag: 3.0,
+        };
+        Basis::new(point, 0.01).unwrap()
+    }
+
+    fn covariance(gains: f64) -> Covariance {
+        let mut p = [[0.0; STATES]; STATES];
+        for (i, row) in p.iter_mut().enumerate() {
+            row[i] = if i < LINEAR { gains } else { 1e-4 };
+        }
+        p
+    }
+
+    fn blocks(count: usize) -> Moments {
+        let (mut basis, mut moments) = (basis(), Moments::NONE);
+        for k in 0..32 * count {
+            let e = |k: usize| libm::sin(0.05 * k as f64) + libm::cos(0.02 * k as f64);
+            let z = basis.step([e(k + 2), e(k + 1), e(k)]);
+            moments.add(&z, 1.0, 0.3 * z[2] + 0.05 * libm::sin(0.7 * k as f64 * k as f64));
+        }
+        moments
+    }
+
+    #[test]
+    fn the_update_is_the_twin_of_the_kalman_gain() {
+        // A singular covariance: the gains lie on one line.
+        let mut p = covariance(0.0);
+        for i in 0..GAINS {
+            for j in 0..GAINS {
+                p[i][j] = 0.3 * (1.0 + i as f64) * (1.0 + j as f64);
+            }
+        }
+        p[GAINS][GAINS] = 0.2;
+        let mut h = Hypothesis::new([0.0; STATES], p, 0.01, 0, 0.0);
+        let moments = blocks(2);
+        let about = moments.about(&basis(), &h.state);
+        h.update(&moments, &basis(), 1.0);
+        // P+ = P - P (A^-1 sigma^2 + P)^-1 P has no inverse of A here; P+ (I + A P/sigma^2) = P is the same.
+        for i in 0..STATES {
+            for j in 0..STATES {
+                let back: f64 = (0..STATES)
+                    .map(|k| {
+                        let of_k: f64 = (0..STATES).map(|l| about.information[k][l] * p[l][j]).sum();
+                        h.covariance[i][k] * (of_k / 0.01 + if k == j { 1.0 } else { 0.0 })
+                    })
+                    .sum();
+                assert!((back - p[i][j]).abs() < 1e-9, "{i} {j}: {back} {}", p[i][j]);
+            }
+            let step: f64 = (0..STATES).map(|k| h.covariance[i][k] * about.score[k]).sum::<f64>() / 0.01;
+            assert!((h.state[i] - step).abs() < 1e-12);
+        }
+        // The gains stay on their line.
+        assert!((h.covariance[1][1] - 2.0 * h.covariance[0][1]).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_block_that_says_nothing_changes_nothing() {
+        let mut h = Hypothesis::new([0.1; STATES], covariance(1.0), 0.01, 0, 0.0);
+        let before = h;
+        let left = h.update(&Moments::NONE, &basis(), 1.0);
+        assert_eq!(
+            (h.state, h.covariance, left.energy),
+            (before.state, before.covariance, 0.0)
+        );
+        // Nor does one that overflows.
+        let mut huge = Moments::NONE;
+        huge.add(&[1e200; SIGNALS], 1.0, 1.0);
+        h.update(&huge, &basis(), 1.0);
+        assert!(h.state.iter().all(|s| s.is_finite()));
+    }
+
+    #[test]
+    fn a_child_remembers_what_was_before() {
+        let mut h = Hypothesis::new([0.1; STATES], covariance(1.0), 0.01, 0, 0.0);
+        for block in 1..=SEGMENTS as u64 + 2 {
+            h.state[0] = block as f64;
+            h = h.child(block);
+        }
+        let segments = h.segments();
+        assert_eq!(segments.len(), SEGMENTS);
+        assert_eq!((segments[0].until, segments[0].state[0]), (3, 3.0));
+        assert_eq!(h.born, SEGMENTS as u64 + 2);
+    }
+}

@@ -1,0 +1,445 @@
+//! When did the operator last change? A mixture over the answers.
+//!
+//! After each block the likeliest hypotheses have children that say that the operator changes now: the
+//! covariance of a change is added to that of the gains. A child starts with the prior probability of a
+//! change in the time since the last birth, and its probability follows its likelihood. When there is no
+//! room, the least likely of those that are old enough is pruned. So between changes the estimate rests on
+//! all data since the last one, and after a change it is that of the child that was born there (P.
+//! Andersson, *International Journal of Control* 42 (1985) 1175-1193; R. P. Adams and D. J. C. MacKay,
+//! *Bayesian online changepoint detection*, 2007; the births of A. S. Willsky and H. L. Jones, *IEEE
+//! Trans. Automatic Control* 21 (1976) 108-112, with all their likelihoods).
+//!
+//! **Classes.** The numerator is any, or that of a gain with a lead, `(K_e + K_e_dot s)(s + a)`: the second
+//! is the first with a covariance that leaves the gains no other direction. Of each form the gains hardly
+//! drift between changes, or they wander, as people do. Children have the class of their parent, but one
+//! with a gain and a lead has children of any numerator too. The best of each class is never pruned.
+//!
+//! **The estimate** is the mean of the mixture, its covariance that of the mixture, the differences between
+//! the hypotheses included.
+
+use super::{
+    basis::Basis,
+    hypothesis::{Covariance, Hypothesis, Left, Segment},
+    moments::Moments,
+    sizes::{CLASSES, GAINS, HELD, HYPOTHESES, LINEAR, SEGMENTS, STATES},
+};
+
+/// What is supposed of changes. Gains are in units of |Y| at the reference frequency.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ChangePrior {
+    /// Length of a block, s.
+    pub block: f64,
+    /// Mean time between changes, s.
+    pub between: f64,
+    /// Standard deviations of a change: of the gain and of the lead's part at 2 rad/s.
+    pub jump: [f64; 2],
+    /// Drifts of the gains in a second: of those who hardly drift, and of those who wander.
+    pub drift: [f64; 2],
+    /// The drift just after a change, and its time constant, s.
+    pub settling: [f64; 2],
+    /// Drift of the level of u in a second, over the root mean square of u.
+    pub level: f64,
+    /// Time that the innovation variance rests on, s, and that of a newborn.
+    pub variance: [f64; 2],
+    /// Probability of those who hardly drift.
+    pub steady: f64,
+    /// Probability of any numerator.
+    pub any: f64,
+    /// Blocks for which a newborn is kept whatever it predicts.
+    pub protected: u64,
+    /// Standard deviations beyond which an innovation counts no more than there.
+    pub limit: f64,
+    /// The same in the detector.
+    pub look: f64,
+}
+
+impl ChangePrior {
+    pub(super) fn is_sound(&self) -> bool {
+        let positive = |x: f64| x > 0.0 && x.is_finite();
+        let share = |x: f64| (0.0..=1.0).contains(&x);
+        [self.block, self.between, self.settling[1]].into_iter().all(positive)
+            && self.variance.into_iter().all(positive)
+            && self.jump.into_iter().chain(self.drift).all(|x| x >= 0.0)
+            && self.settling[0] >= 0.0
+            && self.level >= 0.0
+            && self.limit > 0.0
+            && self.look > 0.0
+            && share(self.steady)
+            && share(self.any)
+    }
+}
+
+/// Births before this time are of a start that is not settled, s.
+const FIRST_BIRTH_S: f64 = 3.0;
+/// A form is handed on from a gain with a lead to any numerator with this share of its probability.
+const HANDED_ON: f64 = 0.3;
+/// Least logarithm of a probability.
+const LEAST: f64 = -60.0;
+/// Size of the gains before anything is known, in units of the ratio of u to e.
+const WIDE: f64 = 2.0;
+/// Share of the power of u that the innovation variance starts at.
+const INNOVATIONS: f64 = 0.02;
+
+/// Scales of the signals.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct NoiseScales {
+    /// Ratio of u to e, and the root mean square of u.
+    pub unit: f64,
+    pub size: f64,
+    pub sample_time: f64,
+    /// Samples that count for one.
+    pub dispersion: f64,
+}
+
+crate::state!([] NoiseScales { unit, size, sample_time, dispersion });
+
+/// The hypotheses.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Mixture {
+    hypotheses: [Hypothesis; HYPOTHESES],
+    count: usize,
+    pub blocks: u64,
+    mean: [f64; STATES],
+}
+
+crate::state!([] Mixture { hypotheses, count, blocks, mean });
+
+impl Mixture {
+    /// One hypothesis of each class about a state. `held` are the variances of the corrections.
+    pub fn new(prior: &ChangePrior, basis: &Basis, scales: &NoiseScales, held: [f64; HELD]) -> Self {
+        let mut p = [[0.0; STATES]; STATES];
+        p[GAINS][GAINS] = scales.size * scales.size;
+        for (j, variance) in held.into_iter().enumerate() {
+            p[LINEAR + j][LINEAR + j] = variance;
+        }
+        let variance = INNOVATIONS * scales.size * scales.size;
+        Self::of(prior, |class| {
+            let mut p = p;
+            open_gains(&mut p, basis, class, [WIDE * scales.unit; 2]);
+            ([0.0; STATES], p, variance)
+        })
+    }
+
+    /// All classes at a known estimate.
+    pub fn at(prior: &ChangePrior, state: [f64; STATES], covariance: Covariance, variance: f64) -> Self {
+        Self::of(prior, |_| (state, covariance, variance))
+    }
+
+    fn of(prior: &ChangePrior, start: impl Fn(usize) -> ([f64; STATES], Covariance, f64)) -> Self {
+        let share =
+            |class: usize| [prior.steady, 1.0 - prior.steady][class % 2] * [1.0 - prior.any, prior.any][class / 2];
+        let mut mixture = Self {
+            hypotheses: [Hypothesis::new([0.0; STATES], [[0.0; STATES]; STATES], 0.0, 0, LEAST); HYPOTHESES],
+            count: 0,
+            blocks: 0,
+            mean: [0.0; STATES],
+        };
+        for class in (0..CLASSES).filter(|class| share(*class) > 0.0) {
+            let (state, covariance, variance) = start(class);
+            let weight = libm::log(share(class));
+            mixture.hypotheses[mixture.count] = Hypothesis::new(state, covariance, variance, class, weight);
+            mixture.count += 1;
+        }
+        mixture.average();
+        mixture
+    }
+
+    fn all(&self) -> &[Hypothesis] {
+        &self.hypotheses[..self.count.min(HYPOTHESES)]
+    }
+
+    fn all_mut(&mut self) -> &mut [Hypothesis] {
+        &mut self.hypotheses[..self.count.min(HYPOTHESES)]
+    }
+
+    /// Takes a block; the least energy that any hypothesis left.
+    pub fn update(&mut self, moments: &Moments, basis: &Basis, prior: &ChangePrior, scales: &NoiseScales) -> f64 {
+        self.blocks += 1;
+        let (blocks, seconds) = (self.blocks, moments.samples * scales.sample_time);
+        let mut left = [Left::NOTHING; HYPOTHESES];
+        let mut common = f64::INFINITY;
+        for (h, left) in self.all_mut().iter_mut().zip(&mut left) {
+            let age = (blocks - h.born.min(blocks)) as f64 * seconds;
+            let mut drift = prior.drift[h.class % 2] * prior.drift[h.class % 2];
+            if h.born > 0 {
+                let [size, time] = prior.settling;
+                drift += size * size * libm::exp(-2.0 * age / time);
+            }
+            let step = libm::sqrt(drift * seconds) * scales.unit;
+            open_gains(&mut h.covariance, basis, h.class, [step; 2]);
+            let level = prior.level * scales.size;
+            h.covariance[GAINS][GAINS] += level * level * seconds;
+            *left = h.update(moments, basis, scales.dispersion);
+            common = common.min(left.energy);
+        }
+        // Half of the time since the start: its errors, which are large, do not stay.
+        let [longest, shortest] = prior.variance.map(|seconds| seconds / scales.sample_time);
+        let memory = longest.min((0.5 * blocks as f64 * moments.samples).max(shortest));
+        // What is predicted without an error leaves a variance that is still positive.
+        let least = 1e-24 * scales.size * scales.size;
+        for (h, left) in self.all_mut().iter_mut().zip(&left) {
+            h.weigh(left, moments.samples, common, scales.dispersion, memory);
+            h.variance = h.variance.max(least);
+        }
+        self.normalise();
+        self.average();
+        if blocks as f64 * seconds >= FIRST_BIRTH_S {
+            self.births(basis, prior, scales, seconds);
+        }
+        common
+    }
+
+    fn normalise(&mut self) {
+        let finite = |x: f64| if x.is_finite() { x } else { f64::NEG_INFINITY };
+        let best = self
+            .all()
+            .iter()
+            .map(|h| finite(h.log_weight))
+            .fold(f64::NEG_INFINITY, f64::max);
+        if !best.is_finite() {
+            let even = -libm::log(self.count.max(1) as f64);
+            self.all_mut().iter_mut().for_each(|h| h.log_weight = even);
+            return;
+        }
+        let sum: f64 = (self.all().iter())
+            .map(|h| libm::exp(finite(h.log_weight) - best))
+            .sum();
+        let all = best + libm::log(sum);
+        for h in self.all_mut() {
+            h.log_weight = (finite(h.log_weight) - all).max(LEAST);
+        }
+    }
+
+    fn average(&mut self) {
+        let mut mean = [0.0; STATES];
+        for h in self.all() {
+            let weight = h.weight();
+            for (m, s) in mean.iter_mut().zip(h.state) {
+                *m += weight * s;
+            }
+        }
+        self.mean = mean;
+    }
+
+    fn likeliest(&self, of: impl Fn(&Hypothesis) -> bool) -> Option<usize> {
+        (0..self.all().len())
+            .filter(|i| of(&self.hypotheses[*i]))
+            .max_by(|a, b| {
+                self.hypotheses[*a]
+                    .log_weight
+                    .total_cmp(&self.hypotheses[*b].log_weight)
+            })
+    }
+
+    fn probability(&self, class: usize) -> f64 {
+        self.all()
+            .iter()
+            .filter(|h| h.class == class)
+            .map(Hypothesis::weight)
+            .sum()
+    }
+
+    /// The children of a block. Those who wander have theirs every second block.
+    fn births(&mut self, basis: &Basis, prior: &ChangePrior, scales: &NoiseScales, seconds: f64) {
+        for class in 0..CLASSES {
+            let (wanders, any) = (class % 2 == 1, class >= 2);
+            let turn = self.blocks + u64::from(any);
+            if wanders && !turn.is_multiple_of(2) {
+                continue;
+            }
+            let own = self.probability(class);
+            let other = if any {
+                HANDED_ON * self.probability(class - 2)
+            } else {
+                0.0
+            };
+            let (parent, share) = match self.likeliest(|h| h.class == class) {
+                Some(parent) if own >= other => (Some(parent), own),
+                _ if any && prior.any > 0.0 => (self.likeliest(|h| h.class == class - 2), other),
+                found => (found, own),
+            };
+            let Some(parent) = parent else { continue };
+            let mut child = self.hypotheses[parent].child(self.blocks);
+            let every = if wanders { 2.0 } else { 1.0 };
+            child.class = class;
+            child.log_weight = libm::log(share.max(1e-12) * (every * seconds / prior.between).min(0.5));
+            open_gains(
+                &mut child.covariance,
+                basis,
+                class,
+                prior.jump.map(|jump| jump * scales.unit),
+            );
+            let youth = prior.variance[1] / scales.sample_time / scales.dispersion;
+            child.residuals = child.residuals.min(youth);
+            let Some(place) = self.place_for_one(prior) else {
+                continue;
+            };
+            self.hypotheses[place] = child;
+        }
+        self.normalise();
+    }
+
+    /// A free place, or that of the least likely that is old enough and not the best of its class.
+    fn place_for_one(&mut self, prior: &ChangePrior) -> Option<usize> {
+        if self.count < HYPOTHESES {
+            self.count += 1;
+            return Some(self.count - 1);
+        }
+        let best: [Option<usize>; CLASSES] = core::array::from_fn(|class| self.likeliest(|h| h.class == class));
+        let old = |i: &usize| self.blocks >= self.hypotheses[*i].born + prior.protected;
+        (0..HYPOTHESES)
+            .filter(|i| old(i) && !best.contains(&Some(*i)))
+            .min_by(|a, b| {
+                self.hypotheses[*a]
+                    .log_weight
+                    .total_cmp(&self.hypotheses[*b].log_weight)
+            })
+    }
+
+    /// The mean of the mixture.
+    pub fn mean(&self) -> &[f64; STATES] {
+        &self.mean
+    }
+
+    /// Its covariance.
+    pub fn covariance(&self) -> Covariance {
+        let mut c = [[0.0; STATES]; STATES];
+        for h in self.all() {
+            let weight = h.weight();
+            for i in 0..STATES {
+                for j in 0..STATES {
+                    let apart = (h.state[i] - self.mean[i]) * (h.state[j] - self.mean[j]);
+                    c[i][j] += weight * (h.covariance[i][j] + apart);
+                }
+            }
+        }
+        c
+    }
+
+    /// Innovation variance.
+    pub fn variance(&self) -> f64 {
+        self.all().iter().map(|h| h.weight() * h.variance).sum()
+    }
+
+    /// What the likeliest says of the past: the states before its changes, the oldest first, and the one of
+    /// now.
+    pub fn history(&self) -> Segments {
+        let mut segments = Segments::NONE;
+        if let Some(best) = self.likeliest(|_| true) {
+            for segment in self.hypotheses[best].segments() {
+                segments.push(*segment);
+            }
+            segments.push(Segment {
+                until: u64::MAX >> 12,
+                state: self.hypotheses[best].state,
+            });
+        }
+        segments
+    }
+
+    /// Replaces what was supposed of the corrections, normal about zero with the variances `was`, by what is
+    /// supposed of people, normal about `mean` with the variances `is`:
+    /// `P' = (I + P D)^-1 P`, `D = 1/is - 1/was`, `s' = s + P' (mean/is - D s)`.
+    pub fn suppose(&mut self, was: [f64; HELD], is: [f64; HELD], mean: [f64; HELD]) {
+        for h in self.all_mut() {
+            let mut matrix: Covariance = [[0.0; STATES]; STATES];
+            for (i, row) in matrix.iter_mut().enumerate() {
+                row[i] = 1.0;
+                for j in 0..HELD {
+                    row[LINEAR + j] += h.covariance[i][LINEAR + j] * (1.0 / is[j] - 1.0 / was[j]);
+                }
+            }
+            let mut after = h.covariance;
+            super::hypothesis::solve(&mut matrix, &mut after);
+            let sound = after.iter().flatten().all(|p| p.is_finite()) && (0..STATES).all(|i| after[i][i] >= 0.0);
+            if !sound {
+                continue;
+            }
+            let pull: [f64; HELD] = core::array::from_fn(|j| {
+                let s = h.state[LINEAR + j];
+                (mean[j] - s) / is[j] + s / was[j]
+            });
+            for i in 0..STATES {
+                h.state[i] += (0..HELD).map(|j| after[i][LINEAR + j] * pull[j]).sum::<f64>();
+                for j in 0..i {
+                    let half = 0.5 * (after[i][j] + after[j][i]);
+                    (after[i][j], after[j][i]) = (half, half);
+                }
+            }
+            h.covariance = after;
+        }
+        self.average();
+    }
+}
+
+/// States of a past, with the block up to which each held.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Segments {
+    all: [Segment; SEGMENTS + 1],
+    count: usize,
+}
+
+crate::state!([] Segments { all, count });
+
+impl Segments {
+    pub const NONE: Self = Self {
+        all: [Segment {
+            until: 0,
+            state: [0.0; STATES],
+        }; SEGMENTS + 1],
+        count: 0,
+    };
+
+    fn push(&mut self, segment: Segment) {
+        if let Some(place) = self.all.get_mut(self.count) {
+            *place = segment;
+            self.count += 1;
+        }
+    }
+
+    /// The same in another count of blocks, and in other coordinates.
+    pub fn carried(mut self, later: u64, to: impl Fn(&[f64; STATES]) -> [f64; STATES]) -> Self {
+        for segment in &mut self.all {
+            *segment = Segment {
+                until: segment.until.saturating_sub(later),
+                state: to(&segment.state),
+            };
+        }
+        self
+    }
+
+    /// The state of a block.
+    pub fn at(&self, block: u64) -> Option<&[f64; STATES]> {
+        let all = &self.all[..self.count.min(SEGMENTS + 1)];
+        all.iter()
+            .find(|segment| block < segment.until)
+            .map(|segment| &segment.state)
+    }
+}
+
+/// Directions of the gains that are those of a gain and of a lead, `n_0 = K a`, `n_1 = K + K_dot a`,
+/// `n_2 = K_dot`, each response over its scale; K_dot in units of K at 2 rad/s.
+fn gain_and_lead(basis: &Basis) -> [[f64; GAINS]; 2] {
+    let (a, [s0, s1, s2]) = (1.0 / basis.point().lag, basis.scale());
+    [
+        [a / s0, 1.0 / s1, 0.0],
+        [0.0, a / s1, 1.0 / s2].map(|x| x / super::basis::REFERENCE),
+    ]
+}
+
+/// Adds the variance of a change of the gains: of a gain and a lead, or of any numerator, by the class.
+fn open_gains(p: &mut Covariance, basis: &Basis, class: usize, [gain, lead]: [f64; 2]) {
+    if class >= 2 {
+        for (i, size) in [gain, lead, lead].into_iter().enumerate() {
+            p[i][i] += size * size;
+        }
+        return;
+    }
+    for (direction, size) in gain_and_lead(basis).into_iter().zip([gain, lead]) {
+        for i in 0..GAINS {
+            for j in 0..GAINS {
+                p[i][j] += size * size * direction[i] * direction[j];
+            }
+        }
+    }
+}

@@ -1,0 +1,199 @@
+//! The second moments of a block: all that its samples say of an operator.
+//!
+//! After the whitening filter a sample has the signals of the basis and the level, `z` (seven numbers),
+//! and the output y. The response of a state s (gains, level, corrections) is `w(s)' z`, bilinear in
+//! gains and corrections, so that the block says of s only what is in
+//!
+//! `sum z z'`, `sum z y`, `sum y^2`.
+//!
+//! About a state s with the derivatives `T = dw/ds`, with `r = y - w' z`, the Gauss-Newton model of the
+//! block is
+//!
+//! `A = T' (sum z z') T`, `b = T' sum z r`, `E = sum r^2`
+//!
+//! (the information, the score and the energy; all over the innovation variance).
+
+use super::{
+    basis::Basis,
+    sizes::{GAINS, HELD, INPUTS, LINEAR, SIGNALS, STATES},
+};
+
+const ALL: usize = INPUTS + 1;
+
+/// Sums of products over some samples.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Moments {
+    /// Upper triangle over signals, level and output.
+    products: [[f64; ALL]; ALL],
+    pub samples: f64,
+}
+
+crate::state!([] Moments { products, samples });
+
+/// A block about a state.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct About {
+    /// Information and score, times the innovation variance.
+    pub information: [[f64; STATES]; STATES],
+    pub score: [f64; STATES],
+    /// Sum of the squares of the residuals at the state.
+    pub energy: f64,
+}
+
+impl Moments {
+    pub const NONE: Self = Self {
+        products: [[0.0; ALL]; ALL],
+        samples: 0.0,
+    };
+
+    /// Takes a whitened sample.
+    #[inline(always)]
+    pub fn add(&mut self, signals: &[f64; SIGNALS], level: f64, y: f64) {
+        let mut z = [0.0; ALL];
+        z[..SIGNALS].copy_from_slice(signals);
+        (z[SIGNALS], z[INPUTS]) = (level, y);
+        // All of a row: what is below the diagonal is not used, and the loop has a known length.
+        for (row, a) in self.products.iter_mut().zip(z) {
+            for (sum, b) in row.iter_mut().zip(z) {
+                *sum += a * b;
+            }
+        }
+        self.samples += 1.0;
+    }
+
+    fn at(&self, i: usize, j: usize) -> f64 {
+        self.products[i.min(j)][i.max(j)]
+    }
+
+    /// Sum of the squares of the residuals of a state.
+    pub fn energy(&self, basis: &Basis, state: &[f64; STATES]) -> f64 {
+        self.residual(&weights(basis, state)).1
+    }
+
+    /// `sum z r` and `sum r^2` for the weights of a response.
+    fn residual(&self, w: &[f64; INPUTS]) -> ([f64; INPUTS], f64) {
+        let (mut c, mut energy) = ([0.0; INPUTS], self.at(INPUTS, INPUTS));
+        for i in 0..INPUTS {
+            let response: f64 = (0..INPUTS).map(|k| self.at(i, k) * w[k]).sum();
+            let with_output = self.at(i, INPUTS);
+            c[i] = with_output - response;
+            energy += w[i] * (response - 2.0 * with_output);
+        }
+        // Rounding may leave less than nothing of a residual that is next to zero.
+        (c, energy.max(0.0))
+    }
+
+    /// The Gauss-Newton model about a state.
+    pub fn about(&self, basis: &Basis, state: &[f64; STATES]) -> About {
+        let w = weights(basis, state);
+        let (c, energy) = self.residual(&w);
+        let t = derivatives(basis, state, &w);
+        let through: [[f64; INPUTS]; STATES] =
+            t.map(|column| core::array::from_fn(|i| (0..INPUTS).map(|k| self.at(i, k) * column[k]).sum()));
+        let mut information = [[0.0; STATES]; STATES];
+        for i in 0..STATES {
+            for j in i..STATES {
+                let sum = (0..INPUTS).map(|k| t[i][k] * through[j][k]).sum();
+                (information[i][j], information[j][i]) = (sum, sum);
+            }
+        }
+        About {
+            information,
+            score: t.map(|column| (0..INPUTS).map(|k| column[k] * c[k]).sum()),
+            energy,
+        }
+    }
+}
+
+/// Weights of the signals and the level in the response of a state.
+pub(super) fn weights(basis: &Basis, state: &[f64; STATES]) -> [f64; INPUTS] {
+    let mut w = [0.0; INPUTS];
+    w[..SIGNALS].copy_from_slice(&basis.weights(state));
+    w[SIGNALS] = state[GAINS];
+    w
+}
+
+/// Derivatives of the weights `w` by each number of the state: exact, for the weights are linear in the
+/// gains and linear in the corrections.
+fn derivatives(basis: &Basis, state: &[f64; STATES], w: &[f64; INPUTS]) -> [[f64; INPUTS]; STATES] {
+    let mut t = [[0.0; INPUTS]; STATES];
+    for i in 0..GAINS {
+        let mut one = *state;
+        one[..LINEAR].fill(0.0);
+        one[i] = 1.0;
+        t[i] = weights(basis, &one);
+    }
+    t[GAINS][SIGNALS] = 1.0;
+    for j in 0..HELD {
+        let mut moved = *state;
+        moved[LINEAR + j] += 1.0;
+        let there = weights(basis, &moved);
+        t[LINEAR + j] = core::array::from_fn(|k| there[k] - w[k]);
+    }
+    t
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use crate::population::basis::Point;
+
+    fn basis() -> Basis {
+        let point = Point {
+            tau: 0.213,
+            omega: 10.0,
+            zeta: 0.3,
+            lag: 3.0,
+        };
+        Basis::new(point, 0.01).unwrap()
+    }
+
+    fn block(mut y: impl FnMut(&[f64; SIGNALS], usize) -> f64) -> Moments {
+        let (mut basis, mut moments) = (basis(), Moments::NONE);
+        for k in 0..40 {
+            let e = |k: usize| libm::sin(0.37 * k as f64) + libm::cos(0.11 * k as f64);
+            let z = basis.step([e(k + 2), e(k + 1), e(k)]);
+            moments.add(&z, 0.2, y(&z, k));
+        }
+        moments
+    }
+
+    #[test]
+    fn score_and_information_are_those_of_the_residuals() {
+        let state = [0.3, -0.2, 0.1, 0.4, 0.2, -0.03, 0.01];
+        let moments = block(|_, k| libm::sin(k as f64));
+        let about = moments.about(&basis(), &state);
+        assert!((about.energy - moments.energy(&basis(), &state)).abs() < 1e-12);
+        for i in 0..STATES {
+            // E is of the fourth degree in the state, but quadratic in each number: a difference is exact.
+            let at = |step: f64| {
+                let mut moved = state;
+                moved[i] += step;
+                moments.energy(&basis(), &moved)
+            };
+            let h = 1e-4;
+            let slope = (at(h) - at(-h)) / (2.0 * h);
+            let curvature = (at(h) - 2.0 * at(0.0) + at(-h)) / (h * h);
+            let size = about.information[i][i].abs().max(1e-9);
+            assert!(
+                (slope + 2.0 * about.score[i]).abs() < 1e-6 * (slope.abs() + size),
+                "{i}"
+            );
+            assert!(
+                (curvature - 2.0 * about.information[i][i]).abs() < 1e-4 * size + 1e-6,
+                "{i}"
+            );
+        }
+    }
+
+    #[test]
+    fn the_state_that_made_the_output_leaves_nothing() {
+        let state = [0.3, -0.2, 0.1, 0.4, 0.2, -0.03, 0.01];
+        let w = weights(&basis(), &state);
+        let moments = block(|z, _| (0..SIGNALS).map(|k| w[k] * z[k]).sum::<f64>() + w[SIGNALS] * 0.2);
+        let about = moments.about(&basis(), &state);
+        assert!(about.energy < 1e-12 && about.score.iter().all(|s| s.abs() < 1e-9));
+        assert_eq!(Moments::NONE.about(&basis(), &state).energy, 0.0);
+    }
+}

@@ -1,0 +1,177 @@
+//! What the guard tells of recordings: of those as they are, and of faults that are put into them.
+//!
+//! `HOID_PILOT_DATA=DIR cargo run --release -p hoid --no-default-features --features io --example recorded_faults --
+//! [RUNS|all] [METHOD]`
+//!
+//! The folder is that of the example `pilots_evidence`. Of each recording as it is the first line counts what was told,
+//! by kind. Each fault of the study `tracker-faults` that fits into it, and steps and ramps of a target as well, is put
+//! in at two places; *told* is an event between its first sample and 3 s behind its last that the recording without
+//! it does not have there.
+#![allow(clippy::unwrap_used, clippy::print_stdout)]
+
+#[path = "../tests/common/tracker_faults/faults.rs"]
+mod faults;
+
+use std::{collections::BTreeMap, env, fs, path::Path};
+
+use faults::{Fault, Signal, faults};
+use hoid::{io::ReadOptions, model::SampleTime};
+use hoid_track::{GuardEvent, Method, Sample, TrackOptions, Tracker};
+use rayon::prelude::*;
+
+const FROM_S: f64 = 8.08;
+/// Where faults are put in, s after the beginning, and the longest of them.
+const PLACES_S: [f64; 2] = [33.3, 47.77];
+const LONGEST_S: f64 = 20.0;
+/// Time behind a fault in which it may be told, s.
+const BEHIND_S: f64 = 3.0;
+
+struct Recording {
+    e: Vec<f64>,
+    u: Vec<f64>,
+    sample_time: SampleTime,
+}
+
+fn told(recording: &Recording, e: &[f64], u: &[f64], method: &str) -> Vec<(usize, GuardEvent)> {
+    let method: Method = method.parse().unwrap();
+    let options = TrackOptions::usual(method, recording.sample_time.nk(0.2));
+    let mut tracker = Tracker::new(&options, None, recording.sample_time).unwrap();
+    let mut all = Vec::new();
+    for (k, (e, u)) in e.iter().zip(u).enumerate() {
+        let sample = Sample {
+            e: *e,
+            u: *u,
+            reference: None,
+        };
+        tracker.update(sample, true);
+        all.extend(tracker.event().map(|event| (k, event)));
+    }
+    all
+}
+
+/// The faults of the study, short enough for a recording, and others.
+fn all_faults() -> Vec<Fault> {
+    let short = |fault: &Fault| match *fault {
+        Fault::Scaled { factor, .. } => Fault::Scaled {
+            factor,
+            seconds: LONGEST_S,
+        },
+        Fault::ScaledOne { signal, factor, .. } => Fault::ScaledOne {
+            signal,
+            factor,
+            seconds: LONGEST_S,
+        },
+        Fault::Swapped { .. } => Fault::Swapped { seconds: LONGEST_S },
+        Fault::Silence { .. } => Fault::Silence { seconds: LONGEST_S },
+        Fault::NoisySilence { .. } => Fault::NoisySilence { seconds: LONGEST_S },
+        Fault::FrozenBoth { .. } => Fault::FrozenBoth { seconds: LONGEST_S },
+        Fault::MissingBoth { .. } => Fault::MissingBoth { seconds: LONGEST_S },
+        Fault::Saturated { signal, at, .. } => Fault::Saturated {
+            signal,
+            at,
+            seconds: LONGEST_S,
+        },
+        Fault::Flipped { .. } => Fault::Flipped { seconds: LONGEST_S },
+        other => other,
+    };
+    let mut all: Vec<Fault> = Vec::new();
+    for fault in faults().iter().map(short) {
+        if !all.contains(&fault) && !matches!(fault, Fault::Innovations { .. }) {
+            all.push(fault);
+        }
+    }
+    for signal in [Signal::E, Signal::U] {
+        all.push(Fault::Frozen { signal, seconds: 5.0 });
+        for size in [2.0, 3.0] {
+            all.push(Fault::Outlier {
+                signal,
+                size,
+                seconds: 0.0,
+            });
+        }
+    }
+    all.push(Fault::FrozenBoth { seconds: 2.5 });
+    all.push(Fault::Outlier {
+        signal: Signal::E,
+        size: 2.0,
+        seconds: 1e3,
+    });
+    all.push(Fault::Outlier {
+        signal: Signal::E,
+        size: 6.0,
+        seconds: 1e3,
+    });
+    all
+}
+
+fn main() {
+    let Some(folder) = env::var_os("HOID_PILOT_DATA") else {
+        println!("HOID_PILOT_DATA does not name the folder of the recorded pilots");
+        return;
+    };
+    let folder = Path::new(&folder);
+    let mut arguments = env::args().skip(1);
+    let runs = arguments.next().unwrap_or_else(|| "all".to_owned());
+    let method = arguments.next().unwrap_or_else(|| "population".to_owned());
+    let mut names: Vec<String> = fs::read_dir(folder)
+        .unwrap()
+        .map(|f| f.unwrap().file_name().to_string_lossy().into_owned())
+        .filter_map(|n| n.strip_suffix(".parquet").map(str::to_owned))
+        .filter(|n| runs == "all" || runs.split(',').any(|r| n.ends_with(&format!("_{r}"))))
+        .collect();
+    names.sort();
+    let recordings: Vec<Recording> = names
+        .iter()
+        .map(|name| {
+            let path = folder.join(format!("{name}.parquet"));
+            let record = hoid::io::read_record(&path, &ReadOptions::default()).unwrap().record;
+            let first = (0..record.len()).find(|k| record.time_s(*k) >= FROM_S - 1e-6).unwrap();
+            Recording {
+                e: record.input()[first..].to_vec(),
+                u: record.output()[first..].to_vec(),
+                sample_time: record.sample_time(),
+            }
+        })
+        .collect();
+    let clean: Vec<Vec<(usize, GuardEvent)>> = recordings.par_iter().map(|r| told(r, &r.e, &r.u, &method)).collect();
+    let mut kinds = BTreeMap::<&str, usize>::new();
+    for (name, (_, event)) in names
+        .iter()
+        .zip(&clean)
+        .flat_map(|(n, all)| all.iter().map(move |e| (n, e)))
+    {
+        *kinds.entry(event.kind.name()).or_default() += 1;
+        if env::var_os("HOID_EACH").is_some() {
+            println!("{name} {event:?}");
+        }
+    }
+    let some = clean.iter().filter(|events| !events.is_empty()).count();
+    println!(
+        "Without a fault, {} recordings, {method}: {kinds:?}, in {some} recordings.\n",
+        names.len()
+    );
+    println!("| fault | told |\n|---|---|");
+    for fault in all_faults() {
+        let found: Vec<bool> = recordings
+            .par_iter()
+            .zip(&clean)
+            .flat_map_iter(|(r, clean)| {
+                let (fault, method) = (&fault, &method);
+                PLACES_S.map(move |at_s| {
+                    let per_second = 1.0 / r.sample_time.s();
+                    let at = (at_s * per_second) as usize;
+                    let (mut e, mut u) = (r.e.clone(), r.u.clone());
+                    let end = fault.put(&mut e, &mut u, at, per_second, 0.0);
+                    let until = end.min(e.len()) + (BEHIND_S * per_second) as usize;
+                    let within = |k: usize| k >= at && k < until;
+                    let without: Vec<_> = clean.iter().filter(|(k, _)| within(*k)).collect();
+                    let with = told(r, &e, &u, method);
+                    let mut with = with.iter().filter(|(k, _)| within(*k));
+                    with.any(|event| !without.contains(&event))
+                })
+            })
+            .collect();
+        let count = found.iter().filter(|told| **told).count();
+        println!("| {fault} | {count} of {} |", found.len());
+    }
+}
