@@ -122,6 +122,8 @@ pub(crate) fn track_with(
         trace.held.push(tracker.counts.held);
         trace.change_odds.extend(tracker.change_odds());
     }
+    trace.response_doubt = tracker.response_doubt();
+    trace.response_is_known = tracker.response_is_known();
     trace.counts = tracker.counts;
     trace.guarded = tracker.guard.is_some();
     if let Some(last) = trace.faults.last_mut().filter(|last| last.is_open()) {

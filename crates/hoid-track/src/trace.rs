@@ -1,7 +1,7 @@
 //! The estimate at every sample.
 
 use hoid_model::{
-    NotConvertible, Orders, PolynomialModel, SampleTime, Structure,
+    Finding, NotConvertible, Orders, PolynomialModel, SampleTime, Structure,
     uncertainty::{Estimate, OperatorEstimate, operator_estimate},
 };
 
@@ -53,6 +53,10 @@ pub struct Trace {
     /// The batch fit that the recursion started from.
     pub(crate) start: Option<Fit>,
     pub(crate) failures: Option<(usize, String)>,
+    /// What the response at the end says against who is said to have held the loop.
+    pub(crate) response_doubt: Option<Finding>,
+    /// True where the response at the end is determined at some frequency, whatever gain and lead are.
+    pub(crate) response_is_known: bool,
     /// Samples between two rows.
     pub(crate) every: usize,
     /// Rows of the moving average, 1 for none.
@@ -91,6 +95,8 @@ impl Trace {
             idle_s: 0.0,
             start: None,
             failures: None,
+            response_doubt: None,
+            response_is_known: false,
             every,
             averaged: 1,
             updated_from_s: f64::NEG_INFINITY,

@@ -1,9 +1,9 @@
 //! A recursive estimate that takes one sample at a time.
 
 use hoid_core::guard::reference::ReferenceModel;
-use hoid_ident::{Fit, IdentError};
+use hoid_ident::{Fit, IdentError, family::loop_doubt};
 use hoid_model::{
-    NotConvertible, Orders, Record, SampleTime,
+    Complex64, Finding, NotConvertible, Orders, Record, SampleTime,
     uncertainty::{Estimate, OperatorEstimate},
 };
 
@@ -19,6 +19,18 @@ use crate::{
     start::StartState,
     trace::operator_of,
 };
+
+/// Frequency at which the sign of a response is looked at, rad/s.
+const LOW_RAD_S: f64 = 0.5;
+/// Frequencies at which a response may be known, rad/s, and the error from which it is, dB.
+const KNOWN_AT_RAD_S: [f64; 3] = [1.0, 2.0, 4.0];
+const KNOWN_DB: f64 = 2.0;
+/// Phases of people there, deg: a lag and a delay reach -110, two leads 70.
+const PHASES_DEG: (f64, f64) = (-120.0, 75.0);
+/// Standard errors by which a phase lies beyond them.
+const APART: f64 = 2.0;
+/// Quantile of the normal distribution for 95 %.
+const NORMAL: f64 = 1.96;
 
 /// A recursive estimate that takes one sample at a time.
 pub struct Tracker {
@@ -247,6 +259,57 @@ impl Tracker {
             Some(alone)
         };
         Some(OpenLoop::of(value, whole, element, self.sample_time))
+    }
+
+    /// True where a method whose basis holds more forms than gain and lead knows the response of now at some frequency
+    /// to a quarter: gain and lead may be open then.
+    pub(crate) fn response_is_known(&self) -> bool {
+        let known = |omega: &f64| {
+            let gain = self
+                .response(*omega)
+                .and_then(|response| response.gain_db().standard_error);
+            gain.is_some_and(|error| error < KNOWN_DB)
+        };
+        self.options.method.lag_of_basis_s().is_some() && KNOWN_AT_RAD_S.iter().any(known)
+    }
+
+    /// What the response of now says against who is said to have held the loop: with a controlled element the loop that
+    /// they would make ([`loop_doubt`]), without one the sign of the response at low frequencies.
+    pub(crate) fn response_doubt(&self) -> Option<Finding> {
+        if let Some(element) = &self.options.controlled_element {
+            let crossing = match self.open_loop()? {
+                Ok(found) => Some((
+                    found.crossover_rad_s.value,
+                    NORMAL * found.phase_margin_deg.standard_error.unwrap_or(0.0),
+                )),
+                Err(NoCrossover::NeverFalls) => None,
+                Err(_) => return None,
+            };
+            let open_loop = |omega: f64| {
+                let [re, im] = self.response(omega).map_or([f64::NAN; 2], |response| response.value);
+                Complex64::new(re, im) * element.response(omega)
+            };
+            return loop_doubt(open_loop, crossing);
+        }
+        let phase = self.response(LOW_RAD_S)?.phase_deg();
+        let reach = APART * phase.standard_error?;
+        let (farthest, most) = PHASES_DEG;
+        let ahead = if phase.value < farthest {
+            phase.value + 360.0
+        } else {
+            phase.value
+        };
+        let backwards = ahead - reach > most && ahead + reach < farthest + 360.0;
+        backwards.then(|| {
+            Finding::doubt(
+                "sign",
+                format!(
+                    "the response at {LOW_RAD_S} rad/s has a phase of {:.0} deg: they would push the error away; turn the sign of \
+                     e or u over, or, where the controlled element has a negative gain, name it with --controlled-element",
+                    phase.value
+                ),
+            )
+        })
     }
 
     /// Logarithm of the odds that the person changed within the last four seconds, by

@@ -127,5 +127,5 @@ PLACES: Iterable[Place] = (
     Place("C, `libhoid`", "three calls", c),
     Place("C++, `libhoid`", "three calls", cpp),
     Place("WebAssembly (Node.js)", "three calls", wasm, other_functions=OF_LOOP),
-    Place("Cortex-M4 (QEMU)", "a line", cortex, ("--nk", "29", "--guard", "no")),
+    Place("Cortex-M4 (QEMU)", "a line", cortex, ("--nk", "29", "--replay", "0", "--guard", "no")),
 )

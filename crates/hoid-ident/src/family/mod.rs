@@ -83,7 +83,7 @@ pub use estimator::{FamilyEstimator, HIGHEST_NOISE_ORDER};
 pub use instrumental::InstrumentalFit;
 pub use line_fit::LineFit;
 pub use of_polynomials::{FamilyConversion, family_of_polynomials};
-pub use open_loop::{Crossover, LoopMeasures, loop_measures};
+pub use open_loop::{Crossover, LoopMeasures, loop_doubt, loop_measures};
 pub use parameter::Parameter;
 pub use pole_reading::{PoleRole, RealPole};
 pub use prior::{OperatorPrior, ParameterPrior};

@@ -11,15 +11,12 @@ use super::{
     clusters::{ClusterKind, quantile},
     instrumental::InstrumentalFit,
     line_fit::LineFit,
-    open_loop::{LoopMeasures, followed_margin_deg, loop_measures},
+    open_loop::{LoopMeasures, loop_doubt, loop_measures},
     parameter::Parameter,
     prior::OperatorPrior,
     response_fit::hold,
 };
 use crate::{Fit, Termination};
-
-/// Largest phase margin that is believed of a person, deg.
-const FARTHEST_MARGIN_DEG: f64 = 120.0;
 
 /// An operator of one or several records.
 #[derive(Debug, Clone, PartialEq)]
@@ -136,26 +133,13 @@ impl FamilyFit {
     /// bounded was made in a stable loop, which has a crossover and no phase margin below zero, and a person's has
     /// none above 120 deg. `None` where nothing is against it.
     pub fn loop_finding(&self, record: usize, element: &ContinuousTransferFunction) -> Option<Finding> {
-        let remedy = "check the controlled element, the units of e and u and the time between them";
-        let Some(found) = self.loop_measures(record, element) else {
-            return Some(Finding::doubt(
-                "no-crossover",
-                format!("the gain of the loop with this controlled element does not fall through one: {remedy}"),
-            ));
-        };
-        let (operator, crossover) = (&self.operator(record).operator, found.crossover_rad_s.value);
+        let operator = &self.operator(record).operator;
         let open_loop = |omega: f64| operator.response(omega) * hold(omega, self.sample_time) * element.response(omega);
-        let margin = followed_margin_deg(open_loop, crossover);
-        let reach = found.quantile * found.phase_margin_deg.standard_error.unwrap_or(0.0);
-        (margin + reach <= 0.0 || margin > FARTHEST_MARGIN_DEG).then(|| {
-            Finding::doubt(
-                "unstable-loop",
-                format!(
-                    "the loop with this controlled element has a phase margin of {margin:.0} deg at {crossover:.1} rad/s, which no \
-                     stable loop of a person has: {remedy}"
-                ),
-            )
-        })
+        let crossing = self.loop_measures(record, element).map(|found| {
+            let reach = found.quantile * found.phase_margin_deg.standard_error.unwrap_or(0.0);
+            (found.crossover_rad_s.value, reach)
+        });
+        loop_doubt(open_loop, crossing)
     }
 
     /// Crossover frequency and phase margin of the fit at the lines.

@@ -20,22 +20,14 @@
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
 
-/// Order of the noise model.
-const NOISE: usize = 16;
+use super::whitened::{NOISE, Whitened, lags, orthogonal, thinning, whitened};
+
 /// Taps, and their length in s.
 pub(crate) const TAPS: usize = 6;
 pub(crate) const TAP_S: f64 = 0.15;
-/// Rate to which signals are thinned, Hz.
-const RATE_HZ: f64 = 50.0;
 /// Length of a block, s, and fewest of them.
 const BLOCK_S: f64 = 2.0;
 const FEWEST: usize = 10;
-/// Standard deviations beyond which a residual is limited.
-const LIMIT: f64 = 3.5;
-/// Share of the power of u below which v is rounding.
-const EXACT: f64 = 1e-18;
-/// Rounds of noise model and least squares.
-const ROUNDS: usize = 3;
 
 /// What a test of a model has found.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -57,7 +49,7 @@ pub fn left_response(
     from: usize,
     sample_time_s: f64,
 ) -> Option<LeftResponse> {
-    let thin = (1.0 / (sample_time_s * RATE_HZ) + 1e-6).floor().max(1.0) as usize;
+    let thin = thinning(sample_time_s);
     let every_s = thin as f64 * sample_time_s;
     let tap = (TAP_S / sample_time_s).round().max(1.0) as usize;
     let first = from.max(TAPS * tap);
@@ -69,32 +61,19 @@ pub fn left_response(
     }
     let n = rows.len();
     let p = columns.len() + 1;
-    let x = DMatrix::from_fn(n, p, |i, j| columns.get(j).map_or(1.0, |c| c[rows[i]]));
     let z = DMatrix::from_fn(n, TAPS, |i, j| {
-        let newest = rows[i] + 1 - j * tap;
-        e[newest - tap..newest].iter().sum::<f64>() / tap as f64
-    });
-    let y = DVector::from_fn(n, |i, _| u[rows[i]]);
-    if !(x.iter().chain(&z).chain(&y).all(|v| v.is_finite())) {
-        return None;
-    }
-    let mut d = vec![0.0; NOISE];
-    let mut v = y.clone();
-    for _ in 0..ROUNDS {
-        let (xd, yd) = (whitened(&x, &d), whitened_vector(&y, &d));
-        let b = solution(&xd, &limited(&xd, &yd)?)?;
-        v = &y - &x * b;
-        let lags = lags(&v);
-        d = solution(&lags, &limited(&lags, &tail(&v))?)?
+        // The error of now already holds what is new in u, where the controlled element answers at once.
+        let (next, newest) = (rows[i] + 1, if j == 0 { thin } else { j * tap });
+        e[next - (j + 1) * tap..next - newest.min((j + 1) * tap - 1)]
             .iter()
-            .map(|d| -d)
-            .collect();
-    }
-    if v.norm_squared() <= EXACT * y.norm_squared() {
+            .sum::<f64>()
+            / tap as f64
+    });
+    if !z.iter().all(|v| v.is_finite()) {
         return None;
     }
-    let eps = clipped(&whitened_vector(&v, &d));
-    let (xd, lagged) = (whitened(&x, &d), lags(&v));
+    let Whitened { v, d, x: xd, eps, .. } = Whitened::of(columns, u, &rows)?;
+    let lagged = lags(&v);
     let known = DMatrix::from_fn(n - NOISE, p + NOISE, |i, j| match j {
         j if j < p => xd[(i, j)],
         j => lagged[(i, j - p)],
@@ -135,81 +114,13 @@ fn of_scores(z: &DMatrix<f64>, eps: &DVector<f64>, block: usize, known: usize) -
     })
 }
 
-/// Behind `1 + d_1 q^-1 + ..`, from the first sample on that has all lags.
-fn whitened(m: &DMatrix<f64>, d: &[f64]) -> DMatrix<f64> {
-    DMatrix::from_fn(m.nrows() - NOISE, m.ncols(), |i, j| {
-        let own = m[(i + NOISE, j)];
-        d.iter()
-            .enumerate()
-            .fold(own, |sum, (k, d)| sum + d * m[(i + NOISE - 1 - k, j)])
-    })
-}
-
-fn whitened_vector(v: &DVector<f64>, d: &[f64]) -> DVector<f64> {
-    let m = DMatrix::from_column_slice(v.len(), 1, v.as_slice());
-    whitened(&m, d).column(0).into_owned()
-}
-
-fn tail(v: &DVector<f64>) -> DVector<f64> {
-    v.rows(NOISE, v.len() - NOISE).into_owned()
-}
-
-/// `v(t-1) .. v(t-p)` by rows.
-fn lags(v: &DVector<f64>) -> DMatrix<f64> {
-    DMatrix::from_fn(v.len() - NOISE, NOISE, |i, j| v[i + NOISE - 1 - j])
-}
-
-/// y with what is far from its fit nearer to it.
-fn limited(x: &DMatrix<f64>, y: &DVector<f64>) -> Option<DVector<f64>> {
-    let fit = x * solution(x, y)?;
-    Some(&fit + clipped(&(y - &fit)))
-}
-
-fn clipped(eps: &DVector<f64>) -> DVector<f64> {
-    let most = LIMIT * (eps.norm_squared() / eps.len() as f64).sqrt();
-    eps.map(|v| v.clamp(-most, most))
-}
-
-/// Least squares by columns of unit length; `None` where they are not independent.
-fn solution(x: &DMatrix<f64>, y: &DVector<f64>) -> Option<DVector<f64>> {
-    let (q, r, scales) = factored(x)?;
-    let mut b = r.solve_upper_triangular(&(q.transpose() * y))?;
-    b.iter_mut().zip(&scales).for_each(|(b, s)| *b /= s);
-    Some(b)
-}
-
-fn orthogonal(x: &DMatrix<f64>) -> Option<DMatrix<f64>> {
-    factored(x).map(|(q, ..)| q)
-}
-
-fn factored(x: &DMatrix<f64>) -> Option<(DMatrix<f64>, DMatrix<f64>, Vec<f64>)> {
-    let scales: Vec<f64> = x.column_iter().map(|c| c.norm()).collect();
-    if scales.iter().any(|s| !(*s > 0.0 && s.is_finite())) {
-        return None;
-    }
-    let scaled = DMatrix::from_fn(x.nrows(), x.ncols(), |i, j| x[(i, j)] / scales[j]);
-    let (q, r) = scaled.qr().unpack();
-    let least = r.diagonal().iter().fold(f64::MAX, |least, d| least.min(d.abs()));
-    (least > DEPENDENT).then_some((q, r, scales))
-}
-
-/// Diagonal of R below which columns are not independent.
-const DEPENDENT: f64 = 1e-10;
-
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
+    use crate::judgement::whitened::stream;
 
     const TS: f64 = 0.02;
-
-    /// Numbers of a fixed stream, uniform with variance 1/12.
-    fn stream(seed: &mut u64) -> f64 {
-        *seed = seed
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
-        (*seed >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
-    }
 
     /// e, the column that is known and u: `e(t) = .98 e(t-1) + w - .3 v(t-1)`, `u = e(t-2) + echo e(t-20) + v`,
     /// v autoregressive, louder where `loud` says so.

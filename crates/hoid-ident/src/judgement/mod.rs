@@ -20,11 +20,14 @@
 //! | `residuals` | how far residuals are from white; also for the family |
 //! | `constancy` | whether parameters change; also for the family |
 //! | `left_response` | whether a response is left that a model does not have |
+//! | `answer` | whether e answers to u, as it does in a loop |
 //! | `operator` | gains, poles and delay of an operator |
 //! | `operator_step` | what a stretch of data says against an operator |
 //! | `second_opinion` | fits to records that no single sample can carry |
+//! | `whitened` | least squares behind an autoregression, for those that need one |
 //! | `fit`, `grey_box`, `sigmoid` | the verdict of each kind of fit |
 
+mod answer;
 pub(crate) mod constancy;
 mod fit;
 mod grey_box;
@@ -34,7 +37,10 @@ mod operator_step;
 pub(crate) mod residuals;
 pub mod second_opinion;
 mod sigmoid;
+mod whitened;
 
+pub use answer::{Answer, answer};
+pub use constancy::{Course, Unsteady, unsteady};
 pub use left_response::{LeftResponse, left_response};
 pub use operator::{gain_findings, is_open, leads_backwards, neuromuscular_finding, pole_findings};
 pub use operator_step::{OperatorStep, operator_step};

@@ -10,7 +10,7 @@
 //! | `start-explains-little` | VAF of the simulated start fit on its span below 20 % |
 //! | `not-convertible` | more than 5 % of the rows stand for no operator |
 //! | `gain` | K_e and K_e_dot are both open (within two standard errors of zero) in most rows |
-//! | `undetermined-parameter` | one of them is |
+//! | `undetermined-parameter` | K_e is; where K_e_dot alone is, they answer like a gain (a note) |
 //! | `neuromuscular-lag` | poles of no person, or omega_nm at its bound, in a quarter of the rows |
 //! | `delay-at-bound` | the tracked delay rests at an end of its range in a quarter of the rows |
 //! | `covariance-blown-up` | a standard error 30 times its median: the data say too little to forget |
@@ -28,14 +28,21 @@
 //! | `last-row` | the estimate at the end is doubtful or no estimate, whatever the other rows are |
 //! | `not-followed` | what the last seconds of the record say against the last row |
 //! | `structure` | errors of before say more of u than the operator at the end does |
+//! | `sign` | the response at .5 rad/s would push the error away, where no controlled element is named |
+//! | `unstable-loop`, `no-crossover` | with the controlled element, the loop of the last row could not have been held |
+//! | `undeclared-change`, `drifting`, `swaying` | the response is not the same where no change is declared |
+//! | `no-answer` | e does not answer to u |
 //! | `not-finite` | an estimate that is no number |
 //!
 //! `operators` judges the operators of the rows, `recording` what the guard, the head and the end of the
-//! record say, `structure` the form of the operator, `moment` one sample.
+//! record say, `structure` the form of the operator, `steadiness` whether it is the same throughout, `moment` one
+//! sample. Where the response is known at the end, a gain and a lead that are open, or a lead below zero, are notes:
+//! they are one way to say the response, which may not be theirs.
 
 mod moment;
 mod operators;
 mod recording;
+mod steadiness;
 mod structure;
 #[cfg(test)]
 mod tests;
@@ -85,6 +92,9 @@ impl Trace {
         }
         all.extend(self.many_changes_finding());
         all.extend(self.missed_structure(record));
+        all.extend(self.response_doubt.clone());
+        all.extend(self.unsteady_finding(record));
+        all.extend(self.answer_finding(record));
         Ok(Verdict::of(all))
     }
 
@@ -177,11 +187,14 @@ impl Trace {
             .enumerate()
             .filter_map(|(i, name)| Some((name, grown(i)?)))
             .max_by(|a, b| a.1.total_cmp(&b.1))?;
+        let remedy = match self.options().method.inner().memories() {
+            Some(_) => " for the memory in use; take a longer one",
+            None => "",
+        };
         Some(Finding::doubt(
             "covariance-blown-up",
             format!(
-                "the standard error of {name} grows to {ratio:.0} times its median: for a while the data say too little for the \
-                 memory in use; take a longer one"
+                "the standard error of {name} grows to {ratio:.0} times its median: for a while the data say too little{remedy}"
             ),
         ))
     }

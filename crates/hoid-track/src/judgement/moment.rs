@@ -65,7 +65,11 @@ impl Tracker {
 }
 
 fn level_of_operator(operator: &OperatorEstimate, sample_time: SampleTime) -> VerdictLevel {
-    let gains = gain_findings(&[("", *operator)]);
+    let mut gains = gain_findings(&[("", *operator)]);
+    // Who answers like a gain has no lead to be determined.
+    if !is_open(&operator.k_e) && is_open(&operator.k_e_dot) {
+        gains.retain(|finding| finding.kind != "undetermined-parameter");
+    }
     let senseless = neuromuscular_finding(operator.omega_nm_rad_s.value, operator.zeta_nm.value, sample_time);
     let open = gains.iter().any(|finding| finding.severity == Severity::Undetermined);
     if open {

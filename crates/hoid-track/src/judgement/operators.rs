@@ -3,7 +3,7 @@
 
 use hoid_ident::judgement::{is_open, leads_backwards, neuromuscular_finding};
 use hoid_model::{
-    Finding, NotConvertible,
+    Finding, NotConvertible, Severity,
     uncertainty::{Estimate, OperatorEstimate},
 };
 
@@ -51,9 +51,18 @@ pub(super) fn operator_findings(trace: &Trace, operators: &[Operator]) -> Vec<Fi
         });
     }
     let rows_with = |is: &dyn Fn(&OperatorEstimate) -> bool| share(found.iter().filter(|o| is(o)).count(), found.len());
-    all.extend(gains_over_rows(&rows_with));
+    let remembers = trace.options().method.inner().memories().is_some();
+    // Where the response is known, gain and lead are one way to say it, which may not be theirs.
+    let of_response = |finding: Finding| match trace.response_is_known {
+        true => Finding {
+            severity: Severity::Note,
+            ..finding
+        },
+        false => finding,
+    };
+    all.extend(gains_over_rows(&rows_with, remembers).map(of_response));
     all.extend(sign_finding(&rows_with));
-    all.extend(lead_finding(&rows_with));
+    all.extend(lead_finding(&rows_with).map(of_response));
     let nyquist = trace.sample_time().nyquist_rad_s();
     let bounded = trace.options().method.is_physical();
     let senseless = rows_with(&|o| {
@@ -123,33 +132,39 @@ fn lead_finding(rows_with: &ShareOfRows<'_>) -> Option<Finding> {
 /// Share of the rows whose operator has a property.
 type ShareOfRows<'a> = dyn Fn(&dyn Fn(&OperatorEstimate) -> bool) -> f64 + 'a;
 
-/// Gains that are open in most rows.
-fn gains_over_rows(rows_with: &ShareOfRows<'_>) -> Option<Finding> {
+/// Gains that are open in most rows. With a memory it may be longer; a method without one has no such option.
+fn gains_over_rows(rows_with: &ShareOfRows<'_>, remembers: bool) -> Option<Finding> {
+    let percent = |share: f64| format!("{:.0} %", 100.0 * share);
     let both = rows_with(&|o| is_open(&o.k_e) && is_open(&o.k_e_dot));
     if both > MOST {
+        let why = if remembers { " for the memory in use" } else { "" };
         return Some(Finding::undetermined(
             "gain",
             format!(
-                "in {:.0} % of the rows no gain stands two standard errors from zero: there is too little response to e for \
-                 the memory in use",
-                100.0 * both
+                "in {} of the rows no gain stands two standard errors from zero: there is too little response to e{why}",
+                percent(both)
             ),
         ));
     }
-    type Gain = fn(&OperatorEstimate) -> Estimate;
-    let gains: [(&str, Gain); 2] = [("K_e", |o| o.k_e), ("K_e_dot", |o| o.k_e_dot)];
-    let open: Vec<String> = gains
-        .into_iter()
-        .map(|(name, of)| (name, rows_with(&|o| is_open(&of(o)))))
-        .filter(|(_, share)| *share > MOST)
-        .map(|(name, share)| format!("{name} (in {:.0} % of the rows)", 100.0 * share))
-        .collect();
-    (!open.is_empty()).then(|| {
-        Finding::doubt(
+    let no_gain = rows_with(&|o| is_open(&o.k_e) && !is_open(&o.k_e_dot));
+    let no_lead = rows_with(&|o| is_open(&o.k_e_dot) && !is_open(&o.k_e));
+    if no_gain > MOST {
+        let remedy = if remembers { "; take a longer memory" } else { "" };
+        return Some(Finding::doubt(
             "undetermined-parameter",
             format!(
-                "{} within two standard errors of zero for most of the record; take a longer memory",
-                open.join(" and ")
+                "K_e is within two standard errors of zero in {} of the rows{remedy}",
+                percent(no_gain)
+            ),
+        ));
+    }
+    (no_lead > MOST).then(|| {
+        Finding::note(
+            "undetermined-parameter",
+            format!(
+                "in {} of the rows no lead is told from zero, and the gain is: they answer like a gain, and T_L and K_e_dot are \
+                 none of their parameters",
+                percent(no_lead)
             ),
         )
     })

@@ -1,7 +1,7 @@
 //! What the recording itself says of a trace: what the guard did, an idle head, and whether the last
 //! seconds are followed by the last row.
 
-use hoid_ident::judgement::{is_open, operator_step};
+use hoid_ident::judgement::{is_open, leads_backwards, operator_step};
 use hoid_model::{Finding, Record};
 
 use crate::{
@@ -80,6 +80,10 @@ impl Trace {
     pub(super) fn not_followed(&self, record: &Record) -> Option<Finding> {
         let row = self.len().checked_sub(1)?;
         let operator = self.operator(row).ok()?;
+        // A gain and a lead that stand for another form answer otherwise than the estimate does.
+        if self.response_is_known && (is_open(&operator.k_e) || leads_backwards(&operator)) {
+            return None;
+        }
         let end = self.times_s()[row] + self.sample_time().s();
         let of_row = |name: &str| {
             let rows = operator.rows();
@@ -122,7 +126,8 @@ impl Trace {
     /// An estimate that is none at the end, whatever it was before.
     pub(super) fn last_row_finding(&self) -> Option<Finding> {
         let operator = self.operator(self.len().checked_sub(1)?).ok()?;
-        (is_open(&operator.k_e) && is_open(&operator.k_e_dot)).then(|| {
+        let nothing = is_open(&operator.k_e) && is_open(&operator.k_e_dot) && !self.response_is_known;
+        nothing.then(|| {
             Finding::doubt(
                 "last-row",
                 "at the end of the record no gain stands two standard errors from zero: report an earlier row",

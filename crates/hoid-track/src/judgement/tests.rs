@@ -1,12 +1,13 @@
 #![allow(clippy::unwrap_used)]
 use hoid_model::{
-    Channel, NotConvertible, Orders, Structure, VerdictLevel,
+    Channel, NotConvertible, Orders, Severity, Structure, VerdictLevel,
     scenario::{Condition, Scenario},
 };
 use hoid_sim::{RunSeed, Simulator};
 
 use super::*;
 use crate::{Method, StartAt, TrackOptions, Tracker, track};
+use hoid_model::uncertainty::OperatorEstimate;
 
 fn simulated(condition: Condition) -> Record {
     let simulator = Simulator::new(&Scenario::condition(condition)).unwrap();
@@ -225,4 +226,103 @@ fn orders_of_no_operator_are_judged_by_their_coefficients() {
     assert_eq!(tracker.level(&tracker.operator()), VerdictLevel::Trustworthy);
     let verdict = judged(&record, &options);
     assert!(!kinds(&verdict).contains(&"not-convertible"), "{verdict}");
+}
+
+fn with_signals(record: &Record, e: Vec<f64>, u: Vec<f64>) -> Record {
+    let (e, u) = (Channel::new("e", "", e), Channel::new("u", "", u));
+    Record::new(record.sample_time(), e, u).unwrap()
+}
+
+fn usual() -> TrackOptions {
+    TrackOptions::usual(Method::population(), 29)
+}
+
+#[test]
+fn a_sign_that_is_wrong_is_told_with_and_without_a_controlled_element() {
+    let scenario = Scenario::condition(Condition::C1);
+    let record = simulated(Condition::C1);
+    let turned = record.input().iter().map(|e| -e).collect();
+    let turned = with_signals(&record, turned, record.output().to_vec());
+    let element = scenario.initial.controlled_element.transfer_function().unwrap();
+    let with_element = TrackOptions {
+        controlled_element: Some(element),
+        ..usual()
+    };
+    for (options, kinds_expected) in [
+        (usual(), ["sign"; 2]),
+        (with_element, ["unstable-loop", "no-crossover"]),
+    ] {
+        let clean = judged(&record, &options);
+        assert_eq!(clean.level, VerdictLevel::Trustworthy, "{clean}");
+        let told = judged(&turned, &options);
+        assert!(kinds(&told).iter().any(|kind| kinds_expected.contains(kind)), "{told}");
+    }
+}
+
+#[test]
+fn the_output_of_another_run_is_told() {
+    let record = simulated(Condition::C1);
+    let simulator = Simulator::new(&Scenario::condition(Condition::C1)).unwrap();
+    let seed = RunSeed {
+        replication: 1,
+        ..RunSeed::default()
+    };
+    let other = simulator.run(seed, false).unwrap();
+    let exchanged = with_signals(&record, record.input().to_vec(), other.output().to_vec());
+    let told = judged(&exchanged, &usual());
+    assert!(kinds(&told).contains(&"no-answer"), "{told}");
+    assert!(!kinds(&judged(&record, &usual())).contains(&"no-answer"));
+}
+
+/// u is scaled behind the person: what the loop does of it is another matter.
+#[test]
+fn a_gain_that_drifts_and_one_that_sways_are_told() {
+    let record = simulated(Condition::C1);
+    let scaled = |gain: &dyn Fn(f64) -> f64| {
+        let u = (0..record.len())
+            .map(|k| gain(record.time_s(k)) * record.output()[k])
+            .collect();
+        judged(&with_signals(&record, record.input().to_vec(), u), &usual())
+    };
+    let drifts = scaled(&|t| 1.0 - 0.5 * t / 82.0);
+    assert!(kinds(&drifts).contains(&"drifting"), "{drifts}");
+    let sways = scaled(&|t| 1.0 + 0.4 * (t * 2.0 * std::f64::consts::PI / 20.0).sin());
+    assert!(kinds(&sways).contains(&"swaying"), "{sways}");
+}
+
+#[test]
+fn who_answers_like_a_gain_is_trustworthy_and_no_remedy_is_refused() {
+    let lead_is_open = |method: Method| {
+        let record = simulated(Condition::C1);
+        let mut trace = track(&record, &TrackOptions::usual(method, 29), 10).unwrap();
+        for o in &mut trace.operator {
+            o.k_e_dot.standard_error = Some(o.k_e_dot.value.abs());
+        }
+        trace.verdict(&record, None).unwrap()
+    };
+    let verdict = lead_is_open(Method::physical());
+    let found = verdict.findings().iter().find(|f| f.kind == "undetermined-parameter");
+    assert_eq!(found.map(|f| f.severity), Some(Severity::Note), "{verdict}");
+    // Without a memory none is asked to be longer.
+    assert!(!lead_is_open(Method::population()).to_string().contains("memory"));
+    let operator = |k_e_dot: f64| OperatorEstimate {
+        k_e: Estimate::with_variance(1.0, 0.01),
+        t_l_s: Estimate::with_variance(k_e_dot, 0.01),
+        k_e_dot: Estimate::with_variance(k_e_dot, 0.01),
+        omega_nm_rad_s: Estimate::with_variance(11.0, 1.0),
+        zeta_nm: Estimate::with_variance(0.3, 0.001),
+        tau_e_s: Estimate::with_variance(0.2, 0.001),
+    };
+    let record = simulated(Condition::C1);
+    let mut tracker = Tracker::new(&usual(), None, record.sample_time()).unwrap();
+    for (e, u) in record.input().iter().zip(record.output()) {
+        tracker.step(*e, *u);
+    }
+    for k_e_dot in [0.0, 1.0] {
+        assert_eq!(
+            tracker.level(&Ok(operator(k_e_dot))),
+            VerdictLevel::Trustworthy,
+            "{k_e_dot}"
+        );
+    }
 }

@@ -13,7 +13,7 @@ use crate::{
 };
 
 /// Length of a block, s: longer than the memory of residuals.
-const BLOCK_S: f64 = 2.0;
+pub(super) const BLOCK_S: f64 = 2.0;
 /// Blocks of all records.
 const MOST: usize = 96;
 /// Residuals of a piece.

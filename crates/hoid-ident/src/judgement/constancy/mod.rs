@@ -33,12 +33,14 @@
 //! | `critical` | p-values of a supremum |
 //! | `polynomials` | the scores of a fit of polynomials, with that of the delay |
 //! | `search` | all changes, and the one that stands out |
+//! | `steadiness` | the same of columns that are known: jumps, drifts and sways |
 //! | `stretch` | the block that carries the fit |
 
 mod blocks;
 mod critical;
 mod polynomials;
 mod search;
+mod steadiness;
 mod stretch;
 #[cfg(test)]
 mod tests;
@@ -46,8 +48,10 @@ mod tests;
 use hoid_model::Finding;
 
 pub(crate) use blocks::{physical_blocks, score_blocks};
+pub use search::Course;
 use search::{Change, strongest};
 pub(crate) use search::{Constancy, Direction};
+pub use steadiness::{Unsteady, unsteady};
 use stretch::carrying;
 
 /// p-value below which a parameter counts as changed, for the delay and for all others.

@@ -1,5 +1,7 @@
 //! The change that stands out among all directions, records and instants.
 
+use std::f64::consts::{FRAC_PI_4, TAU};
+
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
 use super::{
@@ -9,6 +11,8 @@ use super::{
 
 /// Blocks on each side of a change.
 const FEWEST: usize = 2;
+/// Shortest period of a sway, in blocks.
+const SHORTEST: f64 = 5.0;
 /// Share of the information of a change that the constant parameters must leave.
 const LEFT: f64 = 1e-3;
 /// Eigenvalue of the information, scaled to a unit diagonal, below which a combination of parameters
@@ -39,9 +43,21 @@ pub(crate) struct Direction {
     pub size: f64,
 }
 
+/// How a parameter goes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Course {
+    /// It jumps.
+    Step,
+    /// It drifts from one end to the other.
+    Drift,
+    /// It sways, with this period in s.
+    Sway(f64),
+}
+
 /// A change of a parameter.
 #[derive(Debug, Clone)]
 pub(super) struct Change {
+    pub course: Course,
     pub name: String,
     pub unit: &'static str,
     pub record: usize,
@@ -52,11 +68,25 @@ pub(super) struct Change {
     pub p_value: f64,
 }
 
-/// A set of samples that differs: record, first sample and the blocks.
-struct Set {
+/// A change over the blocks: record, first sample, how it goes, and what share of it each block has.
+pub(super) struct Set {
     record: usize,
     at: usize,
-    blocks: std::ops::Range<usize>,
+    course: Course,
+    weights: Vec<f64>,
+}
+
+impl Set {
+    /// All blocks of a range have it, others do not.
+    fn of_blocks(record: usize, at: usize, blocks: std::ops::Range<usize>, all: usize) -> Self {
+        let weights = (0..all).map(|c| f64::from(u8::from(blocks.contains(&c)))).collect();
+        Self {
+            record,
+            at,
+            course: Course::Step,
+            weights,
+        }
+    }
 }
 
 /// A change that is tested.
@@ -72,9 +102,14 @@ struct Tested {
 
 /// The change with the smallest p-value among the delays, or among the others.
 pub(super) fn strongest(of: &Constancy<'_>, delay: bool) -> Option<Change> {
+    let directions: Vec<_> = of.directions.iter().filter(|d| d.delay == delay).collect();
+    strongest_among(of, &directions, &sets(of.blocks))
+}
+
+/// The same among these directions and courses.
+pub(super) fn strongest_among(of: &Constancy<'_>, directions: &[&Direction], sets: &[Set]) -> Option<Change> {
     let (blocks, n) = (of.blocks, of.blocks.len());
     let p = blocks.first()?.g.len();
-    let sets = sets(blocks);
     if n < 2 * FEWEST || of.variance <= 0.0 || sets.is_empty() {
         return None;
     }
@@ -91,9 +126,8 @@ pub(super) fn strongest(of: &Constancy<'_>, delay: bool) -> Option<Change> {
         .zip(&matrices)
         .map(|(b, m)| DVector::from_column_slice(&b.g) - m * &step)
         .collect();
-    let directions: Vec<_> = of.directions.iter().filter(|d| d.delay == delay).collect();
     let mut best: Option<Change> = None;
-    for direction in &directions {
+    for direction in directions {
         let v = DVector::from_column_slice(&direction.vector);
         let all: Vec<Tested> = (0..sets.len())
             .filter_map(|k| tested(of, (&matrices, &scores), &inverse, (&v, direction.size), &sets[k], k))
@@ -103,11 +137,21 @@ pub(super) fn strongest(of: &Constancy<'_>, delay: bool) -> Option<Change> {
         let usual = ratios.get(ratios.len() / 2).copied().unwrap_or(1.0);
         let smallest = all.iter().map(|t| t.share.min(1.0 - t.share)).fold(0.5, f64::min);
         for t in &all {
-            let variance = t.by_blocks.max(t.by_model * usual.max(1.0)) + t.between_runs;
-            let p_one = of_student(t.u / variance.sqrt(), (n - 2) as f64);
-            let p_value = (of_supremum(p_one, all.len(), smallest.max(1e-3)) * directions.len() as f64).min(1.0);
+            // All blocks have a share in a drift and a sway, and the usual scatter is that of them all.
+            let (scatter, freedom) = match sets[t.set].course {
+                Course::Step => (t.by_blocks, n - 2),
+                _ => (0.0, 4 * (n - 2)),
+            };
+            let variance = scatter.max(t.by_model * usual.max(1.0)) + t.between_runs;
+            let p_one = of_student(t.u / variance.sqrt(), freedom as f64);
+            let of_all = match sets[t.set].course {
+                Course::Step => of_supremum(p_one, all.len(), smallest.max(1e-3)),
+                _ => p_one * all.len() as f64,
+            };
+            let p_value = (of_all * directions.len() as f64).min(1.0);
             if best.as_ref().is_none_or(|known| p_value < known.p_value) {
                 best = Some(Change {
+                    course: sets[t.set].course,
                     name: direction.name.clone(),
                     unit: direction.unit,
                     record: sets[t.set].record,
@@ -123,22 +167,54 @@ pub(super) fn strongest(of: &Constancy<'_>, delay: bool) -> Option<Change> {
 }
 
 /// Whole records among others, and the part of a record behind each boundary of blocks.
-fn sets(blocks: &[ScoreBlock]) -> Vec<Set> {
+pub(super) fn sets(blocks: &[ScoreBlock]) -> Vec<Set> {
     let records = blocks.last().map_or(0, |b| b.record + 1);
     let mut all = Vec::new();
     for record in 0..records {
         let from = blocks.partition_point(|b| b.record < record);
         let to = blocks.partition_point(|b| b.record <= record);
         if records > 1 && to - from >= FEWEST {
-            let (at, blocks) = (0, from..to);
-            all.push(Set { record, at, blocks });
+            all.push(Set::of_blocks(record, 0, from..to, blocks.len()));
         }
         for k in from + FEWEST..(to + 1).saturating_sub(FEWEST) {
-            let (at, blocks) = (blocks[k].from, k..to);
-            all.push(Set { record, at, blocks });
+            all.push(Set::of_blocks(record, blocks[k].from, k..to, blocks.len()));
         }
     }
     all
+}
+
+/// A drift over the blocks of one record.
+pub(super) fn drifts(blocks: &[ScoreBlock]) -> Vec<Set> {
+    let n = blocks.len();
+    let weight = |c: usize| (c as f64 + 0.5) / n.max(1) as f64 - 0.5;
+    let weights = (0..n).map(weight).collect();
+    let course = Course::Drift;
+    vec![Set {
+        record: 0,
+        at: 0,
+        course,
+        weights,
+    }]
+}
+
+/// Sines over the blocks of one record, of so many s each: periods from [`SHORTEST`] blocks to two thirds of all, half of
+/// what tells two frequencies apart from one to the next, each in four phases.
+pub(super) fn sways(blocks: &[ScoreBlock], block_s: f64) -> Vec<Set> {
+    let n = blocks.len();
+    let frequencies = (3..)
+        .map(|k| f64::from(k) / (2.0 * n as f64))
+        .take_while(|f| *f <= 1.0 / SHORTEST);
+    let of = |frequency: f64, phase: u32| Set {
+        record: 0,
+        at: 0,
+        course: Course::Sway(block_s / frequency),
+        weights: (0..n)
+            .map(|c| (TAU * (c as f64 + 0.5) * frequency + FRAC_PI_4 * f64::from(phase)).sin())
+            .collect(),
+    };
+    frequencies
+        .flat_map(|frequency| (0..4).map(move |phase| of(frequency, phase)))
+        .collect()
 }
 
 fn tested(
@@ -150,18 +226,20 @@ fn tested(
     index: usize,
 ) -> Option<Tested> {
     let p = v.len();
-    let inside = matrices[set.blocks.clone()]
-        .iter()
-        .fold(DVector::zeros(p), |sum, m| sum + m * v);
-    let information: f64 = matrices.iter().map(|m| v.dot(&(m * v))).sum();
-    let of_set = v.dot(&inside);
+    let along: Vec<DVector<f64>> = matrices.iter().map(|m| m * v).collect();
+    let mut inside = DVector::zeros(p);
+    let (mut information, mut of_set) = (0.0, 0.0);
+    for (moved, weight) in along.iter().zip(&set.weights) {
+        inside += moved * *weight;
+        information += v.dot(moved);
+        of_set += weight * weight * v.dot(moved);
+    }
     let a = inverse * inside;
-    let (within, beside) = (v - &a, -&a);
     let mut parts = Vec::with_capacity(matrices.len());
     let mut of_runs = vec![0.0; of.blocks.last()?.record + 1];
     for (c, (matrix, score)) in matrices.iter().zip(scores).enumerate() {
-        let w = if set.blocks.contains(&c) { &within } else { &beside };
-        let moved = matrix * w;
+        let w = v * set.weights[c] - &a;
+        let moved = matrix * &w;
         parts.push((w.dot(score), w.dot(&moved)));
         of_runs[of.blocks[c].record] += v.dot(&moved);
     }
