@@ -6,6 +6,8 @@
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 mod evidence;
+#[path = "evidence/told.rs"]
+mod told;
 
 use evidence::{CHANGE_S, START_S, median, on_all_cores, scenario};
 use hoid_model::{
@@ -14,9 +16,9 @@ use hoid_model::{
     schedule::Schedule,
 };
 use hoid_sim::{RunSeed, Simulator};
-use hoid_track::{ErrorThreshold, Method, Sample, StartAt, TrackOptions, Tracker};
+use hoid_track::{ErrorThreshold, Method, Sample, TrackOptions, Tracker};
+use told::{of_the_text, options};
 
-const NK: usize = 29;
 const COLUMNS: [&str; 5] = ["K_e", "T_L", "K_e_dot", "omega_nm", "zeta_nm"];
 const LEVELS: [f64; 4] = [0.01, 0.1, 0.2, 0.3];
 /// End of the search for a change, s.
@@ -49,20 +51,6 @@ fn run(simulator: &Simulator, condition: Condition, order: usize, level: usize, 
         replication,
     };
     simulator.run(run_seed, false).unwrap()
-}
-
-fn options(method: Method) -> TrackOptions {
-    TrackOptions {
-        start: StartAt::Span(Some((0.0, START_S))),
-        ..TrackOptions::new(method.clone(), method.usual_structure(), method.usual_orders(NK))
-    }
-}
-
-/// RLS or RPEM by the text's own settings.
-fn of_the_text(method: Method) -> TrackOptions {
-    let mut settings = vec![("memory", "256"), ("covariance", "0.1"), ("limit", "inf")];
-    settings.extend((method != Method::rls()).then_some(("stable", "noise")));
-    options(method.clone()).with(&settings).unwrap()
 }
 
 /// What one run of one method gave.

@@ -9,6 +9,8 @@
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 mod evidence;
+#[path = "evidence/told.rs"]
+mod told;
 
 use evidence::{CHANGE_S, START_S, median, on_all_cores, scenario};
 use hoid_model::{
@@ -16,14 +18,14 @@ use hoid_model::{
     scenario::{Condition, Realisation},
 };
 use hoid_sim::{RunSeed, Simulator};
-use hoid_track::{Method, Sample, StartAt, TrackOptions, Tracker};
+use hoid_track::{Method, Sample, TrackOptions, Tracker};
+use told::{of_the_text, options};
 
 /// Not a seed on which anything was set.
 const SEED: u64 = 46_000;
 const COLUMNS: [&str; 5] = ["K_e", "T_L", "K_e_dot", "omega_nm", "zeta_nm"];
 /// Spans of the coverage: before the change, within 5 s of it, and after, s.
 const SPANS: [(f64, f64); 3] = [(20.0, CHANGE_S), (CHANGE_S, CHANGE_S + 5.0), (CHANGE_S + 5.0, 82.0)];
-const NK: usize = 29;
 
 struct Cell {
     condition: Condition,
@@ -54,15 +56,10 @@ fn tracker(name: &str, record: &Record) -> Tracker {
         let options = TrackOptions::usual(method, record.sample_time().nk(0.2));
         return Tracker::new(&options, None, record.sample_time()).unwrap();
     }
-    let mut options = TrackOptions {
-        start: StartAt::Span(Some((0.0, START_S))),
-        ..TrackOptions::usual(method, NK)
+    let options = match name {
+        "rls" | "rpem" => of_the_text(method),
+        _ => options(method),
     };
-    if ["rls", "rpem"].contains(&name) {
-        let mut settings = vec![("memory", "256"), ("covariance", "0.1"), ("limit", "inf")];
-        settings.extend((name == "rpem").then_some(("stable", "noise")));
-        options = options.with(&settings).unwrap();
-    }
     Tracker::new(
         &options,
         Some(&record.span(0.0, START_S).unwrap()),

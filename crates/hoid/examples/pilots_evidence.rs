@@ -11,14 +11,15 @@
 //! the 95 % interval of gain and of phase holds the reference.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
+mod pilots;
+
 use std::{collections::BTreeMap, env, f64::consts::PI, fs, path::Path};
 
-use hoid::io::ReadOptions;
 use hoid_track::{Method, Sample, TrackOptions, Tracker};
+use pilots::FROM_S;
 use rayon::prelude::*;
 
 const AT_RAD_S: [f64; 3] = [1.0, 2.5, 4.0];
-const FROM_S: f64 = 8.08;
 const CHANGE_S: f64 = 50.0;
 /// Where errors are read, s.
 const READ_S: [f64; 3] = [45.0, 60.0, 70.0];
@@ -122,8 +123,7 @@ fn run(name: &str, folder: &Path, references: &References, method: &str) -> Run 
         [0, 1, 2].map(|i| [0, 1].map(|k| 0.5 * (pre[i][k] + post[i][k])))
     };
     let people = [whole("C1"), whole("C2")];
-    let path = folder.join(format!("{name}.parquet"));
-    let record = hoid::io::read_record(&path, &ReadOptions::default()).unwrap().record;
+    let (record, first) = pilots::read(folder, name);
     let (name, setting) = method.split_once(':').map_or((method, None), |(m, s)| (m, Some(s)));
     let mut method: Method = name.parse().unwrap();
     if let Some((key, value)) = setting.and_then(|s| s.split_once('=')) {
@@ -137,7 +137,6 @@ fn run(name: &str, folder: &Path, references: &References, method: &str) -> Run 
         settings.extend((name == "rpem").then_some(("stable", "noise")));
         options = options.with(&settings).unwrap();
     }
-    let first = (0..record.len()).find(|k| record.time_s(*k) >= FROM_S - 1e-6).unwrap();
     let span = record.span(FROM_S, FROM_S + 27.3).unwrap();
     let starts = options.method.starts_itself();
     let mut tracker = Tracker::new(&options, (!starts).then_some(&span), record.sample_time()).unwrap();
@@ -240,25 +239,16 @@ fn told(all: &[Run]) -> String {
 }
 
 fn main() {
-    let Some(folder) = env::var_os("HOID_PILOT_DATA") else {
-        println!("HOID_PILOT_DATA does not name the folder of the recorded pilots");
-        return;
-    };
-    let folder = Path::new(&folder);
+    let Some(folder) = pilots::folder() else { return };
+    let folder = folder.as_path();
     let mut arguments = env::args().skip(1);
     let runs = arguments.next().unwrap_or_else(|| "all".to_owned());
     let mut methods: Vec<String> = arguments.collect();
     if methods.is_empty() {
-        methods = ["adaptive", "rls", "rpem"].map(str::to_owned).to_vec();
+        methods = ["population", "adaptive", "rls", "rpem"].map(str::to_owned).to_vec();
     }
     let references = references(folder);
-    let mut names: Vec<String> = fs::read_dir(folder)
-        .unwrap()
-        .map(|f| f.unwrap().file_name().to_string_lossy().into_owned())
-        .filter_map(|n| n.strip_suffix(".parquet").map(str::to_owned))
-        .filter(|n| runs == "all" || runs.split(',').any(|r| n.ends_with(&format!("_{r}"))))
-        .collect();
-    names.sort();
+    let names = pilots::names(folder, &runs);
     println!(
         "| method | sudden: 5 s before, +10, +20 s | gradual | constant | nearer to H2 before, sudden, gradual | after | bands of \
          gain at -10, -5, +5, +10, +20, +39 s | of phase | alarms an hour | sudden found in 5, 10, 15 s | gradual | instant off, s | K_e, T_L, \

@@ -11,15 +11,15 @@
 
 #[path = "../tests/common/tracker_faults/faults.rs"]
 mod faults;
+mod pilots;
 
-use std::{collections::BTreeMap, env, fs, path::Path};
+use std::{collections::BTreeMap, env};
 
 use faults::{Fault, Signal, faults};
-use hoid::{io::ReadOptions, model::SampleTime};
+use hoid::model::SampleTime;
 use hoid_track::{GuardEvent, Method, Sample, TrackOptions, Tracker};
 use rayon::prelude::*;
 
-const FROM_S: f64 = 8.08;
 /// Where faults are put in, s after the beginning, and the longest of them.
 const PLACES_S: [f64; 2] = [33.3, 47.77];
 const LONGEST_S: f64 = 20.0;
@@ -105,27 +105,16 @@ fn all_faults() -> Vec<Fault> {
 }
 
 fn main() {
-    let Some(folder) = env::var_os("HOID_PILOT_DATA") else {
-        println!("HOID_PILOT_DATA does not name the folder of the recorded pilots");
-        return;
-    };
-    let folder = Path::new(&folder);
+    let Some(folder) = pilots::folder() else { return };
+    let folder = folder.as_path();
     let mut arguments = env::args().skip(1);
     let runs = arguments.next().unwrap_or_else(|| "all".to_owned());
     let method = arguments.next().unwrap_or_else(|| "population".to_owned());
-    let mut names: Vec<String> = fs::read_dir(folder)
-        .unwrap()
-        .map(|f| f.unwrap().file_name().to_string_lossy().into_owned())
-        .filter_map(|n| n.strip_suffix(".parquet").map(str::to_owned))
-        .filter(|n| runs == "all" || runs.split(',').any(|r| n.ends_with(&format!("_{r}"))))
-        .collect();
-    names.sort();
+    let names = pilots::names(folder, &runs);
     let recordings: Vec<Recording> = names
         .iter()
         .map(|name| {
-            let path = folder.join(format!("{name}.parquet"));
-            let record = hoid::io::read_record(&path, &ReadOptions::default()).unwrap().record;
-            let first = (0..record.len()).find(|k| record.time_s(*k) >= FROM_S - 1e-6).unwrap();
+            let (record, first) = pilots::read(folder, name);
             Recording {
                 e: record.input()[first..].to_vec(),
                 u: record.output()[first..].to_vec(),

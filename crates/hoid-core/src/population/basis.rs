@@ -31,7 +31,7 @@
 use super::{
     pair::Pair,
     past::{Paired, paired},
-    sizes::{GAINS, HELD, SIGNALS, STATES},
+    sizes::{GAINS, HELD, LINEAR, SIGNALS, STATES},
 };
 
 /// Frequency at which each response has a gain of one, rad/s.
@@ -293,6 +293,25 @@ impl Basis {
             weights[i + 3] -= a * of_tau;
         }
         weights
+    }
+
+    /// Factors that bring the gains into the units of another basis.
+    pub(super) fn units_of(&self, to: &Self) -> [f64; GAINS] {
+        core::array::from_fn(|i| self.scale[i] / to.scale[i])
+    }
+
+    /// A state in the coordinates of another basis: the same gains in its units, and corrections from its point.
+    pub(super) fn carried(&self, to: &Self, state: &[f64; STATES]) -> [f64; STATES] {
+        let mut carried = *state;
+        for (s, unit) in carried.iter_mut().zip(self.units_of(to)) {
+            *s *= unit;
+        }
+        let (from, there) = (self.point, to.point);
+        let moved = [from.omega - there.omega, from.zeta - there.zeta, from.tau - there.tau];
+        for (c, moved) in carried[LINEAR..].iter_mut().zip(moved) {
+            *c += moved;
+        }
+        carried
     }
 
     /// Brings the filter to rest.

@@ -234,10 +234,11 @@ impl Candidate {
             return true;
         }
         self.take_residual(u);
-        let row = self.row(white, prior.look);
+        let innovation = self.innovation(white);
+        let row = self.row(white, innovation, prior.look);
         self.blocks.take(&row);
-        self.moments
-            .add(&white.signals, white.level, self.limited(white, prior.limit));
+        let y = self.limited(white.y, innovation, prior.limit);
+        self.moments.add(&white.signals, white.level, y);
         if self.moments.samples as u64 >= self.block {
             self.end_of_block(prior);
         }
@@ -246,18 +247,17 @@ impl Candidate {
 
     /// The output with its innovation at most so many standard deviations.
     #[inline(always)]
-    fn limited(&self, white: &Whitened, limit: f64) -> f64 {
+    fn limited(&self, y: f64, innovation: f64, limit: f64) -> f64 {
         let most = limit * libm::sqrt(self.level[0]);
         if most == f64::INFINITY {
-            return white.y;
+            return y;
         }
-        let innovation = self.innovation(white);
-        white.y - innovation + innovation.max(-most).min(most)
+        y - innovation + innovation.max(-most).min(most)
     }
 
     /// What the sample says to the detector.
     #[inline(always)]
-    fn row(&self, white: &Whitened, limit: f64) -> Row {
+    fn row(&self, white: &Whitened, innovation: f64, limit: f64) -> Row {
         let Regressors { x, by } = self.basis.regressors(&white.signals);
         let state = self.mixture.mean();
         let (mut r, mut q) = ([0.0; LINEAR], [0.0; HELD]);
@@ -273,8 +273,8 @@ impl Candidate {
             r,
             q,
             p: core::array::from_fn(|j| state[LINEAR + j]),
-            y: self.limited(white, limit),
-            innovation: self.innovation(white),
+            y: self.limited(white.y, innovation, limit),
+            innovation,
             variance: self.level[0],
         }
     }
@@ -418,20 +418,11 @@ impl Candidate {
         (of(&h), by)
     }
 
-    /// A state in the coordinates of another basis: the same gains in the same units, and corrections from
-    /// its point, where that is near.
+    /// A state in the coordinates of another basis; without corrections where its point is not near.
     pub fn carried(&self, to: &Basis, state: &[f64; STATES]) -> [f64; STATES] {
-        let (from, there) = (self.basis.point(), to.point());
-        let mut carried = *state;
-        for i in 0..GAINS {
-            carried[i] *= self.basis.scale()[i] / to.scale()[i];
-        }
-        let moved = [from.omega - there.omega, from.zeta - there.zeta, from.tau - there.tau];
-        for (c, moved) in carried[LINEAR..].iter_mut().zip(moved) {
-            *c += moved;
-        }
+        let mut carried = self.basis.carried(to, state);
         let [omega, _, tau] = [carried[LINEAR], carried[LINEAR + 1], carried[LINEAR + 2]];
-        if tau.abs() > 0.03 || omega.abs() > 0.3 * there.omega {
+        if tau.abs() > 0.03 || omega.abs() > 0.3 * to.point().omega {
             carried[LINEAR..].fill(0.0);
         }
         carried

@@ -1,20 +1,12 @@
-//! The recursion: the estimate of now, the replays that mend it, and the detector.
+//! The recursion: a sample in, an estimate out.
 //!
-//! The candidate of now ([`super::candidate`]) takes each sample as it comes. Beside it another candidate
-//! reads the record again from the start of the memory, [`REPLAYED`] samples with each new one, until it
-//! has caught up. It has the basis where the estimate now points, the noise model of its residuals, and
-//! the dispersion of its innovations. When it has caught up it takes over, and the next one starts. So the
-//! estimate is, a few seconds late, that of a prediction error method of all data since the start of the
-//! memory that is repeated again and again, at a bounded cost for each sample and with the same digits
-//! whatever the machine.
-//!
-//! Every second replay starts elsewhere. It is repeated [`STAGES`] times from where it ended, and takes over
-//! only if its evidence is better by [`BETTER`].
-//!
-//! With no more memory than the longest delay needs nothing is replayed: basis and noise model are then
-//! those of the start, but for corrections, and the noise model is renewed in place.
+//! The candidate of now ([`super::candidate`]) takes each sample as it comes; what it learns and what it only follows
+//! is decided here, and remembered for those who read the record again (`replay`). The detector looks at the blocks of
+//! the candidate of now.
 
-use core::ops::Range;
+mod replay;
+
+pub use replay::REPLAYED;
 
 use super::{
     alternatives::Alternatives,
@@ -23,7 +15,7 @@ use super::{
     detector::Detector,
     history::{History, Use},
     known::Known,
-    mixture::{ChangePrior, Mixture, NoiseScales},
+    mixture::{Mixture, NoiseScales},
     noise::NoiseModel,
     prior::PopulationPrior,
     saturation::Saturation,
@@ -34,20 +26,10 @@ use crate::{
     state::{State, visit_all},
 };
 
-/// Samples that are read again with each new one.
-pub const REPLAYED: usize = 50;
-/// Replays of a start that is elsewhere, and the evidence by which it must be better, nats.
-const STAGES: u64 = 3;
-const BETTER: f64 = 3.0;
-/// Evidence by which a replay of the estimate itself may be worse: it started with what was known less
-/// well.
-const WORSE: f64 = 20.0;
 /// Trust region of the corrections in a replay: shares of omega and zeta, and s.
 const NEAR: [f64; HELD] = [0.15, 0.3, 0.03];
 /// Time from which a replay learns nothing, s: its filters start at rest, and the person did not.
 const AT_REST_S: f64 = 2.0;
-/// Samples that a first estimate needs, in orders of the noise model.
-const FEWEST: u64 = 3;
 /// Time from which nothing is learnt of signals that do not move, s.
 const STILL_S: f64 = 0.1;
 /// Time after that until the filters have settled, s.
@@ -194,23 +176,15 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> PopulationFilter<E> {
         let scales = self.scales(dispersion);
         let mixture = match &self.known {
             Some(known) => {
-                let scale: [f64; GAINS] = core::array::from_fn(|i| self.origin.scale()[i] / basis.scale()[i]);
-                let of = |i: usize| scale.get(i).copied().unwrap_or(1.0);
+                let units = self.origin.units_of(&basis);
+                let of = |i: usize| units.get(i).copied().unwrap_or(1.0);
                 let mut covariance = known.covariance;
                 for (i, row) in covariance.iter_mut().enumerate() {
                     for (j, c) in row.iter_mut().enumerate() {
                         *c *= of(i) * of(j);
                     }
                 }
-                let mut state: [f64; STATES] = core::array::from_fn(|i| known.state[i] * of(i));
-                let from = self.origin.point();
-                for (s, moved) in state[LINEAR..].iter_mut().zip([
-                    from.omega - point.omega,
-                    from.zeta - point.zeta,
-                    from.tau - point.tau,
-                ]) {
-                    *s += moved;
-                }
+                let state = self.origin.carried(&basis, &known.state);
                 Mixture::at(changes, state, covariance, known.variance)
             }
             None => {
@@ -284,146 +258,6 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> PopulationFilter<E> {
             innovation,
             shortened: false,
         }
-    }
-
-    /// The first estimate: the best of all starts over the samples so far.
-    fn begin(&mut self) {
-        let (ts, n) = (self.prior.sample_time, self.history.samples());
-        let enough = n as f64 * ts >= self.prior.hold && n >= FEWEST * self.prior.order as u64;
-        if !enough || !self.powers.iter().all(|p| *p > 0.0) {
-            return;
-        }
-        if !self.replays_anything() {
-            if let Some(live) = self.candidate(self.prior.person, &self.supposed, 1.0) {
-                self.live = live;
-                self.began = true;
-            }
-            return;
-        }
-        let mut best: Option<(f64, Candidate)> = None;
-        for start in self.prior.starts {
-            let Some(mut candidate) = self.candidate(start, &self.supposed, 1.0) else {
-                continue;
-            };
-            if !read(
-                &self.history,
-                &self.saturation,
-                &self.prior.changes,
-                &mut candidate,
-                0..n,
-            ) {
-                continue;
-            }
-            let evidence = candidate.evidence + self.plausibility(start);
-            if evidence.is_finite() && best.as_ref().is_none_or(|(least, _)| evidence > *least) {
-                best = Some((evidence, candidate));
-            }
-        }
-        if let Some((_, mut candidate)) = best {
-            self.suppose(&mut candidate);
-            (self.live, self.began) = (candidate, true);
-        }
-    }
-
-    /// Logarithm of the prior density of a point, but for a constant.
-    fn plausibility(&self, point: Point) -> f64 {
-        let (p, is) = (self.prior.person, variances(&self.prior));
-        let away = [point.omega - p.omega, point.zeta - p.zeta, point.tau - p.tau];
-        -0.5 * away.iter().zip(is).map(|(a, v)| a * a / v).sum::<f64>()
-    }
-
-    /// Reads on with the trial, and starts another when it is done.
-    fn replay(&mut self) {
-        if self.stage == 0 {
-            self.start_replay();
-            return;
-        }
-        let to = (self.at + REPLAYED as u64).min(self.history.samples());
-        let sound = read(
-            &self.history,
-            &self.saturation,
-            &self.prior.changes,
-            &mut self.trial,
-            self.at..to,
-        );
-        self.at = to;
-        if !sound {
-            self.stage = 0;
-        } else if self.at >= self.history.samples() {
-            self.decide();
-        }
-    }
-
-    fn start_replay(&mut self) {
-        self.replays += 1;
-        let elsewhere = self.replays.is_multiple_of(2) && self.known.is_none();
-        let (point, stage) = match elsewhere {
-            true => (self.prior.starts[self.turn()], 2),
-            false => (self.live.point(), 1),
-        };
-        let live = self.live.clone();
-        self.start_from(&live, point, stage);
-    }
-
-    /// The start of this replay, or of the last one that was elsewhere.
-    fn turn(&self) -> usize {
-        (self.replays / 2) as usize % self.prior.starts.len()
-    }
-
-    /// A trial at a point, with what another has learnt.
-    fn start_from(&mut self, from: &Candidate, point: Point, stage: u64) {
-        let mut d = from.noise.clone();
-        d.solve();
-        let Some(trial) = self.candidate(point, &d, from.dispersion()) else {
-            self.stage = 0;
-            return;
-        };
-        let later = (trial.start.saturating_sub(from.start)) / from.block_samples().max(1);
-        let guide = from.mixture.history();
-        let basis = trial.basis().clone();
-        self.trial = trial.guided(guide.carried(later, |state| from.carried(&basis, state)));
-        (self.stage, self.at) = (stage, self.trial.start);
-    }
-
-    /// What becomes of a trial that has caught up.
-    fn decide(&mut self) {
-        let mut trial = self.trial.clone();
-        trial.unguided();
-        let evidence = trial.evidence;
-        let stage = core::mem::replace(&mut self.stage, 0);
-        if !(evidence.is_finite() && trial.mixture.mean().iter().all(|s| s.is_finite())) {
-            return;
-        }
-        let same = trial.start == self.live.start;
-        self.suppose(&mut trial);
-        if stage > 1 && stage <= STAGES {
-            let point = trial.point();
-            self.start_from(&trial, point, stage + 1);
-            return;
-        }
-        let takes_over = match stage {
-            1 => !same || evidence > self.live.evidence - WORSE,
-            _ => same && evidence > self.live.evidence + BETTER,
-        };
-        if stage > 1 && same {
-            let loser = if takes_over { &self.live } else { &trial };
-            let behind = (evidence - self.live.evidence).abs();
-            self.alternatives
-                .put(self.turn(), loser.operator(), behind, self.history.samples());
-        }
-        if takes_over {
-            self.live = trial;
-        }
-    }
-
-    /// Puts what is supposed of people in the place of the trust region of a replay.
-    fn suppose(&self, candidate: &mut Candidate) {
-        if self.known.is_some() {
-            return;
-        }
-        let (p, at) = (self.prior.person, candidate.basis().point());
-        let mean = [p.omega - at.omega, p.zeta - at.zeta, p.tau - at.tau];
-        candidate.mixture.suppose(trusted(at), variances(&self.prior), mean);
     }
 
     /// Nothing is learnt while neither signal moves: it would be that of a recording that stands, or of a
@@ -600,36 +434,6 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> PopulationFilter<E> {
     pub fn restarts(&self) -> u64 {
         self.restarts
     }
-}
-
-/// Reads samples of the history; false where a number has overflowed.
-fn read<E: AsRef<[f64]> + AsMut<[f64]>>(
-    history: &History<E>,
-    saturation: &Saturation,
-    changes: &ChangePrior,
-    candidate: &mut Candidate,
-    samples: Range<u64>,
-) -> bool {
-    for sample in samples {
-        candidate.respond(|age| history.error(sample, age));
-        let (u, use_of_it) = history.output(sample);
-        let through = match use_of_it {
-            Use::Learn => {
-                let white = candidate.whitened(u);
-                if !candidate.learn(&white, u, changes) {
-                    return false;
-                }
-                u
-            }
-            Use::Follow => u,
-            _ => {
-                let predicted = u - candidate.innovation(&candidate.whitened(u));
-                through_filters(saturation, use_of_it, u, predicted)
-            }
-        };
-        remember(candidate, use_of_it, through);
-    }
-    true
 }
 
 fn remember(candidate: &mut Candidate, use_of_it: Use, u: f64) {

@@ -1,0 +1,23 @@
+//! Methods that are told the delay, for the examples that compare them.
+
+use hoid_track::{Method, StartAt, TrackOptions};
+
+use super::evidence::START_S;
+
+/// Delay of the textbook's operator, samples.
+const NK: usize = 29;
+
+/// A method that is told the delay and starts from a fit of the first 30.72 s.
+pub fn options(method: Method) -> TrackOptions {
+    TrackOptions {
+        start: StartAt::Span(Some((0.0, START_S))),
+        ..TrackOptions::new(method.clone(), method.usual_structure(), method.usual_orders(NK))
+    }
+}
+
+/// RLS or RPEM by the text's own settings.
+pub fn of_the_text(method: Method) -> TrackOptions {
+    let mut settings = vec![("memory", "256"), ("covariance", "0.1"), ("limit", "inf")];
+    settings.extend((method != Method::rls()).then_some(("stable", "noise")));
+    options(method.clone()).with(&settings).unwrap()
+}

@@ -1,0 +1,40 @@
+//! The folder of recorded pilots, for the examples that read it.
+
+use std::{
+    env, fs,
+    path::{Path, PathBuf},
+};
+
+use hoid::{io::ReadOptions, model::Record};
+
+/// Start of the recordings, s: what is before is run-in.
+pub const FROM_S: f64 = 8.08;
+
+/// The folder, where `HOID_PILOT_DATA` names it; else that is said.
+pub fn folder() -> Option<PathBuf> {
+    let folder = env::var_os("HOID_PILOT_DATA").map(PathBuf::from);
+    if folder.is_none() {
+        println!("HOID_PILOT_DATA does not name the folder of the recorded pilots");
+    }
+    folder
+}
+
+/// Names of the recordings of these runs, `1,4` or `all`, in their order.
+pub fn names(folder: &Path, runs: &str) -> Vec<String> {
+    let mut names: Vec<String> = fs::read_dir(folder)
+        .unwrap()
+        .map(|f| f.unwrap().file_name().to_string_lossy().into_owned())
+        .filter_map(|n| n.strip_suffix(".parquet").map(str::to_owned))
+        .filter(|n| runs == "all" || runs.split(',').any(|r| n.ends_with(&format!("_{r}"))))
+        .collect();
+    names.sort();
+    names
+}
+
+/// A recording, and its first sample from [`FROM_S`] on.
+pub fn read(folder: &Path, name: &str) -> (Record, usize) {
+    let path = folder.join(format!("{name}.parquet"));
+    let record = hoid::io::read_record(&path, &ReadOptions::default()).unwrap().record;
+    let first = (0..record.len()).find(|k| record.time_s(*k) >= FROM_S - 1e-6).unwrap();
+    (record, first)
+}
