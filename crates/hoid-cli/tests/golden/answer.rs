@@ -1,0 +1,98 @@
+//! What a call answers, without what differs from machine to machine or from version to version.
+
+use std::{
+    fs,
+    path::Path,
+    process::{Command, Output, Stdio},
+};
+
+use serde_json::{Map, Value, json};
+
+use super::manifest::Call;
+
+/// Keys without an answer.
+const VOLATILE: [&str; 3] = ["hoid", "seconds", "threads"];
+/// Lists that are longer are kept in part.
+const LONG: usize = 24;
+/// Rows of a table that are kept, about.
+const ROWS: usize = 12;
+
+pub fn run(at: &Path, command: &str, stdin: Option<&str>) -> Output {
+    let input = stdin.map_or_else(Stdio::null, |file| fs::File::open(at.join(file)).unwrap().into());
+    Command::new(env!("CARGO_BIN_EXE_hoid"))
+        .args(command.split_whitespace())
+        .current_dir(at)
+        .stdin(input)
+        .env_remove("COLUMNS")
+        .output()
+        .unwrap()
+}
+
+/// Exit code, what was printed, and rows of the tables that were written.
+pub fn of(at: &Path, call: &Call) -> Value {
+    let out = |text: &str| text.replace("{out}", &call.name);
+    let done = run(at, &out(&call.command), call.stdin.as_deref());
+    let mut answer = Map::new();
+    answer.insert("exit".to_owned(), json!(done.status.code()));
+    answer.insert("messages".to_owned(), lines(&done.stderr));
+    answer.insert("answer".to_owned(), shorter(printed(&done.stdout)));
+    for table in &call.tables {
+        let text = fs::read_to_string(at.join(out(table)));
+        answer.insert(table.clone(), text.map_or(Value::Null, |text| rows(&text)));
+    }
+    Value::Object(answer)
+}
+
+fn lines(text: &[u8]) -> Value {
+    let text = String::from_utf8_lossy(text).replace("\r\n", "\n");
+    json!(text.lines().map(|line| line.trim_end()).collect::<Vec<_>>())
+}
+
+/// One JSON object, one a line, or text.
+fn printed(bytes: &[u8]) -> Value {
+    if let Ok(one) = serde_json::from_slice(bytes) {
+        return one;
+    }
+    let text = String::from_utf8_lossy(bytes);
+    let each: Result<Vec<Value>, _> = text.lines().map(serde_json::from_str).collect();
+    each.map_or_else(|_| lines(bytes), Value::Array)
+}
+
+/// Header, number of rows, some of them and the last.
+fn rows(text: &str) -> Value {
+    let mut lines = text.lines().filter(|line| !line.starts_with('#'));
+    let header: Vec<&str> = lines.next().unwrap_or_default().split(',').collect();
+    let cell = |text: &str| text.parse::<f64>().map_or_else(|_| json!(text), |v| shorter(json!(v)));
+    let all: Vec<Vec<&str>> = lines.map(|line| line.split(',').collect()).collect();
+    let last = all.len().saturating_sub(1);
+    let every = all.len().div_ceil(ROWS).max(1);
+    let kept = all.iter().enumerate().filter(|(k, _)| k % every == 0 || *k == last);
+    let kept: Vec<Value> = kept
+        .map(|(_, row)| row.iter().map(|text| cell(text)).collect())
+        .collect();
+    json!({"header": header, "rows": all.len(), "kept": kept})
+}
+
+/// Without volatile keys, numbers to twelve digits, and of long lists about eight entries; pages are
+/// whole.
+fn shorter(value: Value) -> Value {
+    match value {
+        Value::Object(map) => map
+            .into_iter()
+            .filter(|(key, _)| !VOLATILE.contains(&key.as_str()))
+            .map(|(key, value)| (key, shorter(value)))
+            .collect::<Map<_, _>>()
+            .into(),
+        Value::Array(all) if all.len() > LONG && !all.iter().any(Value::is_string) => {
+            let step = all.len().div_ceil(8);
+            let kept: Value = all.iter().step_by(step).map(|v| shorter(v.clone())).collect();
+            json!({"length": all.len(), "kept": kept})
+        }
+        Value::Array(all) => all.into_iter().map(shorter).collect(),
+        Value::Number(number) if number.is_f64() => {
+            let v = number.as_f64().unwrap();
+            json!(format!("{v:.11e}").parse::<f64>().unwrap())
+        }
+        other => other,
+    }
+}

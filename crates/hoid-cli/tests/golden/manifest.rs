@@ -1,0 +1,51 @@
+//! The list of inputs and calls, as it is written.
+
+use std::collections::BTreeMap;
+
+use serde::Deserialize;
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Manifest {
+    /// Relative difference of numbers that is none.
+    pub tolerance: f64,
+    #[serde(rename = "input")]
+    pub inputs: Vec<Input>,
+    #[serde(rename = "call")]
+    pub calls: Vec<Call>,
+}
+
+/// A file that calls read: made by the program, of another one, or written as it stands.
+#[derive(Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Input {
+    pub file: String,
+    /// Options of `hoid simulate`.
+    pub simulate: Option<String>,
+    /// A call whose standard output is the file, or which writes it.
+    pub command: Option<String>,
+    /// Columns of another file, with changes.
+    pub of: Option<String>,
+    pub columns: Vec<String>,
+    pub rows: Option<[usize; 2]>,
+    pub change: Vec<String>,
+    pub text: Option<String>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Call {
+    pub name: String,
+    pub command: String,
+    /// A file of lines on standard input.
+    pub stdin: Option<String>,
+    /// Tables that it writes, of which some rows are kept.
+    #[serde(default)]
+    pub tables: Vec<String>,
+    pub tolerance: Option<f64>,
+    /// Why its tolerance is larger.
+    #[allow(dead_code)]
+    pub reason: Option<String>,
+    /// The same in Python: function, records and keywords.
+    pub python: Option<BTreeMap<String, toml::Value>>,
+}
