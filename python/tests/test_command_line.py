@@ -136,10 +136,10 @@ def test_identify_a_change(run: Path, cli: Any) -> None:
                 *("--memory-of", "b=2.56s,f=inf", "--covariance", 0.1, "--moving-average", 0.5),
             ],
         ),
-        ({"method": "adaptive", "nk": 29}, ["--method", "adaptive", "--nk", 29]),
+        ({"method": "multiple-model", "nk": 29}, ["--method", "multiple-model", "--nk", 29]),
         (
-            {"method": "adaptive", "nk": 29, "smooth": True},
-            ["--method", "adaptive", "--nk", 29, "--smooth"],
+            {"method": "multiple-model", "nk": 29, "smooth": True},
+            ["--method", "multiple-model", "--nk", 29, "--smooth"],
         ),
         (
             {"method": "rriv", "nk": 29, "nd": 1, "every": 7},

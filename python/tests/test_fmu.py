@@ -143,7 +143,7 @@ def test_a_simulator_takes_the_tracker(
 
     unit = tmp_path / "tracker.fmu"
     options = '{"nk": 29, "nd": 1, "warm_up": 20}'
-    cli.run("fmu", "--out", unit, "--library", library, "--method", "adaptive")
+    cli.run("fmu", "--out", unit, "--library", library, "--method", "multiple-model")
     record = columns(run)
     signals = np.array(
         list(zip(record["t"], record["e"], record["u"], strict=True)),

@@ -46,7 +46,7 @@ def script(folder: str) -> list[str]:
     fits: dict[str, pyhoid.Fit] = {"ARX": pyhoid.identify(runs, "arx", nk=10)}
     pyhoid.plots.bode(list(fits.values()))
     for record in runs:
-        trace = pyhoid.track(record, "adaptive", every=10)
+        trace = pyhoid.track(record, "multiple-model", every=10)
         lines.append(f"{trace['t'][-1]} {trace['K_e'][-1]}")
     table = pyhoid.study("bias", f"{folder}/bias", replications=1)["fits"].to_dict()
     lines.extend(table)

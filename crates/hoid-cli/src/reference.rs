@@ -268,7 +268,7 @@ mod tests {
             "{help}"
         );
         let schema = hoid::study::plan_schema_of(&methods);
-        assert!(schema.contains("\"tremor_band_s\"") && schema.contains("count as tremor. For adaptive."));
+        assert!(schema.contains("\"tremor_band_s\"") && schema.contains("count as tremor. For multiple-model."));
         let python = python_settings(&methods);
         assert!(python.contains("    tremor_band: tuple[float, float] | None\n"));
         assert!(options_page(&methods).contains("| `tremor_band` | `LO..HI` | s | 8..12 |"));

@@ -312,7 +312,7 @@ mod tests {
             ("rpem", "{\"start\": {\"b0\": 1}, \"nk\": 29, \"nd\": 1}", "start lacks"),
             ("rpem", "{\"warm_up\": 0}", "one sample"),
             ("rpem", "{\"controlled_element\": \"9/\"}", "coefficients"),
-            ("adaptive", "{\"smooth\": true}", "still to come"),
+            ("multiple-model", "{\"smooth\": true}", "still to come"),
             ("population", "{\"prior\": \"nowhere.json\"}", "nowhere.json"),
             (
                 "population",

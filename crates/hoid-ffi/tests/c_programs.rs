@@ -136,7 +136,7 @@ fn a_change_is_told_in_c() {
     };
     let record = record();
     let options = r#"{"nk": 29, "nd": 1, "warm_up": 20}"#;
-    let output = run(&program, &["adaptive", "0.01", options], &lines(&record));
+    let output = run(&program, &["multiple-model", "0.01", options], &lines(&record));
     assert_eq!(good(&output).lines().count(), record.len());
     let said = String::from_utf8_lossy(&output.stderr).into_owned();
     // The task changes at 40.96 s.

@@ -121,7 +121,7 @@ fn a_tracker_by_every_function_of_the_header() {
     // SAFETY: a tracker, a place on the stack.
     let status = unsafe { hoid_tracker_change_log_odds(tracker, &mut odds) };
     assert_eq!(status, HOID_NOTHING);
-    assert!(read(hoid_last_error()).contains("adaptive"));
+    assert!(read(hoid_last_error()).contains("multiple-model"));
 
     let mut length = 0;
     // SAFETY: only the length is asked for.

@@ -246,7 +246,7 @@ proptest! {
     #[cfg_attr(miri, ignore = "the filters of population take minutes there; tests/every_function.rs has few samples")]
     fn any_samples_are_taken(
         samples in prop::collection::vec((hostile_number(), hostile_number(), hostile_number(), any::<i32>()), 1..60),
-        method in prop_oneof![Just("population"), Just("rpem"), Just("adaptive")],
+        method in prop_oneof![Just("population"), Just("rpem"), Just("multiple-model")],
     ) {
         let options = if method == "population" { "" } else {
             r#"{"nk": 9, "nd": 1, "start": "nothing"}"#
@@ -271,7 +271,7 @@ proptest! {
     #[test]
     #[cfg_attr(miri, ignore = "the filters of population take minutes there; tests/every_function.rs has few samples")]
     fn any_options_have_an_answer(
-        method in prop_oneof![Just("population"), Just("rpem"), Just("adaptive"), Just("rls"), Just("window"), Just("ekf")],
+        method in prop_oneof![Just("population"), Just("rpem"), Just("multiple-model"), Just("rls"), Just("window"), Just("ekf")],
         sample_time in prop_oneof![4 => Just(0.01), 1 => hostile_number()],
         given in prop::collection::btree_map(prop::sample::select(&NAMES[..]), hostile_value(), 0..5),
     ) {

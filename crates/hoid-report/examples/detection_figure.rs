@@ -1,5 +1,5 @@
 //! Draws the share of changes that are found against false alarms an hour, from the table that
-//! `cargo run --release -p hoid-track --example adaptive_evidence -- detection 40` prints:
+//! `cargo run --release -p hoid-track --example multiple_model_evidence -- detection 40` prints:
 //!
 //! `cargo run -p hoid-report --example detection_figure -- detection.txt > docs/src/images/detection.svg`
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
@@ -45,7 +45,7 @@ fn main() {
             within: Some((70.0, 101.0)),
             curves: vec![
                 curve(
-                    "log odds of adaptive",
+                    "log odds of multiple-model",
                     "log odds",
                     LineKind::Marked,
                     Shade::of_method(0),

@@ -282,8 +282,8 @@ fn a_batch_fit_beside_a_delay_that_changed_has_the_delay_of_its_span() {
         .unwrap()
         .run(RunSeed::default(), false)
         .unwrap();
-    let mut with_delay = options(Method::adaptive());
-    with_delay.orders = Method::adaptive().usual_orders(29);
+    let mut with_delay = options(Method::multiple_model());
+    with_delay.orders = Method::multiple_model().usual_orders(29);
     with_delay.method.set("track_delay", "0.2..0.4").unwrap();
     let trace = track(&record, &with_delay, 8).unwrap();
     let (_, fit) = batch_fit(&trace, &record, SPANS[1]).unwrap();

@@ -27,7 +27,7 @@ const DELAYS: [(&str, &str); 3] = [
 ];
 const WITH_DELAY: [&str; 6] = ["K_e", "T_L", "K_e_dot", "omega_nm", "zeta_nm", "tau_e"];
 /// Methods of which all cells are shown.
-const SHOWN: [&str; 5] = ["RLS", "RPEM", "physical", "adaptive", "two-sided"];
+const SHOWN: [&str; 5] = ["RLS", "RPEM", "physical", "multiple-model", "two-sided"];
 const CHANGING: [&str; 4] = ["C3", "C4", "C5", "C6"];
 const STEADY: [&str; 2] = ["C1", "C2"];
 
@@ -65,10 +65,10 @@ fn main() {
     println!("## Detection\n");
     tables.detection();
     println!("## Other changes\n");
-    tables.elsewhere(&OTHERS, &OPERATOR, &["adaptive"]);
+    tables.elsewhere(&OTHERS, &OPERATOR, &["multiple-model"]);
     println!("## Delays\n");
     let without_delay = std::mem::replace(&mut tables.names, every);
-    tables.elsewhere(&DELAYS, &WITH_DELAY, &["adaptive", "adaptive, delay"]);
+    tables.elsewhere(&DELAYS, &WITH_DELAY, &["multiple-model", "multiple-model, delay"]);
     tables.names = without_delay;
     println!("## All cells\n");
     tables.cells();
@@ -215,7 +215,7 @@ impl Tables {
             &["hours", "false alarms", "found within 5 s, %", "median lag, s"],
         );
         for conditions in [&STEADY[..], &["C4"], &["C6"], &["C3"], &["C5"]] {
-            let [alarms, hours, found, lag] = self.declared("adaptive", "all", conditions);
+            let [alarms, hours, found, lag] = self.declared("multiple-model", "all", conditions);
             let cells = [
                 format!("{hours:.2}"),
                 format!("{alarms}"),
@@ -276,7 +276,7 @@ impl Tables {
         for condition in ALL {
             let errors =
                 SHOWN.map(|name| OPERATOR.map(|p| self.medians(&format!("rms_{p}"), "all", &[condition], name)));
-            let rows = self.rows("rms_K_e", "all", &[condition], "adaptive");
+            let rows = self.rows("rms_K_e", "all", &[condition], "multiple-model");
             for (i, row) in rows.iter().enumerate() {
                 let cell = |of: &[Vec<f64>; 5]| {
                     let each = of.iter().map(|e| e.get(i).map_or("-".to_owned(), |e| short(*e)));
@@ -289,13 +289,13 @@ impl Tables {
         println!();
     }
 
-    /// Cells in which adaptive is worse than the better of RLS and RPEM.
+    /// Cells in which multiple-model is worse than the better of RLS and RPEM.
     fn above_one(&self) {
         let mut cells = Vec::new();
         for (p, label) in OPERATOR.iter().zip(LABELS) {
             let quantity = format!("rms_{p}");
-            let ratios = self.relative(&quantity, &CHANGING, "adaptive");
-            let rows = self.rows(&quantity, "all", &CHANGING, "adaptive");
+            let ratios = self.relative(&quantity, &CHANGING, "multiple-model");
+            let rows = self.rows(&quantity, "all", &CHANGING, "multiple-model");
             for (row, ratio) in rows.iter().zip(ratios).filter(|(_, ratio)| *ratio > 1.0) {
                 let (m, p_n) = (row.remnant_order, row.noise_level);
                 cells.push(format!(
@@ -309,7 +309,7 @@ impl Tables {
         } else {
             cells.join("; ")
         };
-        println!("Cells of C3 to C6 in which `adaptive` is above 1: {cells}.\n");
+        println!("Cells of C3 to C6 in which `multiple-model` is above 1: {cells}.\n");
     }
 }
 

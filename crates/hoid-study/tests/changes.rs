@@ -26,8 +26,8 @@ orders.nk = 29
 start_span_s = [0.0, 30.72]
 
 [[estimators]]
-name = "adaptive"
-method = "adaptive"
+name = "multiple-model"
+method = "multiple-model"
 orders.nk = 29
 orders.nd = 6
 start_span_s = [0.0, 30.72]
@@ -45,20 +45,20 @@ fn changes_there_and_back_are_found_and_measured() {
         row.statistics.mean
     };
     // Changes at 40.96 and 61.44 s; that at 81.92 s is beyond the last sample.
-    assert_eq!(mean("found", "adaptive"), 100.0);
-    assert!((0.4..3.0).contains(&mean("lag", "adaptive")));
+    assert_eq!(mean("found", "multiple-model"), 100.0);
+    assert!((0.4..3.0).contains(&mean("lag", "multiple-model")));
     // 51.2 s after the start fit, less 5 s of each change.
-    assert!((mean("hours", "adaptive") - 41.2 / 3600.0).abs() < 1e-6);
+    assert!((mean("hours", "multiple-model") - 41.2 / 3600.0).abs() < 1e-6);
     for p in ["K_e", "T_L", "K_e_dot"] {
         let (all, through) = (
-            mean(&format!("covered_{p}"), "adaptive"),
-            mean(&format!("covered_through_{p}"), "adaptive"),
+            mean(&format!("covered_{p}"), "multiple-model"),
+            mean(&format!("covered_through_{p}"), "multiple-model"),
         );
         assert!(
             (50.0..=100.0).contains(&all) && (0.0..=100.0).contains(&through),
             "{p}: {all} {through}"
         );
-        assert!(mean(&format!("before_{p}"), "adaptive").abs() < 20.0);
+        assert!(mean(&format!("before_{p}"), "multiple-model").abs() < 20.0);
     }
     // A recursion that declares nothing has neither hits nor false alarms.
     let silent = results.one(&Query::of("found").name("RLS"));

@@ -3,7 +3,7 @@
 //!
 //! `cargo run --release -p hoid-track --example conditions_evidence -- [RUNS] [M,..] [LEVEL,..] [METHOD,..]`
 //!
-//! Methods: `population` is told nothing; `adaptive`, `rls` and `rpem` are told the delay and start from a fit
+//! Methods: `population` is told nothing; `multiple-model`, `rls` and `rpem` are told the delay and start from a fit
 //! of the first 30.72 s (RLS and RPEM by the settings of the text). Their first rows are therefore not causal:
 //! the ratios are of the rows from then on, and those of 10 s on stand beside.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
@@ -71,7 +71,7 @@ fn tracker(name: &str, record: &Record) -> Tracker {
 fn follow(name: &str, cell: &Cell, record: &Record) -> Found {
     let truth = COLUMNS.map(|c| record.channel(c).unwrap());
     let mut tracker = tracker(name, record);
-    let moves_from = if name == "adaptive" { START_S - 0.005 } else { 0.0 };
+    let moves_from = if name == "multiple-model" { START_S - 0.005 } else { 0.0 };
     let (mut squares, mut rows) = ([[0.0; 5]; 2], [0.0; 2]);
     let (mut covered, mut counts) = ([[0.0; 5]; 3], [0.0; 3]);
     let (mut alarms, mut delay_s) = (0.0, f64::NAN);
@@ -131,7 +131,7 @@ fn main() {
     let (orders, levels, methods) = (
         numbers(of(1, "1,2")),
         numbers(of(2, "0.1")),
-        of(3, "adaptive,rls,rpem,population"),
+        of(3, "multiple-model,rls,rpem,population"),
     );
     let mut cells = Vec::new();
     for level in levels {

@@ -48,8 +48,11 @@ fn main() {
     let methods = [
         ("rpem, nk = 29", options(Method::rpem(), None)),
         ("rpem, tracked", options(Method::rpem(), Some(RANGE_S))),
-        ("adaptive, nk = 29", options(Method::adaptive(), None)),
-        ("adaptive, tracked", options(Method::adaptive(), Some(RANGE_S))),
+        ("multiple-model, nk = 29", options(Method::multiple_model(), None)),
+        (
+            "multiple-model, tracked",
+            options(Method::multiple_model(), Some(RANGE_S)),
+        ),
         ("physical, tracked", options(Method::physical(), Some(RANGE_S))),
     ];
     let orders: &[usize] = if tune { &[2, 3] } else { &[2] };

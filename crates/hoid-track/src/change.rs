@@ -1,4 +1,4 @@
-//! When a person changed: by the odds of the hypotheses of [`crate::Method::Adaptive`], and the
+//! When a person changed: by the odds of the hypotheses of [`crate::Method::MultipleModel`], and the
 //! published baseline.
 //!
 //! The baseline looks at the loop from outside: an adaptation is taken to be needed while the
@@ -6,7 +6,7 @@
 //! Hess, *Journal of Guidance, Control, and Dynamics* 32 (2009): three; here either signal raises
 //! the alarm, the rate by the difference of neighbouring samples).
 
-use hoid_core::adaptive::{change as kernel_change, hypothesis as kernel};
+use hoid_core::multiple_model::{change as kernel_change, hypothesis as kernel};
 use hoid_model::{SampleTime, uncertainty::Estimate};
 
 /// A change of the person that was declared.

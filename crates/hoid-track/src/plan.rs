@@ -283,7 +283,7 @@ mod tests {
             let start: Vec<String> = start.iter().map(|name| (*name).to_owned()).collect();
             ranges_of(method, Structure::BoxJenkins, &named.collect(), &start, ts)
         };
-        let tracked = Method::adaptive().with("track_delay", "0.2..0.3").unwrap();
+        let tracked = Method::multiple_model().with("track_delay", "0.2..0.3").unwrap();
         let found = of(&tracked, &[], &[]).unwrap();
         assert_eq!((found.nd, found.nk), (6..=6, 21..=31));
         let found = of(&tracked, &[("nk", 29..=29), ("nd", 1..=2)], &[]).unwrap();

@@ -2,8 +2,8 @@
 //! polynomials of the exact hold and the operator.
 
 use hoid_core::{
-    adaptive::prior::OPERATOR,
     held_operator::held_operator,
+    multiple_model::prior::OPERATOR,
     state::{State, visit_all},
 };
 use hoid_model::{

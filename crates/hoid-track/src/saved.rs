@@ -153,7 +153,7 @@ mod tests {
         let mut cases = vec![
             TrackOptions::new(Method::rls(), Structure::Arx, Structure::Arx.operator_orders(29)),
             of(Method::physical()),
-            of(Method::adaptive()),
+            of(Method::multiple_model()),
             TrackOptions::usual(Method::population(), 29),
             of(Method::fused()),
             of(Method::ekf()),
@@ -161,7 +161,9 @@ mod tests {
             of(Method::window()).with(&[("refit", "400")]).unwrap(),
             of(Method::rriv()).with(&[("instruments", "f_t")]).unwrap(),
             of(Method::physical()).with(&[("track_delay", "0.2..0.35")]).unwrap(),
-            of(Method::adaptive()).with(&[("track_delay", "0.2..0.35")]).unwrap(),
+            of(Method::multiple_model())
+                .with(&[("track_delay", "0.2..0.35")])
+                .unwrap(),
             of(Method::rpem()).with(&[("track_delay", "0.2..0.35")]).unwrap(),
         ];
         for forgetting in [

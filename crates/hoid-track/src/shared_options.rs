@@ -117,7 +117,7 @@ settings! {
     /// A delay that is followed.
     pub struct DelayOptions {
         /// Follow the delay tau_e too, within this range: as a parameter by physical, in whole
-        /// samples by rpem and adaptive
+        /// samples by rpem and multiple-model
         #[setting(name("track_delay"), unit("s"), bounds(Bounds::NonNegative), default("nk stays"))]
         pub track_delay_s: Option<(f64, f64)> = None,
     }

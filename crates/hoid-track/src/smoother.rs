@@ -1,7 +1,7 @@
 //! The two-sided estimate of a recorded run: what all of its samples say of the operator at each of
 //! them.
 //!
-//! Behind the whitening filter the model of [`hoid_core::adaptive`] has no dynamics:
+//! Behind the whitening filter the model of [`hoid_core::multiple_model`] has no dynamics:
 //! `y(t) = K_e psi_1 + K_e_dot psi_2 + eps`, with signals that the record gives once for all. The
 //! bank of hypotheses may therefore be run over it from either end. At t the run from the front
 //! says `p(eta_t | y_1..y_t) = sum_f P(f) N(m_f, P_f)`, where f says when the person changed last,
@@ -25,7 +25,7 @@
 //!
 //! There is time for more hypotheses here: one is born every 0.08 s, and there is room for 64.
 
-use hoid_core::adaptive::{
+use hoid_core::multiple_model::{
     bank::Bank,
     hypothesis::Hypothesis,
     prior::{ChangePrior, OPERATOR},
@@ -36,7 +36,7 @@ use hoid_model::Record;
 
 use crate::{
     Trace,
-    methods::{AdaptiveOptions, Method, change_prior, first_hypothesis, outside},
+    methods::{Method, MultipleModelOptions, change_prior, first_hypothesis, outside},
     reported::Reported,
     setup::Setup,
     start::StartState,
@@ -102,7 +102,7 @@ type Seen = Option<(f64, Signals)>;
 /// [`IdentError::BadStart`] for a start that cannot be used.
 pub(crate) fn smooth(record: &Record, trace: &mut Trace, from: &StartState) -> Result<(), IdentError> {
     let (options, setup) = (trace.options.clone(), trace.options.setup()?);
-    let Method::Adaptive(own) = &options.method else {
+    let Method::MultipleModel(own) = &options.method else {
         return Ok(());
     };
     let rows = kept_rows(record.len(), trace.every);
@@ -140,7 +140,7 @@ fn kept_rows(samples: usize, every: usize) -> Vec<usize> {
 /// The mixtures of pairs at the samples asked for, ascending.
 fn two_sided(
     record: &Record,
-    options: &AdaptiveOptions,
+    options: &MultipleModelOptions,
     setup: &Setup,
     largest: f64,
     from: &StartState,

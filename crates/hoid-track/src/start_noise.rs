@@ -72,9 +72,9 @@ mod tests {
 
     /// Bounds that the Box-Jenkins fit cannot keep lead to the grey box.
     fn outside() -> TrackOptions {
-        let mut options = TrackOptions::usual(Method::adaptive(), 29);
+        let mut options = TrackOptions::usual(Method::multiple_model(), 29);
         let narrow = BTreeMap::from([("omega_nm".to_owned(), Constraint::Between(20.0, 30.0))]);
-        if let Method::Adaptive(own) = &mut options.method {
+        if let Method::MultipleModel(own) = &mut options.method {
             own.bounds.bound = narrow;
         }
         options

@@ -313,7 +313,7 @@ impl Tracker {
     }
 
     /// Logarithm of the odds that the person changed within the last four seconds, by
-    /// [`crate::Method::Adaptive`].
+    /// [`crate::Method::MultipleModel`].
     pub fn change_odds(&self) -> Option<f64> {
         self.recursion.change_odds()
     }

@@ -39,7 +39,7 @@ fn saved() -> &'static Saved {
             TrackOptions::new(Method::rls(), Structure::Arx, Structure::Arx.operator_orders(29)),
             of(Method::rpem()),
             of(Method::physical()),
-            of(Method::adaptive()),
+            of(Method::multiple_model()),
             of(Method::ekf()),
             of(Method::window()).with(&[("refit", "400")]).unwrap(),
         ];

@@ -66,7 +66,7 @@ fn main() {
             let who = [Who::C1, Who::Person, Who::C2, Who::Person][i as usize % 4];
             // The case decides what kind of person: each in turn.
             let case = FIRST_CLEAN + i / 2;
-            let tracker = [Way::Adaptive, Way::Physical, Way::Rpem, Way::Rls][i as usize / 4 % 4];
+            let tracker = [Way::MultipleModel, Way::Physical, Way::Rpem, Way::Rls][i as usize / 4 % 4];
             let batch = [Way::GreyBox, Way::BoxJenkins][i as usize / 4 % 2];
             let such: Vec<Way> = ways
                 .iter()

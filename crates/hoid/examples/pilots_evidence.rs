@@ -245,7 +245,9 @@ fn main() {
     let runs = arguments.next().unwrap_or_else(|| "all".to_owned());
     let mut methods: Vec<String> = arguments.collect();
     if methods.is_empty() {
-        methods = ["population", "adaptive", "rls", "rpem"].map(str::to_owned).to_vec();
+        methods = ["population", "multiple-model", "rls", "rpem"]
+            .map(str::to_owned)
+            .to_vec();
     }
     let references = references(folder);
     let names = pilots::names(folder, &runs);

@@ -31,7 +31,12 @@ fn main() {
         }
     }
     if methods.is_empty() {
-        methods = vec![Method::physical(), Method::adaptive(), Method::rls(), Method::rpem()];
+        methods = vec![
+            Method::physical(),
+            Method::multiple_model(),
+            Method::rls(),
+            Method::rpem(),
+        ];
     }
     let seeds = numbers.first().copied().unwrap_or(4);
     let first = numbers.get(1).copied().unwrap_or(1000);

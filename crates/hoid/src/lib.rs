@@ -22,7 +22,7 @@
 //! println!("{}", choice.fit);
 //! println!("{}", choice.fit.validate(&records[0])?);
 //!
-//! let options = TrackOptions::usual(Method::adaptive(), choice.fit.orders().nk);
+//! let options = TrackOptions::usual(Method::multiple_model(), choice.fit.orders().nk);
 //! let trace = track(&records[0], &options, 10)?;            // every tenth sample
 //! println!("{trace}");
 //!

@@ -65,12 +65,12 @@ fn mean(all: &[[[f64; 5]; 2]], what: usize, i: usize) -> f64 {
 
 #[test]
 fn the_two_sided_estimate_is_closer_and_its_bands_hold() {
-    let two_sided = options(Method::adaptive()).with(&[("smooth", "true")]).unwrap();
+    let two_sided = options(Method::multiple_model()).with(&[("smooth", "true")]).unwrap();
     let (mut causal, mut smooth) = (Vec::new(), Vec::new());
     for condition in [Condition::C3, Condition::C4, Condition::C5, Condition::C6] {
         for replication in 0..3 {
             let record = run(condition, 2, 0.1, replication);
-            causal.push(errors(&record, &options(Method::adaptive())));
+            causal.push(errors(&record, &options(Method::multiple_model())));
             smooth.push(errors(&record, &two_sided));
         }
     }
@@ -123,7 +123,7 @@ fn a_delay_that_changes_is_followed_and_named() {
     scenario.realisation = hoid::model::scenario::Realisation::Output;
     scenario.last.operator.tau_e_s = 0.34;
     let simulator = Simulator::new(&scenario).unwrap();
-    let tracked = options(Method::adaptive())
+    let tracked = options(Method::multiple_model())
         .with(&[("track_delay", "0.2..0.4")])
         .unwrap();
     for replication in 0..2 {
@@ -155,8 +155,8 @@ fn a_delay_that_changes_is_followed_and_named() {
             .to_string()
     };
     let with = |range| {
-        let mut options = options(Method::adaptive());
-        if let Method::Adaptive(own) = &mut options.method {
+        let mut options = options(Method::multiple_model());
+        if let Method::MultipleModel(own) = &mut options.method {
             own.delay.track_delay_s = Some(range);
         }
         options
@@ -173,7 +173,7 @@ fn a_delay_that_changes_is_followed_and_named() {
 
 #[test]
 fn what_has_a_model_of_the_change_takes_no_memory() {
-    for method in [Method::ekf(), Method::ukf(), Method::adaptive()] {
+    for method in [Method::ekf(), Method::ukf(), Method::multiple_model()] {
         for (name, text) in [("memory", "256"), ("covariance", "0.1")] {
             let refused = options(method.clone()).with(&[(name, text)]).unwrap_err().to_string();
             assert!(refused.contains(name) && refused.contains("rpem"), "{refused}");

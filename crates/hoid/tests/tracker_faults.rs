@@ -36,7 +36,7 @@ fn effects(references: &[(Run, Reference)], fault: &Fault, at_s: f64) -> Vec<Eff
 #[test]
 fn an_outlier_moves_no_parameter_by_half_a_standard_error_for_a_second() {
     use Signal::{E, U};
-    for method in [Method::physical(), Method::adaptive(), Method::rpem()] {
+    for method in [Method::physical(), Method::multiple_model(), Method::rpem()] {
         let references = references(&method, 70..73, 120.0);
         for (signal, size, seconds, at_s) in [
             (E, 7.0, 0.0, 61.37),
@@ -60,7 +60,7 @@ fn an_outlier_moves_no_parameter_by_half_a_standard_error_for_a_second() {
 
 #[test]
 fn after_a_hostile_span_the_estimate_comes_back_by_itself() {
-    for method in [Method::physical(), Method::adaptive()] {
+    for method in [Method::physical(), Method::multiple_model()] {
         let references = references(&method, 80..82, 200.0);
         for (fault, at_s) in [
             (

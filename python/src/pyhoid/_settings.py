@@ -21,7 +21,7 @@ RecursiveMethod = Literal[
     "physical",
     "window",
     "rriv",
-    "adaptive",
+    "multiple-model",
     "population",
     "fused",
     "ekf",
@@ -52,7 +52,7 @@ class MethodSettings(TypedDict, total=False):
     covariance: float | None
 
     # Standard deviations beyond which an innovation moves the estimate no further. For rls,
-    # rpem, physical, adaptive, population, fused.
+    # rpem, physical, multiple-model, population, fused.
     limit: float | None
 
     # How far each variance in P may grow where nothing excites its parameter, as a multiple of
@@ -93,7 +93,7 @@ class MethodSettings(TypedDict, total=False):
     rate: float | None
 
     # Guard: outliers of e and u are held back, spans that no tracking makes are left out, and
-    # the estimate begins again after them. For rls, rpem, physical, adaptive, population.
+    # the estimate begins again after them. For rls, rpem, physical, multiple-model, population.
     guard: Literal["yes", "no"] | None
 
     # Signals of psi: gradient (D/(C F) as one filter), cascade (1/F before D/C; for
@@ -104,11 +104,11 @@ class MethodSettings(TypedDict, total=False):
     stable: Literal["predictor", "noise"] | None
 
     # Follow the delay tau_e too, within this range: as a parameter by physical, in whole
-    # samples by rpem and adaptive. For rpem, physical, adaptive.
+    # samples by rpem and multiple-model. For rpem, physical, multiple-model.
     track_delay: tuple[float, float] | None
 
     # Bounds of physical parameters, as omega_nm=5..30,zeta_nm=0.1..2; an end may be left open.
-    # For physical, adaptive, ekf, ukf.
+    # For physical, multiple-model, ekf, ukf.
     bound: Mapping[str, tuple[float | None, float | None]] | None
 
     # Length of the window: samples or seconds. For window.
@@ -120,11 +120,11 @@ class MethodSettings(TypedDict, total=False):
     # Channel of the signal from outside the loop of which the instruments are made. For rriv.
     instruments: str | None
 
-    # Logarithm of the odds from which a change is declared. For adaptive.
+    # Logarithm of the odds from which a change is declared. For multiple-model.
     alarm: float | None
 
     # At each sample what all of a recorded run says of it, by hypotheses run from both ends, in
-    # place of what the past alone says. For adaptive.
+    # place of what the past alone says. For multiple-model.
     smooth: bool | None
 
     # False alarms in an hour that are accepted: a lower number finds fewer changes, later. For
@@ -147,7 +147,7 @@ METHODS = """``"rls"``: recursive least squares;
         ``"physical"``: recursive prediction-error method in the operator's parameters;
         ``"window"``: a batch fit of the last seconds, again and again;
         ``"rriv"``: recursive refined instrumental variable;
-        ``"adaptive"``: a bank of hypotheses of when the person changed, which sets its memory
+        ``"multiple-model"``: a bank of hypotheses of when the person changed, which sets its memory
         itself and tells of changes;
         ``"population"``: gains in a basis that people share, with a noise model of its own;
         starts without a fit;
@@ -161,7 +161,7 @@ SETTINGS = """covariance : float
             variance (the reference text: 0.1). For rls, rpem, physical, fused.
         limit : float
             Standard deviations beyond which an innovation moves the estimate no further. For
-            rls, rpem, physical, adaptive, population, fused.
+            rls, rpem, physical, multiple-model, population, fused.
         windup_guard : float | Literal['off']
             How far each variance in P may grow where nothing excites its parameter, as a
             multiple of what it is at the start; off: without end. For rls, rpem, physical.
@@ -184,7 +184,7 @@ SETTINGS = """covariance : float
             For forgetting by the gradient: step size. For rls, rpem, physical.
         guard : Literal['yes', 'no']
             Guard: outliers of e and u are held back, spans that no tracking makes are left out,
-            and the estimate begins again after them. For rls, rpem, physical, adaptive,
+            and the estimate begins again after them. For rls, rpem, physical, multiple-model,
             population.
         regressor : Literal['gradient', 'cascade', 'pseudo-linear']
             Signals of psi: gradient (D/(C F) as one filter), cascade (1/F before D/C; for
@@ -194,10 +194,10 @@ SETTINGS = """covariance : float
             fused.
         track_delay : tuple[float, float]
             Follow the delay tau_e too, within this range: as a parameter by physical, in whole
-            samples by rpem and adaptive. For rpem, physical, adaptive.
+            samples by rpem and multiple-model. For rpem, physical, multiple-model.
         bound : Mapping[str, tuple[float | None, float | None]]
             Bounds of physical parameters, as omega_nm=5..30,zeta_nm=0.1..2; an end may be left
-            open. For physical, adaptive, ekf, ukf.
+            open. For physical, multiple-model, ekf, ukf.
         window : float | str
             Length of the window: samples or seconds. For window.
         refit : int
@@ -206,10 +206,10 @@ SETTINGS = """covariance : float
             Channel of the signal from outside the loop of which the instruments are made. For
             rriv.
         alarm : float
-            Logarithm of the odds from which a change is declared. For adaptive.
+            Logarithm of the odds from which a change is declared. For multiple-model.
         smooth : bool
             At each sample what all of a recorded run says of it, by hypotheses run from both
-            ends, in place of what the past alone says. For adaptive.
+            ends, in place of what the past alone says. For multiple-model.
         false_alarms : float
             False alarms in an hour that are accepted: a lower number finds fewer changes,
             later. For population.

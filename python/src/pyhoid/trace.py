@@ -189,7 +189,7 @@ class Trace:
 
     @property
     def changes(self) -> list[dict[str, Any]]:
-        """The changes that ``"population"`` or ``"adaptive"`` declared.
+        """The changes that ``"population"`` or ``"multiple-model"`` declared.
 
         Each has its time `t`, how long ago it was, the odds, what changed (`changed`), and the
         gains before and after with their standard errors.

@@ -55,7 +55,7 @@ def track(
 
     Without options this is ``"population"``: gains in a basis that people share. It needs no start
     fit, speaks from the second second on, and is made for recorded people. Where the form of the
-    operator and its delay are known, ``"adaptive"`` is more precise.
+    operator and its delay are known, ``"multiple-model"`` is more precise.
 
     Parameters
     ----------

@@ -164,7 +164,7 @@ mod tests {
         for method in [
             Method::rls(),
             Method::physical(),
-            Method::adaptive(),
+            Method::multiple_model(),
             Method::population(),
         ] {
             let own = OfMethod(method);

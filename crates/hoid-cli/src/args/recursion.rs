@@ -27,7 +27,7 @@ pub struct RecursionArgs {
     #[arg(long, value_name = "NAME", value_parser = choice_of(&Structure::ALL))]
     pub structure: Option<Structure>,
     /// Orders, each a number or a range to search on the start span, as nb=2,nc=0,nd=1..4,nf=2
-    /// [default: the operator's: bj nb=2,nd=1..4,nf=2, for population nd=16, for adaptive nd=6; arx
+    /// [default: the operator's: bj nb=2,nd=1..4,nf=2, for population nd=16, for multiple-model nd=6; arx
     /// na=2,nb=2]
     #[arg(long, value_name = "LIST")]
     pub orders: Option<String>,

@@ -131,7 +131,7 @@ mod tests {
         let settings = FmuSettings::new(FmuKind::Tracker)
             .with_fit("{}".to_owned())
             .with("sample_time", FmuStart::Real(0.02))
-            .with("method", FmuStart::Text("adaptive".to_owned()));
+            .with("method", FmuStart::Text("multiple-model".to_owned()));
         let back = FmuSettings::parse(&settings.text()).unwrap();
         assert_eq!(back.variables().unwrap()[0].start, FmuStart::Real(0.02));
         assert_eq!(back, settings);

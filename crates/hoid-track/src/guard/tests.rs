@@ -31,7 +31,7 @@ fn tracker(options: &TrackOptions, record: &Record) -> Tracker {
 
 const GUARDED: [fn() -> Method; 5] = [
     Method::physical,
-    Method::adaptive,
+    Method::multiple_model,
     Method::population,
     Method::rls,
     Method::rpem,
@@ -61,7 +61,7 @@ fn it_stands_before_methods_of_a_person_by_default() {
     for method in Method::all() {
         let expected = matches!(
             method,
-            Method::Physical(_) | Method::Adaptive(_) | Method::Population(_)
+            Method::Physical(_) | Method::MultipleModel(_) | Method::Population(_)
         );
         assert_eq!(method.inner().is_guarded(), expected, "{method}");
     }
@@ -73,7 +73,7 @@ fn it_stands_before_methods_of_a_person_by_default() {
 #[test]
 fn a_jump_that_stays_is_taken_as_if_nothing_had_been() {
     let record = record(5);
-    for method in [Method::physical(), Method::adaptive()] {
+    for method in [Method::physical(), Method::multiple_model()] {
         let mut with = tracker(&options(method.clone(), "yes"), &record);
         let mut without = tracker(&options(method, "no"), &record);
         let mut accepted = 0;

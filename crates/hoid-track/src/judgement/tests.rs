@@ -38,7 +38,7 @@ fn a_change_inside_the_start_span_is_told() {
     let record = simulated(Condition::C4);
     for (span, changes) in [((10.0, 36.0), false), ((25.0, 60.0), true)] {
         for (method, severity) in [
-            (Method::adaptive(), Severity::Doubt),
+            (Method::multiple_model(), Severity::Doubt),
             (Method::physical(), Severity::Note),
         ] {
             let options = TrackOptions {

@@ -1,8 +1,8 @@
 //! The recursive methods. A new one is a file beside these and a line in the list below.
 
-mod adaptive;
 mod fused;
 mod joint_filter;
+mod multiple_model;
 mod physical;
 mod population;
 mod rls;
@@ -24,9 +24,9 @@ use crate::{
     person_prior::PersonPrior,
 };
 
-pub use adaptive::AdaptiveOptions;
 pub use fused::FusedOptions;
 pub use joint_filter::{EkfOptions, UkfOptions};
+pub use multiple_model::MultipleModelOptions;
 pub use physical::PhysicalOptions;
 pub use population::PopulationOptions;
 pub use rls::RlsOptions;
@@ -34,7 +34,7 @@ pub use rpem::RpemOptions;
 pub use rriv::RrivOptions;
 pub use window::WindowOptions;
 
-pub(crate) use adaptive::{change_prior, first_hypothesis, outside};
+pub(crate) use multiple_model::{change_prior, first_hypothesis, outside};
 
 macro_rules! methods {
     ($($(#[doc = $doc:literal])+ $variant:ident($options:ident) = $name:ident),+ $(,)?) => {
@@ -91,7 +91,7 @@ methods! {
     Rriv(RrivOptions) = rriv,
     /// A bank of hypotheses of when the person changed, in physical parameters: Box-Jenkins with nc
     /// = 0.
-    Adaptive(AdaptiveOptions) = adaptive,
+    MultipleModel(MultipleModelOptions) = multiple_model,
     /// Gains in a basis that people share: Box-Jenkins with nc = 0.
     Population(PopulationOptions) = population,
     /// Recursive least squares for B with the poles of the recursive prediction-error method:
@@ -238,7 +238,7 @@ impl Method {
     }
 
     /// The operator's orders with the noise model that the method takes when none is named: of
-    /// order 1, for adaptive of order 6, for its odds need innovations that are white.
+    /// order 1, for multiple-model of order 6, for its odds need innovations that are white.
     pub fn usual_orders(&self, nk: usize) -> Orders {
         let orders = self.usual_structure().operator_orders(nk);
         match self.usual_nd() {
@@ -355,10 +355,13 @@ mod tests {
     #[test]
     fn what_belongs_to_another_method_is_refused_by_name() {
         let refused = Method::rls().with("alarm", "3").unwrap_err().to_string();
-        assert!(refused.contains("alarm") && refused.contains("adaptive"), "{refused}");
+        assert!(
+            refused.contains("alarm") && refused.contains("multiple-model"),
+            "{refused}"
+        );
         let refused = Method::rls().with("colour", "3").unwrap_err().to_string();
         assert!(refused.contains("memory"), "{refused}");
-        let set = Method::adaptive().with("alarm", "3").unwrap();
+        let set = Method::multiple_model().with("alarm", "3").unwrap();
         assert_eq!(set.settings().get("alarm").as_deref(), Some("3"));
     }
 }

@@ -67,9 +67,9 @@ fn options() -> TrackOptions {
     TrackOptions {
         start: StartAt::Span(Some((0.0, 30.72))),
         ..TrackOptions::new(
-            Method::adaptive().with("smooth", "true").unwrap(),
-            Method::adaptive().usual_structure(),
-            Method::adaptive().usual_orders(29),
+            Method::multiple_model().with("smooth", "true").unwrap(),
+            Method::multiple_model().usual_structure(),
+            Method::multiple_model().usual_orders(29),
         )
     }
 }
@@ -139,7 +139,7 @@ fn a_record_with_faults_and_one_that_is_too_short() {
 
 #[test]
 fn other_methods_have_no_two_sided_estimate() {
-    for method in Method::all().into_iter().filter(|m| *m != Method::adaptive()) {
+    for method in Method::all().into_iter().filter(|m| *m != Method::multiple_model()) {
         let name = method.name();
         assert!(method.with("smooth", "true").is_err(), "{name}");
     }

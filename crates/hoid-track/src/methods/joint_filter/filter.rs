@@ -1,8 +1,8 @@
 //! The filter of state and parameters over samples: start, bounds, restarts.
 
 use hoid_core::{
-    adaptive::prior::OPERATOR,
     delay::DelayLine,
+    multiple_model::prior::OPERATOR,
     state::{State, visit_all},
 };
 use hoid_ident::IdentError;

@@ -22,7 +22,7 @@
 //! The noise of both is in proportion to the variance of the remnant of the start fit, `sigma^2`
 //! times the power of the impulse response of 1/D, and the drift in proportion to the start values;
 //! the factors were set on conditions C3 and C5 with remnants of order 2 and 3, as those of the
-//! method adaptive were.
+//! method multiple-model were.
 
 mod belief;
 mod ekf;
@@ -34,7 +34,7 @@ use std::collections::BTreeMap;
 use hoid_ident::{Constraint, IdentError, settings};
 use hoid_model::{SampleTime, Structure};
 
-use super::adaptive::check_model_of_change;
+use super::multiple_model::check_model_of_change;
 use crate::{
     memory::Memory,
     method::{About, RecursiveMethod},

@@ -5,7 +5,7 @@ use super::{
     filter::power,
     ukf,
 };
-use hoid_core::adaptive::response::Response;
+use hoid_core::multiple_model::response::Response;
 
 const MODEL: Model = Model {
     ts: 0.01,

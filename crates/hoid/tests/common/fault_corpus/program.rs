@@ -29,7 +29,7 @@ pub enum Way {
     /// `identify --structure bj`.
     BoxJenkins,
     Population,
-    Adaptive,
+    MultipleModel,
     Physical,
     Rls,
     Rpem,
@@ -40,7 +40,7 @@ impl Way {
         Self::GreyBox,
         Self::BoxJenkins,
         Self::Population,
-        Self::Adaptive,
+        Self::MultipleModel,
         Self::Physical,
         Self::Rls,
         Self::Rpem,
@@ -51,7 +51,7 @@ impl Way {
             Self::GreyBox => "grey-box",
             Self::BoxJenkins => "bj",
             Self::Population => "population",
-            Self::Adaptive => "adaptive",
+            Self::MultipleModel => "multiple-model",
             Self::Physical => "physical",
             Self::Rls => "rls",
             Self::Rpem => "rpem",
@@ -65,7 +65,7 @@ impl Way {
     /// Those that a run is evaluated by: the grey box knows all operators, the others a gain with a
     /// lead; of people, by the three that are meant for them.
     pub fn of(base: &Base) -> &'static [Self] {
-        const LEAD: [Way; 4] = [Way::GreyBox, Way::Population, Way::Adaptive, Way::Physical];
+        const LEAD: [Way; 4] = [Way::GreyBox, Way::Population, Way::MultipleModel, Way::Physical];
         match (base.who, base.form) {
             (Who::C1 | Who::C2, _) => &Self::ALL,
             (Who::Person, hoid::model::Form::Lead) => &LEAD,

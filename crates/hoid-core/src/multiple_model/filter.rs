@@ -21,7 +21,7 @@ const LARGEST_MOVE: f64 = 0.1;
 /// The recursion. M is the largest number of hypotheses, D the largest order of the noise model, B
 /// the memory for the signals of every delay.
 #[derive(Debug, Clone, PartialEq)]
-pub struct AdaptiveFilter<const M: usize, const D: usize, B = [Signals; 1]> {
+pub struct MultipleModelFilter<const M: usize, const D: usize, B = [Signals; 1]> {
     bank: Bank<M>,
     response: Response,
     ring: SignalRing<B>,
@@ -34,11 +34,11 @@ pub struct AdaptiveFilter<const M: usize, const D: usize, B = [Signals; 1]> {
     restarts: u64,
 }
 
-crate::state!([const M: usize, const D: usize, B: AsMut<[Signals]>] AdaptiveFilter<M, D, B> {
+crate::state!([const M: usize, const D: usize, B: AsMut<[Signals]>] MultipleModelFilter<M, D, B> {
     bank, response, ring, d, order, u, past, restarts,
 });
 
-impl<const M: usize, const D: usize> AdaptiveFilter<M, D> {
+impl<const M: usize, const D: usize> MultipleModelFilter<M, D> {
     /// Starts from one hypothesis with filters at rest, for a delay that is known. `None` when the
     /// order of the noise model is above D, and as [`Bank::new`].
     pub fn new(first: Hypothesis, d: &[f64], prior: ChangePrior) -> Option<Self> {
@@ -46,8 +46,8 @@ impl<const M: usize, const D: usize> AdaptiveFilter<M, D> {
     }
 }
 
-impl<const M: usize, const D: usize, B: AsRef<[Signals]> + AsMut<[Signals]>> AdaptiveFilter<M, D, B> {
-    /// As [`AdaptiveFilter::new`] with several candidate delays. `None` too when the memory is not
+impl<const M: usize, const D: usize, B: AsRef<[Signals]> + AsMut<[Signals]>> MultipleModelFilter<M, D, B> {
+    /// As [`MultipleModelFilter::new`] with several candidate delays. `None` too when the memory is not
     /// of [`DelayPrior::count`](super::prior::DelayPrior::count) signals.
     pub fn with_delays(first: Hypothesis, d: &[f64], prior: ChangePrior, memory: B) -> Option<Self> {
         let ring = SignalRing::new(memory);
@@ -85,7 +85,7 @@ impl<const M: usize, const D: usize, B: AsRef<[Signals]> + AsMut<[Signals]>> Ada
         }
     }
 
-    /// As [`AdaptiveFilter::step`], but the estimate stays: only the filters move on.
+    /// As [`MultipleModelFilter::step`], but the estimate stays: only the filters move on.
     pub fn step_without_update(&mut self, x: f64, u: f64) -> Step {
         self.bank.skip();
         let signals = self.response.step(x);
@@ -99,7 +99,7 @@ impl<const M: usize, const D: usize, B: AsRef<[Signals]> + AsMut<[Signals]>> Ada
         }
     }
 
-    /// As [`AdaptiveFilter::step_without_update`] where the output is missing: the one-step
+    /// As [`MultipleModelFilter::step_without_update`] where the output is missing: the one-step
     /// prediction takes its place.
     pub fn bridge(&mut self, x: f64) {
         self.bank.skip();

@@ -9,13 +9,13 @@ use common::{
     operator::{S1, TS, diagonal, prior_of},
 };
 use hoid_core::{
-    adaptive::{
-        AdaptiveFilter,
+    innovation_variance::InnovationVariance,
+    multiple_model::{
+        MultipleModelFilter,
         hypothesis::Hypothesis,
         prior::{ChangePrior, DelayPrior},
         response::{Response, Signals},
     },
-    innovation_variance::InnovationVariance,
 };
 
 /// Number of candidate delays.
@@ -23,7 +23,7 @@ const COUNT: usize = 16;
 const D: [f64; 1] = [-0.85];
 const DEVIATION: f64 = 0.02;
 
-type Bank = AdaptiveFilter<48, 4, Vec<Signals>>;
+type Bank = MultipleModelFilter<48, 4, Vec<Signals>>;
 
 const OPEN: DelayPrior = DelayPrior {
     count: COUNT,
@@ -43,7 +43,7 @@ fn first(spread: [f64; 4]) -> Hypothesis {
 }
 
 fn bank(later: usize, delay: DelayPrior) -> Bank {
-    AdaptiveFilter::with_delays(
+    MultipleModelFilter::with_delays(
         first(SPREAD).with_extra_delay(later),
         &D,
         prior_of(delay),
@@ -86,8 +86,10 @@ fn a_delay_that_is_not_questioned_is_a_delay_line() {
         ..OPEN
     };
     let memory = vec![[0.0; 6]; COUNT];
-    let mut one: Bank = AdaptiveFilter::with_delays(first.with_extra_delay(5), &D, prior_of(silent), memory).unwrap();
-    let mut other: AdaptiveFilter<48, 4> = AdaptiveFilter::new(first, &D, prior_of(DelayPrior::KNOWN)).unwrap();
+    let mut one: Bank =
+        MultipleModelFilter::with_delays(first.with_extra_delay(5), &D, prior_of(silent), memory).unwrap();
+    let mut other: MultipleModelFilter<48, 4> =
+        MultipleModelFilter::new(first, &D, prior_of(DelayPrior::KNOWN)).unwrap();
     let data = operator(4000, 3, |k| if k < 2000 { 5 } else { 6 });
     for (k, &(x, u)) in data.iter().enumerate() {
         let delayed = k.checked_sub(5).map_or(0.0, |past| data[past].0);

@@ -1,6 +1,6 @@
 //! The numbers of the page "A person who changes" of the book that take too long for a test.
 //!
-//! `cargo run --release -p hoid-track --example adaptive_evidence -- detection|tune|set|cost [RUNS]`
+//! `cargo run --release -p hoid-track --example multiple_model_evidence -- detection|tune|set|cost [RUNS]`
 //! or `-- joined FIRST.csv SECOND.csv ..`, pairs of recordings with the columns t, r, u and y that
 //! are joined in the middle
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
@@ -167,7 +167,7 @@ fn alarms(statistic: &Statistic, threshold: f64, changes: bool) -> (Option<f64>,
 fn detection(runs: usize) {
     let statistics = |record: &Record| -> [Statistic; 2] {
         let span = record.span(0.0, START_S).unwrap();
-        let options = options(Method::adaptive());
+        let options = options(Method::multiple_model());
         let mut tracker = Tracker::new(&options, Some(&span), record.sample_time()).unwrap();
         let mut baseline = ErrorThreshold::new(span.input(), record.sample_time()).unwrap();
         let mut both = [Vec::new(), Vec::new()];
@@ -293,10 +293,10 @@ fn tune(runs: usize) {
     }
 }
 
-/// Cells on which `adaptive` is set: C3 and C5, C1 and C2, and changes of the neuromuscular system
+/// Cells on which `multiple-model` is set: C3 and C5, C1 and C2, and changes of the neuromuscular system
 /// that are not those of the plan. Errors: geometric mean over the cells of the median run.
 fn set(runs: usize) {
-    let options = options(Method::adaptive());
+    let options = options(Method::multiple_model());
     let neuromuscular = |omega: f64, zeta: f64| {
         move |scenario: &mut Scenario| {
             scenario.last.operator.omega_nm_rad_s = omega;
@@ -431,7 +431,7 @@ fn joined(files: &[String]) {
         let span = record.span(0.0, start_s).unwrap();
         // The delay of the least innovation variance of the start fit.
         let fits = (8..=26).filter_map(|nk| {
-            let m = Method::adaptive();
+            let m = Method::multiple_model();
             let options = TrackOptions::new(m.clone(), m.usual_structure(), m.usual_orders(nk));
             Tracker::new(&options, Some(&span), sample_time).ok()
         });
@@ -489,7 +489,7 @@ fn cost(runs: usize) {
     let simulator = simulator(Condition::C4, 2, 0.1);
     let record = run(&simulator, Condition::C4, 2, 1, 0);
     let span = record.span(0.0, START_S).unwrap();
-    let tracked = options(Method::adaptive())
+    let tracked = options(Method::multiple_model())
         .with(&[("track_delay", "0.2..0.4")])
         .unwrap();
     let methods = [
@@ -499,7 +499,7 @@ fn cost(runs: usize) {
         Method::physical(),
         Method::ekf(),
         Method::ukf(),
-        Method::adaptive(),
+        Method::multiple_model(),
     ];
     for options in methods.map(options).into_iter().chain([tracked]) {
         let mut least = f64::INFINITY;

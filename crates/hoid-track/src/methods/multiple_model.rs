@@ -1,4 +1,4 @@
-//! The bank of hypotheses of the real-time kernel ([`hoid_core::adaptive`]) behind the face of a
+//! The bank of hypotheses of the real-time kernel ([`hoid_core::multiple_model`]) behind the face of a
 //! recursion: what it supposes of a person, in seconds.
 //!
 //! Where the delay is tracked, other delays are proposed every 1.28 s.
@@ -9,14 +9,14 @@
 use std::{collections::BTreeMap, ops::RangeInclusive};
 
 use hoid_core::{
-    adaptive::{
-        AdaptiveFilter,
+    delay::DelayLine,
+    innovation_variance::InnovationVariance,
+    multiple_model::{
+        MultipleModelFilter,
         hypothesis::Hypothesis,
         prior::{ChangePrior, DelayPrior, OPERATOR},
         response::Signals,
     },
-    delay::DelayLine,
-    innovation_variance::InnovationVariance,
     state::{State, visit_all},
 };
 use hoid_model::{
@@ -91,7 +91,7 @@ const USUAL_ND: usize = 6;
 
 settings! {
     /// Options of the bank of hypotheses.
-    pub struct AdaptiveOptions {
+    pub struct MultipleModelOptions {
         /// Logarithm of the odds from which a change is declared
         pub alarm: f64 = 6.0,
         /// Standard deviations beyond which an innovation moves the estimate no further
@@ -111,10 +111,10 @@ settings! {
     }
 }
 
-impl RecursiveMethod for AdaptiveOptions {
+impl RecursiveMethod for MultipleModelOptions {
     fn about(&self) -> About {
         About {
-            name: "adaptive",
+            name: "multiple-model",
             help: "a bank of hypotheses of when the person changed, which sets its memory itself and tells of changes",
             source: "Andersson 1985; Willsky and Jones 1976; Adams and MacKay 2007; the book, page A person who changes",
             structures: &[Structure::BoxJenkins, Structure::OutputError, Structure::General],
@@ -132,7 +132,7 @@ impl RecursiveMethod for AdaptiveOptions {
     }
 
     fn check(&self, setup: &Setup) -> Result<(), IdentError> {
-        check_model_of_change("adaptive", setup)?;
+        check_model_of_change("multiple-model", setup)?;
         if self.smooth && self.delay.track_delay_s.is_some() {
             return Err(bad_option(
                 "the range of the delay",
@@ -150,13 +150,13 @@ impl RecursiveMethod for AdaptiveOptions {
         sample_time: SampleTime,
     ) -> Result<Box<dyn Recursion>, IdentError> {
         match setup.track_delay_s {
-            None => Ok(Box::new(AdaptiveRecursion::<HYPOTHESES>::new(
+            None => Ok(Box::new(MultipleModelRecursion::<HYPOTHESES>::new(
                 self,
                 setup,
                 from,
                 sample_time,
             )?)),
-            Some(_) => Ok(Box::new(AdaptiveRecursion::<WITH_DELAYS>::new(
+            Some(_) => Ok(Box::new(MultipleModelRecursion::<WITH_DELAYS>::new(
                 self,
                 setup,
                 from,
@@ -243,7 +243,7 @@ fn delays(setup: &Setup, sample_time: SampleTime) -> RangeInclusive<usize> {
 /// # Errors
 /// As [`start::physical_bounds`].
 pub(crate) fn change_prior(
-    options: &AdaptiveOptions,
+    options: &MultipleModelOptions,
     setup: &Setup,
     sample_time: SampleTime,
 ) -> Result<ChangePrior, IdentError> {
@@ -295,7 +295,7 @@ pub(crate) fn first_hypothesis(
 ) -> Result<Hypothesis, IdentError> {
     if !from.from_fit {
         return Err(bad(
-            "adaptive needs the noise model of a batch fit; start it from the fit of a span",
+            "multiple-model needs the noise model of a batch fit; start it from the fit of a span",
         ));
     }
     let p = from.values.len();
@@ -316,17 +316,17 @@ pub(crate) fn outside() -> IdentError {
 }
 
 /// The bank with its filters and its delay line, which is as long as the shortest delay.
-struct AdaptiveRecursion<const M: usize> {
-    model: Box<AdaptiveFilter<M, LARGEST_ND, Vec<Signals>>>,
+struct MultipleModelRecursion<const M: usize> {
+    model: Box<MultipleModelFilter<M, LARGEST_ND, Vec<Signals>>>,
     delay: DelayLine<Vec<f64>>,
     shortest: usize,
     sample_time: SampleTime,
     reported: Reported,
 }
 
-impl<const M: usize> AdaptiveRecursion<M> {
+impl<const M: usize> MultipleModelRecursion<M> {
     fn new(
-        options: &AdaptiveOptions,
+        options: &MultipleModelOptions,
         setup: &Setup,
         from: &StartState,
         sample_time: SampleTime,
@@ -342,7 +342,7 @@ impl<const M: usize> AdaptiveRecursion<M> {
         let first = first_hypothesis(from, 1.0, sample_time)?.with_extra_delay(nk - shortest);
         let d = &from.values[OPERATOR..];
         let memory = vec![[0.0; 6]; delays.count()];
-        let model = AdaptiveFilter::with_delays(first, d, change_prior(options, setup, sample_time)?, memory)
+        let model = MultipleModelFilter::with_delays(first, d, change_prior(options, setup, sample_time)?, memory)
             .ok_or_else(outside)?;
         Ok(Self {
             model: Box::new(model),
@@ -365,13 +365,13 @@ impl<const M: usize> AdaptiveRecursion<M> {
     }
 }
 
-impl<const M: usize> State for AdaptiveRecursion<M> {
+impl<const M: usize> State for MultipleModelRecursion<M> {
     fn visit(&mut self, each: &mut dyn FnMut(&mut f64)) {
         visit_all(&mut [&mut *self.model, &mut self.delay, &mut self.reported], each);
     }
 }
 
-impl<const M: usize> Recursion for AdaptiveRecursion<M> {
+impl<const M: usize> Recursion for MultipleModelRecursion<M> {
     fn step(&mut self, sample: Sample) -> StepOutcome {
         let x = self.delay.step(sample.e);
         let step = self.model.step(x, sample.u);

@@ -9,14 +9,14 @@ use common::{
     operator::{self, S1, TS, diagonal},
 };
 use hoid_core::{
-    adaptive::{
-        AdaptiveFilter,
+    held_operator::held_operator,
+    innovation_variance::InnovationVariance,
+    multiple_model::{
+        MultipleModelFilter,
         hypothesis::Hypothesis,
         prior::{ChangePrior, DelayPrior},
         response::Response,
     },
-    held_operator::held_operator,
-    innovation_variance::InnovationVariance,
 };
 
 const S2: [f64; 4] = [0.07, 0.084, 11.25, 0.35];
@@ -38,9 +38,15 @@ fn steady() -> ChangePrior {
 
 const WIDE: [f64; 4] = [1e-4, 1e-4, 0.5, 1e-3];
 
-fn bank(eta: [f64; 4], spread: [f64; 4], level: InnovationVariance, d: &[f64], s: ChangePrior) -> AdaptiveFilter<8, 4> {
+fn bank(
+    eta: [f64; 4],
+    spread: [f64; 4],
+    level: InnovationVariance,
+    d: &[f64],
+    s: ChangePrior,
+) -> MultipleModelFilter<8, 4> {
     let first = Hypothesis::new(eta, &diagonal(spread), level).unwrap();
-    AdaptiveFilter::new(first, d, s).unwrap()
+    MultipleModelFilter::new(first, d, s).unwrap()
 }
 
 fn level(deviation: f64) -> InnovationVariance {
@@ -280,7 +286,7 @@ fn outliers_are_no_change() {
 fn silence_constants_saturation_and_overflow_leave_everything_finite() {
     let data = operator(2000, 4, 0.02, |_| S1);
     let mut bank = bank(S1, WIDE, level(0.02), &[-1.6, 0.7], prior_of());
-    let finite = |bank: &mut AdaptiveFilter<8, 4>, x: f64, u: f64| {
+    let finite = |bank: &mut MultipleModelFilter<8, 4>, x: f64, u: f64| {
         bank.step(x, u);
         assert!(bank.bank().mixture().eta.iter().all(|e| e.is_finite()));
         assert!(bank.bank().covariance().iter().flatten().all(|c| c.is_finite()));
@@ -343,12 +349,12 @@ fn t_l_stays_finite_as_k_e_becomes_zero() {
 #[test]
 fn starts_that_cannot_be_are_refused() {
     let first = |eta| Hypothesis::new(eta, &diagonal(WIDE), level(0.02)).unwrap();
-    let new = |eta, d: &[f64], s| AdaptiveFilter::<8, 4>::new(first(eta), d, s);
+    let new = |eta, d: &[f64], s| MultipleModelFilter::<8, 4>::new(first(eta), d, s);
     assert!(new(S1, &[-0.85], prior_of()).is_some());
     assert!(new(S1, &[0.0; 5], prior_of()).is_none());
     assert!(new([0.09, 0.036, 200.0, 0.35], &[], prior_of()).is_none());
     assert!(new([f64::NAN, 0.036, 11.0, 0.35], &[], prior_of()).is_none());
-    assert!(AdaptiveFilter::<1, 4>::new(first(S1), &[], prior_of()).is_none());
+    assert!(MultipleModelFilter::<1, 4>::new(first(S1), &[], prior_of()).is_none());
     for wrong in [
         ChangePrior {
             birth_interval: 0,
@@ -377,7 +383,7 @@ fn a_neuromuscular_system_that_changes_is_followed_and_named() {
     let (mut slow, mut fast, mut n) = (0.0, 0.0, 0.0);
     let (mut before, mut w) = (0.0, [0.0; 2]);
     let first = Hypothesis::new(S1, &diagonal(WIDE), level(0.003)).unwrap();
-    let mut bank: AdaptiveFilter<16, 4> = AdaptiveFilter::new(first, &[-0.85], prior_of()).unwrap();
+    let mut bank: MultipleModelFilter<16, 4> = MultipleModelFilter::new(first, &[-0.85], prior_of()).unwrap();
     let mut changes = Vec::new();
     for k in 0..9000 {
         let ([b0, b1, f1, f2], _) = held_operator(if k < at { S1 } else { slower }, TS);

@@ -37,7 +37,7 @@
 //! last seconds against those that are older.
 //!
 //! From below to above: [`prior`], [`response`], [`signal_ring`], [`hypothesis`], [`change`],
-//! [`bank`], and the recursion [`AdaptiveFilter`].
+//! [`bank`], and the recursion [`MultipleModelFilter`].
 
 pub mod bank;
 pub mod change;
@@ -46,7 +46,7 @@ pub mod prior;
 pub mod response;
 pub mod signal_ring;
 
-mod adaptive_filter;
 pub(crate) mod elementary;
+mod filter;
 
-pub use adaptive_filter::AdaptiveFilter;
+pub use filter::MultipleModelFilter;
