@@ -165,7 +165,7 @@ def test_track(
     assert [change["t"] for change in trace.changes] == [
         change["t"] for change in found.get("changes", [])
     ]
-    # `population` begins without a fit.
+    # `adaptive` begins without a fit.
     started = None if trace.start is None else trace.start.orders
     assert (found["start"] and found["start"]["orders"]) == started
     assert (started is None) == (keywords == {})

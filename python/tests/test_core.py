@@ -288,7 +288,7 @@ def test_a_person_is_tracked_with_the_loop_that_they_close(c4: pyhoid.Record) ->
     element = ([90.0], [1.0, 6.0, 0.0])
     keywords: Any = {"at": (1, 2.5), "controlled_element": element}
     trace = pyhoid.track(c4, every=50, **keywords)
-    assert trace.method == "population" and trace.start is None
+    assert trace.method == "adaptive" and trace.start is None
     assert trace.response_names == [
         *("gain_db@1", "phase_deg@1", "gain_db@2.5", "phase_deg@2.5"),
         *("crossover_rad_s", "phase_margin_deg"),
@@ -305,12 +305,32 @@ def test_a_person_is_tracked_with_the_loop_that_they_close(c4: pyhoid.Record) ->
     assert tracker.phase_margin.value == pytest.approx(trace["phase_margin_deg"][-1], abs=1e-9)
     assert tracker.determined["K_e_dot"] is bool(trace["K_e_dot_determined"][-1])
     assert tracker.at == [1, 2.5] and "6" in (tracker.controlled_element or "")
-    assert tracker.settings["at"] == [1, 2.5] and tracker.settings["method"] == "population"
+    assert tracker.settings["at"] == [1, 2.5] and tracker.settings["method"] == "adaptive"
     lost = np.isnan(trace["crossover_rad_s"]).sum()
     assert trace.no_crossover is not None and trace.no_crossover[0] == lost
     assert all(change["changed"] == list(change["changed"]) for change in trace.changes)
     again = pickle.loads(pickle.dumps(tracker))
     assert again.responses == tracker.responses and again.settings == tracker.settings
+
+
+def test_an_earlier_name_of_a_method_is_read_with_a_warning(c4: pyhoid.Record) -> None:
+    earlier: Any = "population"
+    said = "`population` is now called `adaptive`"
+    now = pyhoid.track(c4.span(0, 20), every=50)
+    with pytest.warns(DeprecationWarning, match=said) as warned:
+        trace = pyhoid.track(c4.span(0, 20), earlier, every=50)
+    assert [warning.filename for warning in warned] == [__file__]
+    np.testing.assert_array_equal(trace["K_e"], now["K_e"])
+    assert trace.method == "adaptive" and trace.settings["method"] == "adaptive"
+    with pytest.warns(DeprecationWarning, match=said) as warned:
+        tracker = pyhoid.Tracker(earlier, sample_time=0.01)
+    assert [warning.filename for warning in warned] == [__file__]
+    assert tracker.settings["method"] == "adaptive"
+    # What was pickled under it is read silently.
+    tracker._options["method"] = earlier
+    tracker.update(c4.e[:300], c4.u[:300])
+    again = pickle.loads(pickle.dumps(tracker))
+    assert again.step(0.5, 1.0) == tracker.step(0.5, 1.0) and again.method == "adaptive"
 
 
 def test_a_person_is_tracked_from_an_earlier_fit(c1: pyhoid.Record, tmp_path: Path) -> None:
@@ -343,7 +363,7 @@ def test_a_person_is_tracked_from_an_earlier_fit(c1: pyhoid.Record, tmp_path: Pa
     slow = pyhoid.simulate("C1", sample_time=0.02)
     with pytest.raises(pyhoid.Error, match="100.000000 Hz"):
         pyhoid.track(slow, prior=fit)
-    with pytest.raises(pyhoid.OptionError, match="population"):
+    with pytest.raises(pyhoid.OptionError, match="adaptive"):
         pyhoid.track(later, "physical", prior="none")
 
 

@@ -134,7 +134,7 @@ def test_track_and_tracker_have_the_same_keywords() -> None:
     # The rate is a setting of the samples, not of the recursion.
     same = [*KEYWORDS, "decimate"]
     for name in same:
-        usual = "population" if name == "method" else track[name].default
+        usual = "adaptive" if name == "method" else track[name].default
         assert tracker[name].default == usual, name
         assert track[name].annotation == tracker[name].annotation, name
     shared = [name for name in track if name in tracker]

@@ -223,7 +223,7 @@ fn tried(program: &Path, libraries: &Path) -> Result<(), String> {
     let file = fs::File::open(&input).map_err(|e| format!("{}: {e}", input.display()))?;
     let said = output(
         Command::new(program)
-            .args(["population", "0.01"])
+            .args(["adaptive", "0.01"])
             .env("LD_LIBRARY_PATH", libraries)
             .env("DYLD_LIBRARY_PATH", libraries)
             .stdin(file),

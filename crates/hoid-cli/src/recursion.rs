@@ -44,13 +44,24 @@ pub fn counts_samples(args: &RecursionArgs) -> Result<bool, CliError> {
     Ok(matches!(args.nk, Some(DelayRange::Samples(_))) || method(args)?.counts_samples())
 }
 
+/// The method of a name as typed; of an earlier name it is said what it is called now.
+///
+/// # Errors
+/// A name that no method has.
+pub fn method_of(name: &str) -> Result<Method, CliError> {
+    if let Some((_, renamed)) = Method::renamed(name) {
+        output::notice("", format!("note: {renamed}"));
+    }
+    Ok(name.parse()?)
+}
+
 /// The method with the options that were typed.
 ///
 /// # Errors
 /// [`CliError::Usage`] for an option of another method, or a text that is no value of it.
 fn method(args: &RecursionArgs) -> Result<Method, CliError> {
     let usage = |name: &str, text: &str| CliError::Usage(format!("--{} {text}", flag(name)));
-    let mut method: Method = args.method.parse()?;
+    let mut method = method_of(&args.method)?;
     for (name, text) in args.settings.given() {
         let of = methods_with(name, &Method::registry()).join(" or ");
         if !method.settings().list().iter().any(|setting| setting.name == name) {

@@ -73,7 +73,7 @@ fn what_makes_no_unit_says_why() {
     for (arguments, reason) in [
         (&["--prior", "fit.json"][..], "fit.json"),
         (&["--prior", "omega_nm=1"], "omega_nm"),
-        (&["--method", "rpem", "--prior", "none"], "population"),
+        (&["--method", "rpem", "--prior", "none"], "adaptive"),
         (&["--sample-time", "0"], "sample time"),
         (&["--operator", "nowhere.toml"], "nowhere.toml"),
         // Its control would hang on the error of the same sample.

@@ -215,7 +215,7 @@ fn the_default_speaks_from_the_second_second_on() {
         .collect();
     let arguments = [
         "--method",
-        "population",
+        "adaptive",
         "--at",
         "2.5",
         "--controlled-element",
@@ -223,7 +223,7 @@ fn the_default_speaks_from_the_second_second_on() {
     ];
     let (lines, said) = answers(&arguments, &(run.join("\n") + "\n"));
     assert!(
-        said.contains("started at once") && said.contains("method: population"),
+        said.contains("started at once") && said.contains("method: adaptive"),
         "{said}"
     );
     assert!(lines.iter().all(|line| line.get("warm_up").is_none()));

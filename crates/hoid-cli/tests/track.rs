@@ -8,7 +8,7 @@ use std::{fs, path::Path};
 use serde_json::Value;
 use tempfile::TempDir;
 
-use common::{bad, good, json, physical};
+use common::{bad, good, hoid, json, physical};
 
 const KNOWN_ORDERS: [&str; 4] = ["--nk", "29", "--orders", "nd=1"];
 
@@ -284,7 +284,7 @@ fn the_default_needs_nothing_and_tells_the_loop() {
         "90/(s(s+6))",
     ];
     let found = json(d, &arguments);
-    assert_eq!(found["method"], "population");
+    assert_eq!(found["method"], "adaptive");
     assert!(found["start"].is_null());
     assert_eq!(found["settings"]["start"], "what is usual of people");
     assert_eq!(found["settings"]["response at"], "1, 2.5 rad/s");
@@ -324,6 +324,27 @@ fn the_default_needs_nothing_and_tells_the_loop() {
         ],
     );
     assert!(page.contains("Open loop at 81.91 s: crossover"), "{page}");
+}
+
+/// The same numbers by the earlier name of a method; that it is one is said on standard error alone.
+#[test]
+fn an_earlier_name_of_a_method_is_read_and_said_to_be_one() {
+    let directory = simulated("C1");
+    let d = directory.path();
+    let by = |method: &str| {
+        let output = hoid(
+            d,
+            &["track", "c.csv", "--method", method, "--to", "20", "--out", "trace.csv"],
+        );
+        assert!(output.status.success());
+        let trace = fs::read(d.join("trace.csv")).unwrap();
+        (trace, output.stdout, String::from_utf8(output.stderr).unwrap())
+    };
+    let (now, before) = (by("adaptive"), by("population"));
+    assert_eq!((&now.0, &now.1), (&before.0, &before.1));
+    let note = "note: the method `population` is now called `adaptive`";
+    assert_eq!(before.2.lines().filter(|line| *line == note).count(), 1, "{}", before.2);
+    assert!(!now.2.contains("is now called"), "{}", now.2);
 }
 
 #[test]
@@ -396,7 +417,7 @@ fn a_person_is_followed_from_an_earlier_fit_of_them() {
             "track", "c.csv", "--out", "t.csv", "--method", "physical", "--prior", "none",
         ],
     );
-    assert!(code == 2 && message.contains("--method population"), "{message}");
+    assert!(code == 2 && message.contains("--method adaptive"), "{message}");
     let (code, message) = bad(d, &["track", "c.csv", "--out", "fit.json", "--prior", "fit.json"]);
     assert!(code != 0 && !message.is_empty());
     assert!(fs::read_to_string(d.join("fit.json")).unwrap().contains("covariance"));

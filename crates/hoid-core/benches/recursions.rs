@@ -8,14 +8,14 @@ use std::hint::black_box;
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use hoid_core::{
     adaptation::Forgetting,
+    adaptive::{
+        AdaptiveFilter, memory_needed,
+        usual::{REPLAYED_S, Usual},
+    },
     covariance::Covariance,
     error_bars::{ErrorBars, NoErrorBars},
     innovation_variance::InnovationVariance,
     physical::{PhysicalModel, PhysicalRpem},
-    population::{
-        PopulationFilter, memory_needed,
-        usual::{REPLAYED_S, Usual},
-    },
     predictor::Regressor,
     recursion::Stable,
     rls::Rls,
@@ -204,14 +204,14 @@ fn plain(data: &[(f64, f64)], history: &mut Vec<[f64; 4]>) {
 }
 
 /// A person in the basis that people share, at its usual settings.
-fn person() -> PopulationFilter<Vec<f64>> {
+fn person() -> AdaptiveFilter<Vec<f64>> {
     let (usual, ts) = (Usual::with_delay(0.285), 0.01);
     let memory = vec![0.0; memory_needed(ts, REPLAYED_S)];
-    PopulationFilter::new(usual.prior(ts), memory).unwrap()
+    AdaptiveFilter::new(usual.prior(ts), memory).unwrap()
 }
 
 /// Goes on with a person: from the beginning, where replays are short, or from where they are long.
-fn follow(mut person: PopulationFilter<Vec<f64>>, data: &[(f64, f64)], history: &mut Vec<f64>) {
+fn follow(mut person: AdaptiveFilter<Vec<f64>>, data: &[(f64, f64)], history: &mut Vec<f64>) {
     history.clear();
     for &(x, u) in data {
         history.push(person.step(x, u).innovation);
@@ -269,14 +269,14 @@ fn bench(c: &mut Criterion) {
         b.iter(|| rls(any(16, 16, 0, 0), scalar(), data, &mut h32))
     });
     let mut innovations: Vec<f64> = Vec::with_capacity(SAMPLES);
-    group.bench_function("population, from the beginning", |b| {
+    group.bench_function("adaptive, from the beginning", |b| {
         b.iter(|| follow(person(), data, &mut innovations))
     });
     let mut later = person();
     data.iter().for_each(|&(x, u)| {
         later.step(x, u);
     });
-    group.bench_function("population, after 82 s", |b| {
+    group.bench_function("adaptive, after 82 s", |b| {
         b.iter(|| follow(later.clone(), data, &mut innovations))
     });
     group.finish();

@@ -68,7 +68,7 @@
 //! |---|---|
 //! | [`rls`], [`rpem`], [`physical`] | the recursions: least squares, prediction-error method in polynomials and in physical parameters |
 //! | [`multiple_model`] | a bank of hypotheses about when the operator changed |
-//! | [`population`] | gains in a basis that people share, a noise model and a level of its own, a test for changes |
+//! | [`adaptive`] | gains in a basis that people share, a noise model and a level of its own, a test for changes |
 //! | [`predictor`], [`shape`] | one-step predictor of the general model with its gradient; orders of the model |
 //! | [`adaptation`], [`covariance`], [`window`] | from gradient to step: rules of forgetting; P with a guard against windup; a rectangular window |
 //! | [`ud_covariance`] | the covariance `U D U'` |
@@ -87,6 +87,7 @@ extern crate std;
 pub mod state;
 
 pub mod adaptation;
+pub mod adaptive;
 pub mod covariance;
 pub mod delay;
 pub mod divided_differences;
@@ -97,7 +98,6 @@ pub mod held_operator;
 pub mod innovation_variance;
 pub mod multiple_model;
 pub mod physical;
-pub mod population;
 pub mod predictor;
 pub mod recursion;
 pub mod rls;

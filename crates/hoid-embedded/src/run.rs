@@ -5,8 +5,8 @@
 
 use core::{ffi::CStr, fmt::Arguments};
 
-use hoid_core::population::{
-    PARAMETERS, PopulationFilter,
+use hoid_core::adaptive::{
+    AdaptiveFilter, PARAMETERS,
     usual::{GIVEN_DELAY_S, SPREAD, Usual},
 };
 
@@ -28,7 +28,7 @@ const MEMORY: usize = 3 * 128;
 const LONGEST: usize = 80;
 
 /// The recursion, with memory of its own.
-type Filter = PopulationFilter<[f64; MEMORY]>;
+type Filter = AdaptiveFilter<[f64; MEMORY]>;
 
 /// Bytes that the recursion takes.
 pub const STATE_BYTES: usize = size_of::<Filter>();

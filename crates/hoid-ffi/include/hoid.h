@@ -242,7 +242,7 @@ uint32_t hoid_abi_version(void);
 const char *hoid_version(void);
 
 /*
- Makes a tracker: by the name of the method (NULL: "population", which speaks from the second second
+ Makes a tracker: by the name of the method (NULL: "adaptive", which speaks from the second second
  on), the sample time in s, and options as one object in JSON by the keywords of pyhoid.Tracker
  (NULL: none), as "{\"controlled_element\": \"90/(s(s+6))\", \"prior\": \"fit.json\"}".
 

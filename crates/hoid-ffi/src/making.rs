@@ -27,7 +27,7 @@ pub extern "C" fn hoid_version() -> *const c_char {
     VERSION.as_ptr()
 }
 
-/// Makes a tracker: by the name of the method (NULL: "population", which speaks from the second second
+/// Makes a tracker: by the name of the method (NULL: "adaptive", which speaks from the second second
 /// on), the sample time in s, and options as one object in JSON by the keywords of pyhoid.Tracker
 /// (NULL: none), as "{\"controlled_element\": \"90/(s(s+6))\", \"prior\": \"fit.json\"}".
 ///

@@ -291,16 +291,16 @@ mod tests {
         let memory = options.method.settings().get("memory_of").unwrap();
         assert_eq!(memory, "b=inf");
         assert!(!found.plan.is_settled());
-        let pair = understood("population", r#"{"controlled_element": [[90], [1, 6, 0]]}"#).unwrap();
+        let pair = understood("adaptive", r#"{"controlled_element": [[90], [1, 6, 0]]}"#).unwrap();
         assert_eq!(pair.plan.options().controlled_element, options.controlled_element);
-        let none = understood("population", " ").unwrap();
-        assert_eq!(none.plan.options().method, Method::population());
+        let none = understood("adaptive", " ").unwrap();
+        assert_eq!(none.plan.options().method, Method::adaptive());
     }
 
     #[test]
     fn what_cannot_be_says_why() {
         for (method, options, reason) in [
-            ("kalman", "{}", "population"),
+            ("kalman", "{}", "adaptive"),
             ("rpem", "[1]", "no object in JSON"),
             ("rpem", "{\"nk\": -1}", "whole number"),
             ("rpem", "{\"nk\": [30, 20]}", "smaller first"),
@@ -308,14 +308,14 @@ mod tests {
             ("rpem", "{\"colour\": 1}", "no option colour"),
             ("rpem", "{\"at\": 1}", "list of numbers"),
             ("rpem", "{\"structure\": \"curve\"}", "curve"),
-            ("rpem", "{\"prior\": \"none\"}", "population"),
+            ("rpem", "{\"prior\": \"none\"}", "adaptive"),
             ("rpem", "{\"start\": {\"b0\": 1}, \"nk\": 29, \"nd\": 1}", "start lacks"),
             ("rpem", "{\"warm_up\": 0}", "one sample"),
             ("rpem", "{\"controlled_element\": \"9/\"}", "coefficients"),
             ("multiple-model", "{\"smooth\": true}", "still to come"),
-            ("population", "{\"prior\": \"nowhere.json\"}", "nowhere.json"),
+            ("adaptive", "{\"prior\": \"nowhere.json\"}", "nowhere.json"),
             (
-                "population",
+                "adaptive",
                 "{\"prior\": {\"parameters\": []}}",
                 "no form of an operator",
             ),

@@ -104,7 +104,8 @@ mod tests {
     fn a_saved_tracker_goes_on_with_the_same_digits() {
         let samples = samples();
         let [taken, all] = TAKEN;
-        let of_bank = [("population", None)];
+        // The second is an earlier name, as it stands in what was saved under it.
+        let of_bank = [("adaptive", None), ("population", None)];
         let at_work = [("rpem", Some(AT_ONCE))];
         let warm = [
             ("rpem", Some("{\"nk\": 29, \"nd\": 1, \"warm_up\": 20}")),
@@ -157,7 +158,7 @@ mod tests {
         }
         // With a true sum, the description still has to be one.
         for (from, to) in [
-            ("population", "lopulation"),
+            ("adaptive", "ldaptive"),
             ("\"orders\":[", "\"orders\":{"),
             ("0.01", "-.01"),
         ] {

@@ -56,7 +56,7 @@ fn expected(record: &Record, options: &TrackOptions) -> Vec<Vec<f64>> {
 }
 
 fn usual(record: &Record) -> TrackOptions {
-    let (method, structure) = (Method::population(), Structure::BoxJenkins);
+    let (method, structure) = (Method::adaptive(), Structure::BoxJenkins);
     let ranges = ranges_of(&method, structure, &NamedOrders::new(), &[], record.sample_time()).unwrap();
     let options = TrackOptions::usual(method, 29);
     let plan = TrackPlan::new(options, ranges, Criterion::Bic, record.sample_time()).unwrap();
@@ -94,7 +94,7 @@ fn the_example_in_c_gives_the_digits_of_rust() {
     let options = format!("{{\"controlled_element\": \"{ELEMENT}\"}}");
     let all: Vec<usize> = (0..17).collect();
     // Saved, freed and restored in the middle.
-    let output = run(&program, &["population", "0.01", &options, "4000"], &lines(&record));
+    let output = run(&program, &["adaptive", "0.01", &options, "4000"], &lines(&record));
     same(&good(&output), &expected_rows, &all);
     let said = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(said.contains("after 8192 samples, 0 skipped"), "{said}");
@@ -109,11 +109,11 @@ fn the_s_function_gives_the_digits_of_rust() {
     };
     let record = record();
     let rows = expected(&record, &usual(&record));
-    let output = run(&program, &["population", "0.01", ""], &lines(&record));
+    let output = run(&program, &["adaptive", "0.01", ""], &lines(&record));
     same(&good(&output), &rows, &(0..17).collect::<Vec<_>>());
     let refused = run(&program, &["kalman", "0.01", ""], "");
     let said = String::from_utf8_lossy(&refused.stderr).into_owned();
-    assert!(!refused.status.success() && said.contains("population"), "{said}");
+    assert!(!refused.status.success() && said.contains("adaptive"), "{said}");
 }
 
 /// Compiled with a stand-in of DUECA's headers, likewise.
@@ -157,7 +157,7 @@ fn the_example_in_cpp_gives_the_digits_of_rust() {
         ..usual(&record)
     };
     let rows = expected(&record, &options);
-    let found = good(&run(&program, &["population", "0.01"], &lines(&record)));
+    let found = good(&run(&program, &["adaptive", "0.01"], &lines(&record)));
     // Rows without an operator have the innovation alone.
     let lines: Vec<&str> = found.lines().collect();
     assert_eq!(lines.len(), rows.len());
@@ -183,7 +183,7 @@ fn the_example_in_c_is_clean_under_the_sanitizers() {
     good(&compile(&with, &example("tracker.c"), &program, &sanitizers));
     let record = record();
     let input = lines(&record);
-    good(&run(&program, &["population", "0.01", "{}", "1000"], &input));
+    good(&run(&program, &["adaptive", "0.01", "{}", "1000"], &input));
     good(&run(
         &program,
         &["rpem", "0.01", "{\"nk\": 29, \"nd\": 1}", "1000"],
@@ -193,5 +193,5 @@ fn the_example_in_c_is_clean_under_the_sanitizers() {
     let refused = run(&program, &["kalman", "0.01"], "");
     let said = String::from_utf8_lossy(&refused.stderr).into_owned();
     assert_eq!(refused.status.code(), Some(1));
-    assert!(said.contains("population") && !said.contains("Sanitizer"), "{said}");
+    assert!(said.contains("adaptive") && !said.contains("Sanitizer"), "{said}");
 }

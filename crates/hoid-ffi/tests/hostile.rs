@@ -147,7 +147,7 @@ fn null_pointers_are_refused_everywhere() {
 }
 
 #[test]
-#[cfg_attr(miri, ignore = "the filters of population take minutes there")]
+#[cfg_attr(miri, ignore = "the filters of the method adaptive take minutes there")]
 fn a_fit_is_what_a_tracker_begins_with() {
     let fit = r#"{"structure": "grey-box", "form": "gain", "neuromuscular": true, "verdict": {"level": "trustworthy"},
         "records": [{"sample_time": 0.01, "units": {"input": "", "output": ""}}], "parameters": [],
@@ -163,7 +163,7 @@ fn a_fit_is_what_a_tracker_begins_with() {
     };
     let tracker = of(0.01, fit).ok().unwrap();
     let options = format!("{{\"prior\": {fit}}}");
-    let same = made("population", 0.01, &options).ok().unwrap();
+    let same = made("adaptive", 0.01, &options).ok().unwrap();
     for tracker in [&tracker, &same] {
         // SAFETY: a tracker.
         unsafe { hoid_tracker_step(tracker.0, 0.1, 0.2, ptr::null_mut()) };
@@ -243,12 +243,12 @@ proptest! {
 
     /// Samples of any kind move no tracker out of its senses.
     #[test]
-    #[cfg_attr(miri, ignore = "the filters of population take minutes there; tests/every_function.rs has few samples")]
+    #[cfg_attr(miri, ignore = "the filters of the method adaptive take minutes there; tests/every_function.rs has few samples")]
     fn any_samples_are_taken(
         samples in prop::collection::vec((hostile_number(), hostile_number(), hostile_number(), any::<i32>()), 1..60),
-        method in prop_oneof![Just("population"), Just("rpem"), Just("multiple-model")],
+        method in prop_oneof![Just("adaptive"), Just("rpem"), Just("multiple-model")],
     ) {
-        let options = if method == "population" { "" } else {
+        let options = if method == "adaptive" { "" } else {
             r#"{"nk": 9, "nd": 1, "start": "nothing"}"#
         };
         // What needs the fit of a warm-up has one.
@@ -269,9 +269,9 @@ proptest! {
 
     /// Options of any kind make a tracker or say why not.
     #[test]
-    #[cfg_attr(miri, ignore = "the filters of population take minutes there; tests/every_function.rs has few samples")]
+    #[cfg_attr(miri, ignore = "the filters of the method adaptive take minutes there; tests/every_function.rs has few samples")]
     fn any_options_have_an_answer(
-        method in prop_oneof![Just("population"), Just("rpem"), Just("multiple-model"), Just("rls"), Just("window"), Just("ekf")],
+        method in prop_oneof![Just("adaptive"), Just("rpem"), Just("multiple-model"), Just("rls"), Just("window"), Just("ekf")],
         sample_time in prop_oneof![4 => Just(0.01), 1 => hostile_number()],
         given in prop::collection::btree_map(prop::sample::select(&NAMES[..]), hostile_value(), 0..5),
     ) {

@@ -212,7 +212,7 @@ impl Default for Condition {
 
 /// The recursive method of the live estimate: it needs no start fit, so that there is something to see
 /// from the first seconds on.
-const USUAL_METHOD: &str = "population";
+const USUAL_METHOD: &str = "adaptive";
 
 /// What a person confirms where the file says nothing else.
 const CONSENT: &str = "You will follow a moving target by hand for a few short runs. The program stores where your \

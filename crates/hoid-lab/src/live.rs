@@ -304,7 +304,7 @@ pub(crate) mod tests {
             scenario_text: Some("condition = \"C1\"\n".to_owned()),
             ..Condition::default()
         };
-        let mut run = LiveRun::new("population", condition.course().unwrap()).unwrap();
+        let mut run = LiveRun::new("adaptive", condition.course().unwrap()).unwrap();
         let mut last = LiveLine::default();
         for five in samples_of_c1(3).chunks(5) {
             last = run.take(five);

@@ -80,6 +80,7 @@ fn _pyhoid(module: &Bound<'_, PyModule>) -> PyResult<()> {
         wrap_pyfunction!(identify::identify, module)?,
         wrap_pyfunction!(recursion::counts_samples, module)?,
         wrap_pyfunction!(recursion::recursive_methods, module)?,
+        wrap_pyfunction!(recursion::renamed_method, module)?,
         wrap_pyfunction!(simulate::convert_discrete, module)?,
         wrap_pyfunction!(simulate::convert_operator, module)?,
         wrap_pyfunction!(simulate::discretise_transfer_function, module)?,

@@ -85,6 +85,8 @@ pub fn counts_samples(options: &Bound<'_, PyDict>) -> Outcome<bool> {
 fn method(options: &Bound<'_, PyDict>) -> Outcome<Method> {
     let mut method = match get::<String>(options, "method")? {
         Some(name) => {
+            // In a pickle there may be an earlier name.
+            let name = renamed_method(&name).map_or(name, |(now, _)| now.to_owned());
             let words = Method::all().into_iter().map(|method| (method.name(), method));
             names::word("method", &name, &words.collect::<Vec<_>>())?
         }
@@ -115,6 +117,12 @@ fn method(options: &Bound<'_, PyDict>) -> Outcome<Method> {
         method.start_from(fit)?;
     }
     Ok(method)
+}
+
+/// Of an earlier name of a recursive method that of now, and the sentence that says so.
+#[pyfunction]
+pub fn renamed_method(name: &str) -> Option<(&'static str, String)> {
+    Method::renamed(name)
 }
 
 /// Name, line of help and literature of each recursive method, and the keywords that it takes.

@@ -143,7 +143,7 @@ impl PyTrace {
             .collect()
     }
 
-    /// The changes that were declared, for the method multiple-model.
+    /// The changes that were declared, for the methods adaptive and multiple-model.
     #[getter]
     fn changes<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyDict>>> {
         let one = |(t, c): &(f64, hoid_track::Change)| {

@@ -162,6 +162,17 @@ fn cells_follow_the_order_of_the_file() {
     assert_ne!(plan.hash(), plan.clone().with_replications(11).unwrap().hash());
 }
 
+/// A plan of before the method had its name of now is the same plan.
+#[test]
+fn an_earlier_name_of_a_method_is_read() {
+    let by = |method: &str| {
+        let text = GOOD.replace("method = \"rls\"\nmemory = 256", &format!("method = \"{method}\""));
+        Plan::parse(&text, "good.toml").unwrap().estimators
+    };
+    assert_eq!(by("population"), by("adaptive"));
+    assert_ne!(by("population"), by("multiple-model"));
+}
+
 /// The published schema is the one that the program has.
 #[test]
 fn the_book_has_the_schema() {

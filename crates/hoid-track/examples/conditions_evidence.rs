@@ -3,7 +3,7 @@
 //!
 //! `cargo run --release -p hoid-track --example conditions_evidence -- [RUNS] [M,..] [LEVEL,..] [METHOD,..]`
 //!
-//! Methods: `population` is told nothing; `multiple-model`, `rls` and `rpem` are told the delay and start from a fit
+//! Methods: `adaptive` is told nothing; `multiple-model`, `rls` and `rpem` are told the delay and start from a fit
 //! of the first 30.72 s (RLS and RPEM by the settings of the text). Their first rows are therefore not causal:
 //! the ratios are of the rows from then on, and those of 10 s on stand beside.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
@@ -131,7 +131,7 @@ fn main() {
     let (orders, levels, methods) = (
         numbers(of(1, "1,2")),
         numbers(of(2, "0.1")),
-        of(3, "multiple-model,rls,rpem,population"),
+        of(3, "multiple-model,rls,rpem,adaptive"),
     );
     let mut cells = Vec::new();
     for level in levels {

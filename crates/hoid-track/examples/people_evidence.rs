@@ -203,7 +203,7 @@ fn main() {
     let folder = PathBuf::from(folder);
     let mut methods: Vec<String> = env::args().skip(1).collect();
     if methods.is_empty() {
-        methods = ["population", "rls", "multiple-model", "physical", "rpem"]
+        methods = ["adaptive", "rls", "multiple-model", "physical", "rpem"]
             .map(str::to_owned)
             .to_vec();
     }

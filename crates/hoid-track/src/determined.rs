@@ -88,7 +88,7 @@ mod tests {
             tau_e_s: Estimate::fixed(0.2),
         };
         // Before the first sample omega is known to 3.3 rad/s, zeta to .125.
-        let found = determined(&Method::population(), &operator);
+        let found = determined(&Method::adaptive(), &operator);
         let expected = [
             ("K_e", false),
             ("T_L", true),

@@ -55,7 +55,7 @@
 //! **Samples that are not as they should be** never reach the filters. A value is a fault when it
 //! is not a finite number or larger than [`TrackOptions::largest`]. An error e is then replaced by
 //! the last good one, an output u by the one-step prediction, and the estimate stays at that
-//! sample. Each is counted. Behind a guard (`guard`; by default for `physical` and `multiple-model`) so are
+//! sample. Each is counted. Behind a guard (`guard`; by default for `physical`, `multiple-model` and `adaptive`) so are
 //! outliers and spans that no tracking makes.
 
 mod change;

@@ -43,6 +43,11 @@ pub(crate) trait RecursiveMethod: Settings {
     /// The words for it.
     fn about(&self) -> About;
 
+    /// What it was called before, where that is still read.
+    fn earlier_name(&self) -> Option<&'static str> {
+        None
+    }
+
     /// Memory of a parameter when none is given.
     fn usual_memory(&self, parameter: &str) -> Memory;
 

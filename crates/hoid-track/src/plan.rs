@@ -320,7 +320,7 @@ mod tests {
             nd: 16..=16,
             ..default_operator_ranges(Structure::BoxJenkins, ts)
         };
-        let options = TrackOptions::usual(Method::population(), 29);
+        let options = TrackOptions::usual(Method::adaptive(), 29);
         let plan = TrackPlan::new(options.clone(), ranges.clone(), Criterion::Bic, ts).unwrap();
         assert!(plan.is_settled());
         assert_eq!((plan.options().orders.nk, plan.options().orders.nd), (21, 16));

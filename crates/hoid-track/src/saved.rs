@@ -154,7 +154,7 @@ mod tests {
             TrackOptions::new(Method::rls(), Structure::Arx, Structure::Arx.operator_orders(29)),
             of(Method::physical()),
             of(Method::multiple_model()),
-            TrackOptions::usual(Method::population(), 29),
+            TrackOptions::usual(Method::adaptive(), 29),
             of(Method::fused()),
             of(Method::ekf()),
             of(Method::ukf()),

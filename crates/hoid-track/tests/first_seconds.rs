@@ -1,4 +1,4 @@
-//! What `population` says of virtual people in their first seconds: from the second second on, with
+//! What `adaptive` says of virtual people in their first seconds: from the second second on, with
 //! bands that hold.
 #![allow(clippy::unwrap_used)]
 
@@ -36,7 +36,7 @@ fn bands_hold_from_the_second_second_on() {
         let element: ContinuousTransferFunction = plant.text().parse().unwrap();
         let options = TrackOptions {
             controlled_element: Some(element),
-            ..TrackOptions::usual(Method::population(), 13)
+            ..TrackOptions::usual(Method::adaptive(), 13)
         };
         let mut tracker = Tracker::new(&options, None, ts).unwrap();
         for k in 0..run.record.len() {

@@ -1,4 +1,4 @@
-//! Parameters of virtual people by `population`: within their errors, or not said to be determined.
+//! Parameters of virtual people by `adaptive`: within their errors, or not said to be determined.
 #![allow(clippy::unwrap_used)]
 
 use hoid_model::uncertainty::Estimate;
@@ -27,7 +27,7 @@ fn poles_and_delay_of_people_are_within_their_errors() {
             continue;
         };
         people += 1.0;
-        let mut tracker = Tracker::new(&TrackOptions::usual(Method::population(), 13), None, ts).unwrap();
+        let mut tracker = Tracker::new(&TrackOptions::usual(Method::adaptive(), 13), None, ts).unwrap();
         for k in 0..run.record.len() {
             tracker.step(run.record.input()[k], run.record.output()[k]);
             let t = run.record.time_s(k) - run.record.time_s(0);

@@ -101,7 +101,7 @@ fn what_cannot_choose_is_refused_with_what_to_do() {
         found.contains("covariance: found 0.1") && found.contains("one of the two"),
         "{found}"
     );
-    for method in [Method::population(), Method::multiple_model(), Method::window()] {
+    for method in [Method::adaptive(), Method::multiple_model(), Method::window()] {
         let found = says(&other, &options(method.clone()));
         assert!(
             found.contains(method.name()) && found.contains("rls or rpem"),

@@ -245,7 +245,7 @@ fn main() {
     let runs = arguments.next().unwrap_or_else(|| "all".to_owned());
     let mut methods: Vec<String> = arguments.collect();
     if methods.is_empty() {
-        methods = ["population", "multiple-model", "rls", "rpem"]
+        methods = ["adaptive", "multiple-model", "rls", "rpem"]
             .map(str::to_owned)
             .to_vec();
     }

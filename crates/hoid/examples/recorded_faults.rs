@@ -109,7 +109,7 @@ fn main() {
     let folder = folder.as_path();
     let mut arguments = env::args().skip(1);
     let runs = arguments.next().unwrap_or_else(|| "all".to_owned());
-    let method = arguments.next().unwrap_or_else(|| "population".to_owned());
+    let method = arguments.next().unwrap_or_else(|| "adaptive".to_owned());
     let names = pilots::names(folder, &runs);
     let recordings: Vec<Recording> = names
         .iter()

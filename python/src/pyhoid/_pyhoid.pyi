@@ -57,6 +57,7 @@ __all__ = [
     "read",
     "read_table",
     "recursive_methods",
+    "renamed_method",
     "reproduce",
     "simulate",
     "simulate_group",
@@ -574,6 +575,7 @@ def simulate_people(
 ) -> int: ...
 def batch_estimators() -> list[tuple[str, list[str], list[str]]]: ...
 def recursive_methods() -> list[tuple[str, str, str, list[str]]]: ...
+def renamed_method(name: str) -> tuple[str, str] | None: ...
 def track(
     record: Record,
     options: dict[str, Any],

@@ -6,16 +6,20 @@ The options of the methods are not listed here: they are those of the registry o
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
 from os import PathLike, fspath
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, cast
 
 from . import _options, _pyhoid
 from .errors import FormatError, OptionError
 from .operator_fit import OperatorFit
 
-__all__ = ["KEYWORDS", "plain"]
+if TYPE_CHECKING:
+    from ._settings import RecursiveMethod
+
+__all__ = ["KEYWORDS", "name_of_now", "plain"]
 
 #: Keywords that all methods share, in the order of the signatures.
 KEYWORDS = (
@@ -31,6 +35,16 @@ KEYWORDS = (
 
 #: Keywords of the methods.
 _OF_METHODS = {name for *_, keywords in _pyhoid.recursive_methods() for name in keywords}
+
+
+def name_of_now(method: RecursiveMethod) -> RecursiveMethod:
+    """The name of a method; of an earlier name that of now, with a warning to who called."""
+    renamed = _pyhoid.renamed_method(method) if isinstance(method, str) else None
+    if renamed is None:
+        return method
+    name, note = renamed
+    warnings.warn(note, DeprecationWarning, stacklevel=3)
+    return cast("RecursiveMethod", name)
 
 
 def plain(arguments: Mapping[str, Any], settings: Mapping[str, Any]) -> dict[str, Any]:

@@ -22,7 +22,7 @@ RecursiveMethod = Literal[
     "window",
     "rriv",
     "multiple-model",
-    "population",
+    "adaptive",
     "fused",
     "ekf",
     "ukf",
@@ -52,7 +52,7 @@ class MethodSettings(TypedDict, total=False):
     covariance: float | None
 
     # Standard deviations beyond which an innovation moves the estimate no further. For rls,
-    # rpem, physical, multiple-model, population, fused.
+    # rpem, physical, multiple-model, adaptive, fused.
     limit: float | None
 
     # How far each variance in P may grow where nothing excites its parameter, as a multiple of
@@ -93,7 +93,7 @@ class MethodSettings(TypedDict, total=False):
     rate: float | None
 
     # Guard: outliers of e and u are held back, spans that no tracking makes are left out, and
-    # the estimate begins again after them. For rls, rpem, physical, multiple-model, population.
+    # the estimate begins again after them. For rls, rpem, physical, multiple-model, adaptive.
     guard: Literal["yes", "no"] | None
 
     # Signals of psi: gradient (D/(C F) as one filter), cascade (1/F before D/C; for
@@ -128,16 +128,16 @@ class MethodSettings(TypedDict, total=False):
     smooth: bool | None
 
     # False alarms in an hour that are accepted: a lower number finds fewer changes, later. For
-    # population.
+    # adaptive.
     false_alarms: float | None
 
     # Time that is read again and again; 0 for a recursion that reads each sample once, as a
-    # microcontroller does. For population.
+    # microcontroller does. For adaptive.
     replay: float | None
 
     # What is known of the person before the first sample: population, none, NAME=CENTRE:SPREAD
     # of omega_nm, zeta_nm, tau_e, T_I (the spread is relative), or an earlier fit of them, a
-    # file that hoid identify --json has printed. For population.
+    # file that hoid identify --json has printed. For adaptive.
     prior: str | PathLike[str] | Mapping[str, tuple[float, float]] | OperatorFit | None
 
 
@@ -147,9 +147,9 @@ METHODS = """``"rls"``: recursive least squares;
         ``"physical"``: recursive prediction-error method in the operator's parameters;
         ``"window"``: a batch fit of the last seconds, again and again;
         ``"rriv"``: recursive refined instrumental variable;
-        ``"multiple-model"``: a bank of hypotheses of when the person changed, which sets its memory
-        itself and tells of changes;
-        ``"population"``: gains in a basis that people share, with a noise model of its own;
+        ``"multiple-model"``: a bank of hypotheses of when the person changed, which sets its
+        memory itself and tells of changes;
+        ``"adaptive"``: gains in a basis that people share, with a noise model of its own;
         starts without a fit;
         ``"fused"``: least squares for B with the poles of rpem, for comparison;
         ``"ekf"``: extended Kalman filter of state and parameters, for comparison;
@@ -161,7 +161,7 @@ SETTINGS = """covariance : float
             variance (the reference text: 0.1). For rls, rpem, physical, fused.
         limit : float
             Standard deviations beyond which an innovation moves the estimate no further. For
-            rls, rpem, physical, multiple-model, population, fused.
+            rls, rpem, physical, multiple-model, adaptive, fused.
         windup_guard : float | Literal['off']
             How far each variance in P may grow where nothing excites its parameter, as a
             multiple of what it is at the start; off: without end. For rls, rpem, physical.
@@ -185,7 +185,7 @@ SETTINGS = """covariance : float
         guard : Literal['yes', 'no']
             Guard: outliers of e and u are held back, spans that no tracking makes are left out,
             and the estimate begins again after them. For rls, rpem, physical, multiple-model,
-            population.
+            adaptive.
         regressor : Literal['gradient', 'cascade', 'pseudo-linear']
             Signals of psi: gradient (D/(C F) as one filter), cascade (1/F before D/C; for
             comparison), or pseudo-linear (without filters: extended least squares). For rpem.
@@ -212,11 +212,11 @@ SETTINGS = """covariance : float
             ends, in place of what the past alone says. For multiple-model.
         false_alarms : float
             False alarms in an hour that are accepted: a lower number finds fewer changes,
-            later. For population.
+            later. For adaptive.
         replay : float
             Time that is read again and again; 0 for a recursion that reads each sample once, as
-            a microcontroller does. For population.
+            a microcontroller does. For adaptive.
         prior : str | PathLike[str] | Mapping[str, tuple[float, float]] | OperatorFit
             What is known of the person before the first sample: population, none,
             NAME=CENTRE:SPREAD of omega_nm, zeta_nm, tau_e, T_I (the spread is relative), or an
-            earlier fit of them, a file that hoid identify --json has printed. For population."""
+            earlier fit of them, a file that hoid identify --json has printed. For adaptive."""

@@ -53,7 +53,7 @@ class Trace:
     Columns are read by name: ``trace["K_e"]``, and ``trace["K_e_se"]`` for its standard errors. All
     have shape (N,), and NaN where a row has no operator. With `at` and `controlled_element` there
     are ``trace["gain_db@2.5"]``, ``trace["phase_deg@2.5"]``, ``trace["crossover_rad_s"]`` and
-    ``trace["phase_margin_deg"]``; ``"population"`` adds ``trace["omega_nm_determined"]`` and the
+    ``trace["phase_margin_deg"]``; ``"adaptive"`` adds ``trace["omega_nm_determined"]`` and the
     like, 1 where the data determine a parameter.
 
     Attributes
@@ -189,7 +189,7 @@ class Trace:
 
     @property
     def changes(self) -> list[dict[str, Any]]:
-        """The changes that ``"population"`` or ``"multiple-model"`` declared.
+        """The changes that ``"adaptive"`` or ``"multiple-model"`` declared.
 
         Each has its time `t`, how long ago it was, the odds, what changed (`changed`), and the
         gains before and after with their standard errors.

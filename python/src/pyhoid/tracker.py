@@ -24,7 +24,7 @@ __all__ = ["Tracker"]
 class Tracker(_pyhoid.Tracker):
     """A recursive estimate that takes one sample at a time.
 
-    The default, ``"population"``, speaks at once. Other methods without a start collect `warm_up`
+    The default, ``"adaptive"``, speaks at once. Other methods without a start collect `warm_up`
     seconds, fit them, and go on from there; until then `ready` is False. It can be pickled, and
     goes on with the same digits.
 
@@ -59,7 +59,7 @@ class Tracker(_pyhoid.Tracker):
 
     def __new__(
         cls,
-        method: RecursiveMethod = "population",
+        method: RecursiveMethod = "adaptive",
         *,
         sample_time: float = 0.01,
         warm_up: float = 20.0,
@@ -80,6 +80,7 @@ class Tracker(_pyhoid.Tracker):
         **settings: Unpack[MethodSettings],
     ) -> Tracker:
         """See the class."""
+        method = _recursion.name_of_now(method)
         options = _recursion.plain(locals(), settings) | {"decimate": str(decimate)}
         samples = round(warm_up / sample_time) if sample_time > 0 else 0
         return cls._made(options, float(sample_time), samples, record)
@@ -125,7 +126,7 @@ class Tracker(_pyhoid.Tracker):
 
         Examples
         --------
-        >>> tracker = pyhoid.Tracker("population", at=(1, 2.5), sample_time=0.01)
+        >>> tracker = pyhoid.Tracker("adaptive", at=(1, 2.5), sample_time=0.01)
         >>> gain, phase = tracker.responses[2.5]
         """
         told = {omega: self.response(omega) for omega in self.at}

@@ -27,7 +27,7 @@ __all__ = ["track"]
 
 def track(
     record: Record,
-    method: RecursiveMethod = "population",
+    method: RecursiveMethod = "adaptive",
     *,
     structure: Structure | None = None,
     na: Order | None = None,
@@ -53,7 +53,7 @@ def track(
 ) -> Trace:
     """Track a model and the operator's parameters over a record, sample by sample.
 
-    Without options this is ``"population"``: gains in a basis that people share. It needs no start
+    Without options this is ``"adaptive"``: gains in a basis that people share. It needs no start
     fit, speaks from the second second on, and is made for recorded people. Where the form of the
     operator and its delay are known, ``"multiple-model"`` is more precise.
 
@@ -69,7 +69,7 @@ def track(
     criterion : str
         The criterion that chooses between candidates.
     start : mapping of str to float, or "nothing", optional
-        All coefficients; default a batch fit of the start span. ``"population"`` has `prior` in
+        All coefficients; default a batch fit of the start span. ``"adaptive"`` has `prior` in
         its place.
     largest : float
         Magnitude of e or u beyond which a sample is a fault.
@@ -123,6 +123,7 @@ def track(
     >>> trace = pyhoid.track(record, at=(1, 2.5), controlled_element="90/(s(s+6))", prior=fit)
     >>> trace["phase_margin_deg"], trace["phase_margin_deg_se"]
     """
+    method = _recursion.name_of_now(method)
     shared = {
         name: value
         for name, value in locals().items()

@@ -165,7 +165,7 @@ mod tests {
             Method::rls(),
             Method::physical(),
             Method::multiple_model(),
-            Method::population(),
+            Method::adaptive(),
         ] {
             let own = OfMethod(method);
             let (over_record, options) = (own.follow(&task).unwrap(), own.options(&task).unwrap());
@@ -187,7 +187,7 @@ mod tests {
             seeds: Seeds::Open,
             number: 1,
         };
-        let line = Posed::new(&case, of).unwrap().line(&OfMethod(Method::population()));
+        let line = Posed::new(&case, of).unwrap().line(&OfMethod(Method::adaptive()));
         let errors: Vec<f64> = line.moments.iter().map(|m| m.error).collect();
         assert!(errors.iter().all(|e| *e < 0.3), "{errors:?}");
     }

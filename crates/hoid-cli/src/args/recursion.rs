@@ -27,12 +27,12 @@ pub struct RecursionArgs {
     #[arg(long, value_name = "NAME", value_parser = choice_of(&Structure::ALL))]
     pub structure: Option<Structure>,
     /// Orders, each a number or a range to search on the start span, as nb=2,nc=0,nd=1..4,nf=2
-    /// [default: the operator's: bj nb=2,nd=1..4,nf=2, for population nd=16, for multiple-model nd=6; arx
+    /// [default: the operator's: bj nb=2,nd=1..4,nf=2, for adaptive nd=16, for multiple-model nd=6; arx
     /// na=2,nb=2]
     #[arg(long, value_name = "LIST")]
     pub orders: Option<String>,
     /// Delay of b0 in samples (29), or dead time in s (0.28s); a number or a range (20..40,
-    /// 0.1s..0.4s) to search on the start span [default: 0.05 to 0.6 s; population begins at 0.2 s and
+    /// 0.1s..0.4s) to search on the start span [default: 0.05 to 0.6 s; adaptive begins at 0.2 s and
     /// follows the delay]
     #[arg(long, value_name = "N|Ss|LO..HI", value_parser = parse_delay)]
     pub nk: Option<DelayRange>,
@@ -40,7 +40,7 @@ pub struct RecursionArgs {
     #[arg(long, value_name = "NAME", default_value = "bic", value_parser = choice_of(&Criterion::ALL))]
     pub criterion: Criterion,
     /// Where the recursion starts: all coefficients as f1=-1.9,f2=.92,b0=.04,... or `nothing`
-    /// [default: a batch fit of the start span, or of the warm-up; population starts from --prior]
+    /// [default: a batch fit of the start span, or of the warm-up; adaptive starts from --prior]
     #[arg(long, value_name = "LIST|nothing", allow_hyphen_values = true)]
     pub start: Option<String>,
     #[command(flatten)]
@@ -146,8 +146,11 @@ pub struct StreamArgs {
 
 /// The recursive methods, each with its line of help.
 pub(super) fn method_names() -> impl TypedValueParser<Value = String> {
-    let value = |spec: MethodSpec| PossibleValue::new(spec.name).help(spec.help);
-    PossibleValuesParser::new(Method::registry().into_iter().map(value)).map(|name| name.to_lowercase())
+    let value = |method: Method| {
+        let MethodSpec { name, help, .. } = method.spec();
+        PossibleValue::new(name).help(help).aliases(method.earlier_name())
+    };
+    PossibleValuesParser::new(Method::all().into_iter().map(value)).map(|name| name.to_lowercase())
 }
 
 fn parse_count(text: &str) -> Result<usize, String> {

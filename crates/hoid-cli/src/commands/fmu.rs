@@ -12,13 +12,13 @@ use hoid::io::{
 };
 use hoid::model::SampleTime;
 use hoid::sim::{FamilyOperatorRun, FamilySimulator, RunSeed, Simulator};
-use hoid::track::Method;
 
 use super::places;
 use crate::{
     args::{FmuArgs, OperatorChoice},
     error::CliError,
     output,
+    recursion::method_of,
 };
 
 pub fn run(args: &FmuArgs) -> Result<(), CliError> {
@@ -56,11 +56,11 @@ type Unit = (FmuSettings, Vec<PathBuf>, f64);
 
 fn of_tracker(args: &FmuArgs) -> Result<Unit, CliError> {
     let step = SampleTime::new(args.sample_time)?;
+    let mut method = method_of(&args.method)?;
     let mut settings = FmuSettings::new(FmuKind::Tracker)
         .with("sample_time", FmuStart::Real(step.s()))
-        .with("method", FmuStart::Text(args.method.clone()));
+        .with("method", FmuStart::Text(method.name().to_owned()));
     let mut read = Vec::new();
-    let mut method: Method = args.method.parse()?;
     let wrong = |prior: &str, error: &dyn std::fmt::Display| CliError::Usage(format!("--prior {prior}: {error}"));
     match &args.prior {
         None => {}

@@ -4,10 +4,10 @@
 // Put it into a project of your own with `hoid` among its libraries, and create it by
 //
 //     dueca.Module("hoid-tracker", "", admin_priority).param(
-//         ("set-timing", sim_timing), ("method", "population"), ("options", ""))
+//         ("set-timing", sim_timing), ("method", "adaptive"), ("options", ""))
 //
 // A model is fitted within a sample by methods with a warm-up: give those a priority of their own, or
-// take `population`, which has none.
+// take `adaptive`, which has none.
 #include <hoid.h>
 
 #include <cmath>
@@ -29,7 +29,7 @@ class HoidTracker : public Module {
         void operator()(hoid_tracker *tracker) const { hoid_tracker_free(tracker); }
     };
 
-    std::string method = "population";
+    std::string method = "adaptive";
     std::string options;
     double sample_time = 0.0;
     std::unique_ptr<hoid_tracker, Free> tracker;

@@ -2,7 +2,7 @@
  *
  *     mex sfun_hoid.c -I/where/sdk/include -L/where/sdk/lib -lhoid
  *
- * Parameters of the block: method ('population'), sample time in s (0.01), options in JSON ('').
+ * Parameters of the block: method ('adaptive'), sample time in s (0.01), options in JSON ('').
  * Input port: [e u]. Output port, NaN for what is not known:
  *
  *     1..12   K_e, T_L, K_e_dot, omega_nm, zeta_nm, tau_e, a standard error behind each

@@ -298,7 +298,10 @@ mod tests {
 
     /// A fit lies in the unit; what it is of shows before the data do.
     #[test]
-    #[cfg_attr(miri, ignore = "safe code, and the filters of population take minutes there")]
+    #[cfg_attr(
+        miri,
+        ignore = "safe code, and the filters of the method adaptive take minutes there"
+    )]
     fn a_unit_begins_with_its_fit() {
         let fit = r#"{"form": "gain", "neuromuscular": true, "verdict": {"level": "trustworthy"}, "parameters": [],
             "records": [{"sample_time": 0.01, "units": {"input": "", "output": ""}}],
@@ -355,7 +358,7 @@ mod tests {
         assert!(why(instance.set(output, FmuStart::Real(0.0))).contains("output"));
         assert!(instance.text(0).is_err() && instance.begins_at(f64::NAN).is_err());
         set(&mut instance, "method", FmuStart::Text("kalman".to_owned()));
-        assert!(why(instance.start()).contains("population"));
+        assert!(why(instance.start()).contains("adaptive"));
         instance.reset();
         // The cheapest there is: its method does not matter.
         set(&mut instance, "method", FmuStart::Text("rpem".to_owned()));

@@ -97,7 +97,7 @@ fn tracker() -> Vec<FmuVariable> {
             Real(0.01),
             "sample time; steps may be shorter, not longer",
         ),
-        parameter("method", "", text("population"), "recursive method, as of hoid track"),
+        parameter("method", "", text("adaptive"), "recursive method, as of hoid track"),
         parameter(
             "prior",
             "",

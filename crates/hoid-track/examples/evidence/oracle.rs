@@ -8,7 +8,7 @@
 //!
 //! over the first seconds after the change, each without its mean. It needs about 12 where once an hour may
 //! be wrong; without knowing both persons, more.
-use hoid_core::population::{basis::Basis, usual::Usual};
+use hoid_core::adaptive::{basis::Basis, usual::Usual};
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 const ORDER: usize = 16;

@@ -32,7 +32,7 @@ fn tracker(options: &TrackOptions, record: &Record) -> Tracker {
 const GUARDED: [fn() -> Method; 5] = [
     Method::physical,
     Method::multiple_model,
-    Method::population,
+    Method::adaptive,
     Method::rls,
     Method::rpem,
 ];
@@ -61,7 +61,7 @@ fn it_stands_before_methods_of_a_person_by_default() {
     for method in Method::all() {
         let expected = matches!(
             method,
-            Method::Physical(_) | Method::MultipleModel(_) | Method::Population(_)
+            Method::Physical(_) | Method::MultipleModel(_) | Method::Adaptive(_)
         );
         assert_eq!(method.inner().is_guarded(), expected, "{method}");
     }

@@ -5,7 +5,7 @@
 //! lag, where that is all that is missed. Whether the errors before, since the last
 //! change, say anything more of u is the question ([`hoid_ident::judgement::left_response()`]).
 
-use hoid_core::population::basis::{Basis, Point, Signals};
+use hoid_core::adaptive::basis::{Basis, Point, Signals};
 use hoid_ident::judgement::{LeftResponse, left_response};
 use hoid_model::{Finding, Record};
 
@@ -135,7 +135,7 @@ mod tests {
     }
 
     fn found(record: &Record) -> LeftResponse {
-        let options = TrackOptions::usual(Method::population(), 29);
+        let options = TrackOptions::usual(Method::adaptive(), 29);
         track(record, &options, 50).unwrap().left_response(record).unwrap()
     }
 
@@ -154,7 +154,7 @@ mod tests {
     #[test]
     fn too_little_says_nothing() {
         let record = run(0).span(0.0, 25.0).unwrap();
-        let trace = track(&record, &TrackOptions::usual(Method::population(), 29), 50).unwrap();
+        let trace = track(&record, &TrackOptions::usual(Method::adaptive(), 29), 50).unwrap();
         assert_eq!(trace.left_response(&record), None);
         // A method without this basis is not asked.
         let record = run(0);

@@ -55,7 +55,7 @@ fn a_change_inside_the_start_span_is_told() {
 #[test]
 fn a_method_that_starts_itself_says_what_it_supposes() {
     let record = simulated(Condition::C1);
-    let options = TrackOptions::usual(Method::population(), 29);
+    let options = TrackOptions::usual(Method::adaptive(), 29);
     let short = judged(&record.span(0.0, 3.0).unwrap(), &options);
     assert!(kinds(&short).contains(&"supposed"), "{short}");
     assert!(!kinds(&short).contains(&"not-convertible"), "{short}");
@@ -111,7 +111,7 @@ fn an_output_that_is_zero_is_not_determined() {
     let input = Channel::new("e", "", record.input().to_vec());
     let silent = Channel::new("u", "", vec![0.0; record.len()]);
     let other = Record::new(record.sample_time(), input, silent).unwrap();
-    let trace = track(&other, &TrackOptions::usual(Method::population(), 29), 10).unwrap();
+    let trace = track(&other, &TrackOptions::usual(Method::adaptive(), 29), 10).unwrap();
     let verdict = trace.verdict(&other, None).unwrap();
     assert_eq!(verdict.level, VerdictLevel::NotDetermined, "{verdict}");
 }
@@ -234,7 +234,7 @@ fn with_signals(record: &Record, e: Vec<f64>, u: Vec<f64>) -> Record {
 }
 
 fn usual() -> TrackOptions {
-    TrackOptions::usual(Method::population(), 29)
+    TrackOptions::usual(Method::adaptive(), 29)
 }
 
 #[test]
@@ -304,7 +304,7 @@ fn who_answers_like_a_gain_is_trustworthy_and_no_remedy_is_refused() {
     let found = verdict.findings().iter().find(|f| f.kind == "undetermined-parameter");
     assert_eq!(found.map(|f| f.severity), Some(Severity::Note), "{verdict}");
     // Without a memory none is asked to be longer.
-    assert!(!lead_is_open(Method::population()).to_string().contains("memory"));
+    assert!(!lead_is_open(Method::adaptive()).to_string().contains("memory"));
     let operator = |k_e_dot: f64| OperatorEstimate {
         k_e: Estimate::with_variance(1.0, 0.01),
         t_l_s: Estimate::with_variance(k_e_dot, 0.01),

@@ -1,10 +1,10 @@
 //! The recursive methods. A new one is a file beside these and a line in the list below.
 
+mod adaptive;
 mod fused;
 mod joint_filter;
 mod multiple_model;
 mod physical;
-mod population;
 mod rls;
 mod rpem;
 mod rriv;
@@ -24,11 +24,11 @@ use crate::{
     person_prior::PersonPrior,
 };
 
+pub use adaptive::AdaptiveOptions;
 pub use fused::FusedOptions;
 pub use joint_filter::{EkfOptions, UkfOptions};
 pub use multiple_model::MultipleModelOptions;
 pub use physical::PhysicalOptions;
-pub use population::PopulationOptions;
 pub use rls::RlsOptions;
 pub use rpem::RpemOptions;
 pub use rriv::RrivOptions;
@@ -93,7 +93,7 @@ methods! {
     /// = 0.
     MultipleModel(MultipleModelOptions) = multiple_model,
     /// Gains in a basis that people share: Box-Jenkins with nc = 0.
-    Population(PopulationOptions) = population,
+    Adaptive(AdaptiveOptions) = adaptive,
     /// Recursive least squares for B with the poles of the recursive prediction-error method:
     /// Box-Jenkins.
     Fused(FusedOptions) = fused,
@@ -125,6 +125,21 @@ impl Method {
     /// Name as on the command line.
     pub fn name(&self) -> &'static str {
         self.inner().about().name
+    }
+
+    /// What it was called before; that is still read.
+    pub fn earlier_name(&self) -> Option<&'static str> {
+        self.inner().earlier_name()
+    }
+
+    /// Of an earlier name of a method that of now, and the sentence that says so.
+    pub fn renamed(text: &str) -> Option<(&'static str, String)> {
+        let earlier = plain(text);
+        let found = Self::all()
+            .into_iter()
+            .find(|method| method.earlier_name() == Some(earlier.as_str()))?;
+        let name = found.name();
+        Some((name, format!("the method `{earlier}` is now called `{name}`")))
     }
 
     /// Its options by name.
@@ -181,7 +196,7 @@ impl Method {
             false => Err(bad(
                 "prior",
                 source,
-                "the method population, which alone begins with a fit",
+                "the method adaptive, which alone begins with a fit",
             )),
         }
     }
@@ -269,10 +284,10 @@ impl Method {
     }
 }
 
-/// [`Method::population`]: it needs nothing to begin with, and holds on recorded people.
+/// [`Method::adaptive`]: it needs nothing to begin with, and holds on recorded people.
 impl Default for Method {
     fn default() -> Self {
-        Self::population()
+        Self::adaptive()
     }
 }
 
@@ -282,15 +297,22 @@ impl fmt::Display for Method {
     }
 }
 
-/// The method of a name, with its defaults.
+/// A name as it was typed, in the form of the registry.
+fn plain(text: &str) -> String {
+    text.trim().to_ascii_lowercase()
+}
+
+/// The method of a name, with its defaults. An earlier name stands in plans and in saved trackers, and is read
+/// as well; who can tell the user says it ([`Method::renamed`]).
 impl FromStr for Method {
     type Err = IdentError;
 
     fn from_str(text: &str) -> Result<Self, Self::Err> {
-        let plain = text.trim().to_ascii_lowercase();
+        let plain = plain(text);
+        let name = Self::renamed(&plain).map_or(plain.as_str(), |(now, _)| now);
         let all = Self::all();
         let names: Vec<&str> = all.iter().map(Self::name).collect();
-        let found = all.iter().find(|method| method.name() == plain).cloned();
+        let found = all.iter().find(|method| method.name() == name).cloned();
         found.ok_or_else(|| bad("the method", text.to_owned(), &format!("one of {}", names.join(", "))))
     }
 }
@@ -316,6 +338,19 @@ mod tests {
                 .to_string()
                 .contains("rpem, physical")
         );
+    }
+
+    #[test]
+    fn an_earlier_name_is_read_and_said_to_be_one() {
+        assert_eq!("population".parse::<Method>().unwrap(), Method::adaptive());
+        let (name, note) = Method::renamed(" Population").unwrap();
+        assert_eq!(name, "adaptive");
+        assert_eq!(note, "the method `population` is now called `adaptive`");
+        let refused = "kalman".parse::<Method>().unwrap_err().to_string();
+        assert!(!refused.contains("population"), "{refused}");
+        for method in Method::all() {
+            assert_eq!(Method::renamed(method.name()), None, "a name belongs to one method");
+        }
     }
 
     #[test]

@@ -28,7 +28,7 @@ pub enum Way {
     GreyBox,
     /// `identify --structure bj`.
     BoxJenkins,
-    Population,
+    Adaptive,
     MultipleModel,
     Physical,
     Rls,
@@ -39,7 +39,7 @@ impl Way {
     pub const ALL: [Self; 7] = [
         Self::GreyBox,
         Self::BoxJenkins,
-        Self::Population,
+        Self::Adaptive,
         Self::MultipleModel,
         Self::Physical,
         Self::Rls,
@@ -50,7 +50,7 @@ impl Way {
         match self {
             Self::GreyBox => "grey-box",
             Self::BoxJenkins => "bj",
-            Self::Population => "population",
+            Self::Adaptive => "adaptive",
             Self::MultipleModel => "multiple-model",
             Self::Physical => "physical",
             Self::Rls => "rls",
@@ -65,7 +65,7 @@ impl Way {
     /// Those that a run is evaluated by: the grey box knows all operators, the others a gain with a
     /// lead; of people, by the three that are meant for them.
     pub fn of(base: &Base) -> &'static [Self] {
-        const LEAD: [Way; 4] = [Way::GreyBox, Way::Population, Way::MultipleModel, Way::Physical];
+        const LEAD: [Way; 4] = [Way::GreyBox, Way::Adaptive, Way::MultipleModel, Way::Physical];
         match (base.who, base.form) {
             (Who::C1 | Who::C2, _) => &Self::ALL,
             (Who::Person, hoid::model::Form::Lead) => &LEAD,

@@ -19,7 +19,7 @@
 //!
 //! - **Candidates** (`candidate`). One basis and one noise model read the data sample by sample: that is the
 //!   prediction error method for given D and a linearisation. The candidate of now answers; beside it another one
-//!   reads the record again ([`PopulationFilter`]), from where the estimate points, with what has been learnt of the
+//!   reads the record again ([`AdaptiveFilter`]), from where the estimate points, with what has been learnt of the
 //!   noise, and takes over when it has caught up. Every second one starts elsewhere. So the estimate is that of a
 //!   batch fit which is repeated again and again, at a bounded cost for each sample.
 //! - **Changes** ([`mixture`]). Within a candidate, hypotheses say when the operator last changed: they are born
@@ -37,7 +37,7 @@
 //!
 //! Nothing has to be fitted before: the estimate begins with the first second, whose ratio of
 //! output to error gives the scale of the gains' prior. Where an earlier fit of the person is at hand
-//! ([`known`]), it begins there. [`PopulationFilter`] is the recursion.
+//! ([`known`]), it begins there. [`AdaptiveFilter`] is the recursion.
 
 pub mod basis;
 pub mod blocks;
@@ -65,7 +65,7 @@ mod saturation;
 mod sizes;
 mod volatility;
 
-pub use filter::{PopulationFilter, REPLAYED, errors_needed, least_memory, memory_needed};
+pub use filter::{AdaptiveFilter, REPLAYED, errors_needed, least_memory, memory_needed};
 pub use operator::through;
-pub use prior::PopulationPrior;
+pub use prior::AdaptivePrior;
 pub use sizes::{GAINS, HELD, HYPOTHESES, LARGEST_ORDER, LINEAR, PARAMETERS, SIGNALS, STARTS, STATES};

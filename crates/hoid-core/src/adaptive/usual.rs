@@ -11,7 +11,7 @@ use super::{
     detector::Detection,
     last_blocks::BLOCK_S,
     mixture::ChangePrior,
-    prior::PopulationPrior,
+    prior::AdaptivePrior,
     sizes::{HELD, STARTS},
 };
 
@@ -125,10 +125,10 @@ impl Usual {
     }
 
     /// What is supposed of them, at a sample time in s.
-    pub fn prior(&self, sample_time: f64) -> PopulationPrior {
+    pub fn prior(&self, sample_time: f64) -> AdaptivePrior {
         let blocks = |seconds: f64| libm::round(seconds / BLOCK_S) as usize;
         let given = self.spread[2] < SPREAD[2];
-        PopulationPrior {
+        AdaptivePrior {
             person: self.point,
             spread: self.spread,
             sample_time,

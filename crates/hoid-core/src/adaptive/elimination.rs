@@ -51,7 +51,7 @@ pub(super) fn solve<const N: usize>(a: &mut [[f64; N]; N], n: usize, b: &mut [f6
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::population::cholesky;
+    use crate::adaptive::cholesky;
 
     #[test]
     fn it_is_the_solution_by_cholesky() {

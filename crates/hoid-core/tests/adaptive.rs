@@ -2,8 +2,8 @@
 #![allow(clippy::expect_used)]
 
 use hoid_core::{
-    population::{
-        GAINS, LARGEST_ORDER, PopulationFilter, PopulationPrior, STATES,
+    adaptive::{
+        AdaptiveFilter, AdaptivePrior, GAINS, LARGEST_ORDER, STATES,
         basis::{Basis, Point},
         detector::Detection,
         known::Known,
@@ -17,8 +17,8 @@ use hoid_core::{
 
 const TS: f64 = 0.02;
 
-fn prior(threshold: f64) -> PopulationPrior {
-    PopulationPrior {
+fn prior(threshold: f64) -> AdaptivePrior {
+    AdaptivePrior {
         order: 8,
         detection: Detection {
             frequency: 2.5,
@@ -47,9 +47,9 @@ fn basis(point: Point) -> Basis {
     Basis::new(point, TS).expect("a sound point")
 }
 
-fn filter(threshold: f64) -> PopulationFilter<Vec<f64>> {
+fn filter(threshold: f64) -> AdaptiveFilter<Vec<f64>> {
     let memory = vec![0.0; memory_needed(TS, REPLAYED_S)];
-    PopulationFilter::new(prior(threshold), memory).expect("a sound prior")
+    AdaptiveFilter::new(prior(threshold), memory).expect("a sound prior")
 }
 
 /// Nearly normal numbers of a fixed stream: sums of twelve uniform ones.
@@ -120,7 +120,7 @@ fn response(basis: &Basis, gains: [f64; GAINS], omega: f64) -> [f64; 2] {
 }
 
 /// The estimate at a frequency, real and imaginary part, with their variances.
-fn estimate(filter: &PopulationFilter<Vec<f64>>, omega: f64) -> ([f64; 2], [f64; 2]) {
+fn estimate(filter: &AdaptiveFilter<Vec<f64>>, omega: f64) -> ([f64; 2], [f64; 2]) {
     let (value, by) = filter.response_with_derivatives(omega);
     let c = filter.state_covariance();
     let variance = |row: &[f64; STATES]| -> f64 {
@@ -381,7 +381,7 @@ fn an_outlier_hardly_moves_the_estimate() {
 #[test]
 fn what_makes_no_sense_is_refused() {
     let memory = || vec![0.0; least_memory(TS)];
-    assert!(PopulationFilter::new(prior(13.5), vec![0.0; 3]).is_none());
+    assert!(AdaptiveFilter::new(prior(13.5), vec![0.0; 3]).is_none());
     let sound = prior(13.5);
     let changed = |between: f64, steady: f64| ChangePrior {
         between,
@@ -389,29 +389,29 @@ fn what_makes_no_sense_is_refused() {
         ..sound.changes
     };
     for wrong in [
-        PopulationPrior {
+        AdaptivePrior {
             person: Point { tau: 1.0, ..usual() },
             ..sound
         },
-        PopulationPrior { order: 1, ..sound },
-        PopulationPrior { hold: 0.0, ..sound },
-        PopulationPrior {
+        AdaptivePrior { order: 1, ..sound },
+        AdaptivePrior { hold: 0.0, ..sound },
+        AdaptivePrior {
             hold: f64::NAN,
             ..sound
         },
-        PopulationPrior {
+        AdaptivePrior {
             spread: [0.3, 0.0, 0.1],
             ..sound
         },
-        PopulationPrior {
+        AdaptivePrior {
             changes: changed(-1.0, 0.5),
             ..sound
         },
-        PopulationPrior {
+        AdaptivePrior {
             changes: changed(60.0, 1.5),
             ..sound
         },
-        PopulationPrior {
+        AdaptivePrior {
             detection: Detection {
                 most: 500,
                 ..sound.detection
@@ -419,9 +419,9 @@ fn what_makes_no_sense_is_refused() {
             ..sound
         },
     ] {
-        assert!(PopulationFilter::new(wrong, memory()).is_none(), "{wrong:?}");
+        assert!(AdaptiveFilter::new(wrong, memory()).is_none(), "{wrong:?}");
     }
-    assert!(PopulationFilter::new(sound, memory()).is_some());
+    assert!(AdaptiveFilter::new(sound, memory()).is_some());
 }
 
 #[test]
@@ -432,7 +432,7 @@ fn without_memory_nothing_is_replayed_and_the_person_is_followed() {
         let memory = vec![0.0; least_memory(TS)];
         let mut filters = [
             filter(1e9),
-            PopulationFilter::new(prior(1e9), memory).expect("a sound prior"),
+            AdaptiveFilter::new(prior(1e9), memory).expect("a sound prior"),
         ];
         for _ in 0..3000 {
             let [e, u] = person.sample(GAINS_OF_A_PERSON, 0.05);
@@ -441,7 +441,7 @@ fn without_memory_nothing_is_replayed_and_the_person_is_followed() {
             });
         }
         let truth = response(&person.basis, GAINS_OF_A_PERSON, 2.0);
-        let error = |filter: &PopulationFilter<Vec<f64>>| {
+        let error = |filter: &AdaptiveFilter<Vec<f64>>| {
             let (value, _) = estimate(filter, 2.0);
             (value[0] - truth[0]).hypot(value[1] - truth[1]) / truth[0].hypot(truth[1])
         };
@@ -533,7 +533,7 @@ fn a_stick_that_ends_does_not_make_the_person_answer_less() {
             does_not.step(e, stick * (1.0 + 1e-9 * f64::from(k % 2)));
         }
         let (of, _) = estimate(&free, 2.0);
-        let distance = |filter: &PopulationFilter<Vec<f64>>| {
+        let distance = |filter: &AdaptiveFilter<Vec<f64>>| {
             let (y, _) = estimate(filter, 2.0);
             (y[0] - of[0]).hypot(y[1] - of[1]) / of[0].hypot(of[1])
         };

@@ -10,7 +10,7 @@
 //! scatter of other operators that predict u about as well ([`super::alternatives`]).
 
 use super::{
-    PopulationFilter,
+    AdaptiveFilter,
     candidate::NEAR_RAD_S,
     sizes::{GAINS, HELD, LINEAR, PARAMETERS, STATES},
     usual::HOLD_S,
@@ -21,7 +21,7 @@ use super::{
 /// another seed than those of the test (`tests/first_seconds.rs` of `hoid-track`).
 const UNLEARNT_S: f64 = 4.0;
 
-impl<E: AsRef<[f64]> + AsMut<[f64]>> PopulationFilter<E> {
+impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
     /// K_e, K_e_dot, omega_nm in rad/s, zeta_nm, and tau_e in s.
     pub fn operator(&self) -> [f64; PARAMETERS] {
         let [k_e, k_e_dot, omega, zeta, tau] = self.live().operator();

@@ -13,7 +13,7 @@
 //! The remnant of the fit is `v = (C/D) eps` with the impulse response g, whose autocovariances over
 //! the variance of eps are `r_k = sum_j g_j g_{j+k}`.
 
-use hoid_core::population::{
+use hoid_core::adaptive::{
     GAINS, HELD, LARGEST_ORDER, LINEAR, STATES,
     basis::{Basis, Point, REFERENCE},
     known::Known,
@@ -308,7 +308,7 @@ fn solved(a: [[f64; GAINS]; GAINS], b: [f64; GAINS]) -> [f64; GAINS] {
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
-    use hoid_core::population::usual;
+    use hoid_core::adaptive::usual;
     use hoid_model::{FamilyOperator, Form, uncertainty::variance_along};
 
     use super::*;
@@ -332,7 +332,7 @@ mod tests {
     }
 
     fn tracker(fit: FittedOperator) -> Result<Tracker, IdentError> {
-        let mut options = TrackOptions::usual(Method::population(), 21);
+        let mut options = TrackOptions::usual(Method::adaptive(), 21);
         options.method.start_from(fit).unwrap();
         Tracker::new(&options, None, SampleTime::HUNDREDTH)
     }
@@ -419,7 +419,7 @@ mod tests {
 
     #[test]
     fn what_is_named_moves_the_basis_and_the_rest_stays_usual() {
-        let named = Method::population()
+        let named = Method::adaptive()
             .with("prior", "omega_nm=9:0.2,tau_e=0.25:0.1")
             .unwrap();
         let prior = named.person_prior().unwrap();

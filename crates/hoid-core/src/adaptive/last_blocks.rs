@@ -111,7 +111,7 @@ impl LastBlocks {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::population::sizes::{HELD, LINEAR};
+    use crate::adaptive::sizes::{HELD, LINEAR};
 
     const ROW: Row = Row {
         r: [1.0; LINEAR],

@@ -9,7 +9,7 @@ use super::{
 
 /// What is supposed of a person and their changes.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct PopulationPrior {
+pub struct AdaptivePrior {
     /// What is held of the person, and how far they may be from it: shares of omega and zeta, and s for
     /// the delay.
     pub person: Point,
@@ -31,7 +31,7 @@ pub struct PopulationPrior {
     pub detection: Detection,
 }
 
-impl PopulationPrior {
+impl AdaptivePrior {
     /// True for numbers that make sense.
     pub(super) fn is_sound(&self) -> bool {
         let positive = |x: f64| x > 0.0 && x.is_finite();

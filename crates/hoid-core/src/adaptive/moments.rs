@@ -137,7 +137,7 @@ fn derivatives(basis: &Basis, state: &[f64; STATES], w: &[f64; INPUTS]) -> [[f64
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
-    use crate::population::basis::Point;
+    use crate::adaptive::basis::Point;
 
     fn basis() -> Basis {
         let point = Point {

@@ -17,7 +17,7 @@ use super::{
     known::Known,
     mixture::{Mixture, NoiseScales},
     noise::NoiseModel,
-    prior::PopulationPrior,
+    prior::AdaptivePrior,
     saturation::Saturation,
     sizes::{GAINS, HELD, LINEAR, STATES},
 };
@@ -37,8 +37,8 @@ const SETTLING_S: f64 = 2.0;
 
 /// The recursion. E is the memory for past samples.
 #[derive(Debug, Clone, PartialEq)]
-pub struct PopulationFilter<E> {
-    prior: PopulationPrior,
+pub struct AdaptiveFilter<E> {
+    prior: AdaptivePrior,
     origin: Basis,
     known: Option<Known>,
     supposed: NoiseModel,
@@ -63,7 +63,7 @@ pub struct PopulationFilter<E> {
     settling: u64,
 }
 
-impl<E: AsMut<[f64]>> State for PopulationFilter<E> {
+impl<E: AsMut<[f64]>> State for AdaptiveFilter<E> {
     fn visit(&mut self, each: &mut dyn FnMut(&mut f64)) {
         visit_all(
             &mut [
@@ -88,10 +88,10 @@ impl<E: AsMut<[f64]>> State for PopulationFilter<E> {
     }
 }
 
-impl<E: AsRef<[f64]> + AsMut<[f64]>> PopulationFilter<E> {
+impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
     /// At rest. `memory` is for [`memory_needed`] numbers, or fewer for no replays, but never fewer than
     /// [`least_memory`]. `None` for numbers that make no sense, or too little memory.
-    pub fn new(prior: PopulationPrior, memory: E) -> Option<Self> {
+    pub fn new(prior: AdaptivePrior, memory: E) -> Option<Self> {
         let ts = prior.sample_time;
         if !prior.is_sound() || prior.person.tau > LATEST_S || memory.as_ref().len() < least_memory(ts) {
             return None;
@@ -300,14 +300,14 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> PopulationFilter<E> {
         }
     }
 
-    /// As [`PopulationFilter::step`], but the estimate stays: only the filters move on.
+    /// As [`AdaptiveFilter::step`], but the estimate stays: only the filters move on.
     pub fn step_without_update(&mut self, e: f64, u: f64) -> Step {
         self.respond(e);
         self.detector.pass_over();
         self.pass(u, Use::Follow)
     }
 
-    /// As [`PopulationFilter::step_without_update`] where the output is missing: the one-step
+    /// As [`AdaptiveFilter::step_without_update`] where the output is missing: the one-step
     /// prediction takes its place.
     pub fn bridge(&mut self, e: f64) {
         self.respond(e);
@@ -457,7 +457,7 @@ fn through_filters(saturation: &Saturation, use_of_it: Use, u: f64, predicted: f
 }
 
 /// Variances of what is supposed of the corrections.
-fn variances(prior: &PopulationPrior) -> [f64; HELD] {
+fn variances(prior: &AdaptivePrior) -> [f64; HELD] {
     let [omega, zeta, tau] = prior.spread;
     [omega * prior.person.omega, zeta * prior.person.zeta, tau].map(|s| s * s)
 }

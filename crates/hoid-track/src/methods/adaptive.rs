@@ -1,7 +1,7 @@
-//! The recursion in the basis that people share ([`hoid_core::population`]) behind the face of a
+//! The recursion in the basis that people share ([`hoid_core::adaptive`]) behind the face of a
 //! recursion: what is usual of people, in seconds.
 //!
-//! It needs no start fit: it begins with what is usual of people ([`hoid_core::population::usual`]). The delay begins at
+//! It needs no start fit: it begins with what is usual of people ([`hoid_core::adaptive::usual`]). The delay begins at
 //! that of nk, .2 s where nothing is said, and at half a sample more, for an error that is held.
 //!
 //! **What is known of the person** before the first sample is `prior`: what is usual, next to nothing,
@@ -9,14 +9,14 @@
 //! (`beginning`).
 //!
 //! **What it reports.** The gain and lead that are nearest to the gains of the basis
-//! ([`PopulationFilter::operator`]). The polynomials are the hold of that, with the delay of nk.
+//! ([`AdaptiveFilter::operator`]). The polynomials are the hold of that, with the delay of nk.
 
 mod beginning;
 
 use beginning::{Beginning, known};
 use hoid_core::{
-    population::{
-        GAINS, HELD, LARGEST_ORDER, LINEAR, PARAMETERS, PopulationFilter,
+    adaptive::{
+        AdaptiveFilter, GAINS, HELD, LARGEST_ORDER, LINEAR, PARAMETERS,
         basis::Basis,
         memory_needed, through,
         usual::{self, Usual},
@@ -44,7 +44,7 @@ use crate::{
 
 settings! {
     /// Options of the recursion in the basis that people share.
-    pub struct PopulationOptions {
+    pub struct AdaptiveOptions {
         /// False alarms in an hour that are accepted: a lower number finds fewer changes, later
         #[setting(unit("1/h"), bounds(Bounds::PositiveFinite))]
         pub false_alarms: f64 = 1.0,
@@ -66,15 +66,19 @@ settings! {
     }
 }
 
-impl RecursiveMethod for PopulationOptions {
+impl RecursiveMethod for AdaptiveOptions {
     fn about(&self) -> About {
         About {
-            name: "population",
+            name: "adaptive",
             help: "gains in a basis that people share, with a noise model of its own; starts without a fit",
             source: "McRuer and Jex 1967; Magill 1965; Chow 1960; Welch 1947; the book, page Recursive methods",
             structures: &[Structure::BoxJenkins, Structure::OutputError, Structure::General],
             defaults: &[],
         }
+    }
+
+    fn earlier_name(&self) -> Option<&'static str> {
+        Some("population")
     }
 
     fn usual_nd(&self) -> Option<usize> {
@@ -87,12 +91,12 @@ impl RecursiveMethod for PopulationOptions {
     }
 
     fn check(&self, setup: &Setup) -> Result<(), IdentError> {
-        check_operator_orders("population", setup)?;
+        check_operator_orders("adaptive", setup)?;
         check_delay(&setup.orders)?;
         let o = &setup.orders;
         if o.nc != 0 || o.nd > LARGEST_ORDER {
             return Err(bad_option(
-                "the noise model of population",
+                "the noise model of adaptive",
                 format!("nc={},nd={}", o.nc, o.nd),
                 "nc = 0 and nd of at most 24",
             ));
@@ -104,7 +108,7 @@ impl RecursiveMethod for PopulationOptions {
         };
         if let Some(start) = start {
             return Err(bad_option(
-                "the start of population",
+                "the start of adaptive",
                 start.to_owned(),
                 "a prior in its place: it starts from what is usual of people, from next to nothing (prior = none) or from an \
                  earlier fit of the person; rpem, physical and rls take a start",
@@ -119,7 +123,7 @@ impl RecursiveMethod for PopulationOptions {
         from: &StartState,
         sample_time: SampleTime,
     ) -> Result<Box<dyn Recursion>, IdentError> {
-        Ok(Box::new(PopulationRecursion::new(self, setup, from, sample_time)?))
+        Ok(Box::new(AdaptiveRecursion::new(self, setup, from, sample_time)?))
     }
 
     fn is_physical(&self) -> bool {
@@ -169,14 +173,14 @@ impl RecursiveMethod for PopulationOptions {
 }
 
 /// The filter with its report.
-struct PopulationRecursion {
-    model: Box<PopulationFilter<Vec<f64>>>,
+struct AdaptiveRecursion {
+    model: Box<AdaptiveFilter<Vec<f64>>>,
     reported: Reported,
 }
 
-impl PopulationRecursion {
+impl AdaptiveRecursion {
     fn new(
-        options: &PopulationOptions,
+        options: &AdaptiveOptions,
         setup: &Setup,
         from: &StartState,
         sample_time: SampleTime,
@@ -202,7 +206,7 @@ impl PopulationRecursion {
             false_alarms: options.false_alarms,
         };
         let memory = vec![0.0; memory_needed(ts, options.replay)];
-        let model = PopulationFilter::new(supposed.prior(ts), memory);
+        let model = AdaptiveFilter::new(supposed.prior(ts), memory);
         let model = match &known {
             Some(known) => model.and_then(|model| model.with_initial_estimate(known)),
             None => model,
@@ -277,13 +281,13 @@ fn unusable(what: &str) -> IdentError {
     }
 }
 
-impl State for PopulationRecursion {
+impl State for AdaptiveRecursion {
     fn visit(&mut self, each: &mut dyn FnMut(&mut f64)) {
         visit_all(&mut [&mut *self.model, &mut self.reported], each);
     }
 }
 
-impl Recursion for PopulationRecursion {
+impl Recursion for AdaptiveRecursion {
     fn step(&mut self, sample: Sample) -> StepOutcome {
         let step = self.model.step(sample.e, sample.u);
         if self.model.began() {

@@ -209,7 +209,7 @@ pub(super) fn solve(m: &mut Covariance, b: &mut Covariance) -> f64 {
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
-    use crate::population::{
+    use crate::adaptive::{
         basis::Point,
         sizes::{GAINS, LINEAR, SIGNALS},
     };

@@ -16,8 +16,8 @@
 
 use core::ops::Range;
 
-use super::{PopulationFilter, remember, through_filters, trusted, variances};
-use crate::population::{
+use super::{AdaptiveFilter, remember, through_filters, trusted, variances};
+use crate::adaptive::{
     basis::Point,
     candidate::Candidate,
     history::{History, Use},
@@ -36,7 +36,7 @@ const WORSE: f64 = 20.0;
 /// Samples that a first estimate needs, in orders of the noise model.
 const FEWEST: u64 = 3;
 
-impl<E: AsRef<[f64]> + AsMut<[f64]>> PopulationFilter<E> {
+impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
     /// The first estimate: the best of all starts over the samples so far.
     pub(super) fn begin(&mut self) {
         let (ts, n) = (self.prior.sample_time, self.history.samples());

@@ -16,7 +16,7 @@ fn record(condition: Condition) -> Record {
 }
 
 fn options() -> TrackOptions {
-    TrackOptions::usual(Method::population(), 29)
+    TrackOptions::usual(Method::adaptive(), 29)
 }
 
 #[test]
@@ -62,7 +62,7 @@ fn responses_have_bands_from_the_first_second_on() {
 
 #[test]
 fn options_that_make_no_sense_are_refused() {
-    assert!(Method::population().with("false_alarms", "0").is_err());
+    assert!(Method::adaptive().with("false_alarms", "0").is_err());
     let mut refused = options();
     refused.orders.nd = 25;
     assert!(refused.check().unwrap_err().to_string().contains("at most 24"));
@@ -75,7 +75,7 @@ fn options_that_make_no_sense_are_refused() {
 fn a_trace_tells_gain_and_phase_with_bands() {
     let record = record(Condition::C1);
     let at_rad_s = vec![1.0, 2.5];
-    for method in [Method::population(), Method::rls()] {
+    for method in [Method::adaptive(), Method::rls()] {
         let usual = TrackOptions {
             at_rad_s: at_rad_s.clone(),
             ..TrackOptions::usual(method, 29)
@@ -111,7 +111,7 @@ fn a_trace_tells_gain_and_phase_with_bands() {
         let averaged = trace.clone().moving_average(2);
         let (a, b) = (trace.response(9, 0).unwrap(), trace.response(10, 0).unwrap());
         let mean = averaged.response(10, 0).unwrap();
-        if usual.method == Method::population() {
+        if usual.method == Method::adaptive() {
             assert!((mean.value[0] - 0.5 * (a.value[0] + b.value[0])).abs() < 1e-12);
         }
         assert!(mean.covariance[0][0] > 0.0);
