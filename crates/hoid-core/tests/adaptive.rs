@@ -21,13 +21,11 @@ fn prior(threshold: f64) -> AdaptivePrior {
     AdaptivePrior {
         order: 8,
         detection: Detection {
-            frequency: 2.5,
             recent: [10, 16],
             least: 16,
             most: 80,
             threshold,
             held: [3.3, 0.125, 0.05],
-            persistence: 2,
             refractory: 16,
         },
         ..Usual::with_delay(0.2).prior(TS)
@@ -219,7 +217,7 @@ fn a_change_of_the_delay_is_found_and_told_from_one_of_the_gains() {
     let later = Point { tau: 0.21, ..usual() };
     let mut found = 0;
     for seed in 600..604 {
-        let (mut person, mut filter) = (Person::new(seed), filter(13.5));
+        let (mut person, mut filter) = (Person::new(seed), filter(12.5));
         let mut other = basis(later);
         let mut past = vec![0.0; other.delay() + 3];
         for k in 0..3000 {
@@ -247,7 +245,7 @@ fn a_change_of_the_delay_is_found_and_told_from_one_of_the_gains() {
 fn a_change_is_found_and_followed_and_a_louder_remnant_is_no_change() {
     let (mut found, mut errors) = (0, 0.0);
     for seed in 0..4 {
-        let (mut person, mut filter) = (Person::new(100 + seed), filter(13.5));
+        let (mut person, mut filter) = (Person::new(100 + seed), filter(12.5));
         let after = GAINS_OF_A_PERSON.map(|g| 0.5 * g);
         for k in 0..3000 {
             let gains = if k < 1500 { GAINS_OF_A_PERSON } else { after };
@@ -270,7 +268,7 @@ fn a_change_is_found_and_followed_and_a_louder_remnant_is_no_change() {
 
     let mut alarms = 0;
     for seed in 0..4 {
-        let (mut person, mut filter) = (Person::new(200 + seed), filter(13.5));
+        let (mut person, mut filter) = (Person::new(200 + seed), filter(12.5));
         for k in 0..3000 {
             let [e, u] = person.sample(GAINS_OF_A_PERSON, if k < 1500 { 0.03 } else { 0.06 });
             filter.step(e, u);
@@ -284,7 +282,7 @@ fn a_change_is_found_and_followed_and_a_louder_remnant_is_no_change() {
 fn what_stands_still_is_no_change_and_one_behind_it_is_found() {
     let (mut alarms, mut found) = (0, 0);
     for seed in 0..4 {
-        let (mut person, mut filter) = (Person::new(300 + seed), filter(9.5));
+        let (mut person, mut filter) = (Person::new(300 + seed), filter(12.5));
         for k in 0..4500 {
             let gains = if k < 2500 {
                 GAINS_OF_A_PERSON
@@ -307,14 +305,14 @@ fn what_stands_still_is_no_change_and_one_behind_it_is_found() {
 
 #[test]
 fn a_copy_goes_on_with_the_same_digits() {
-    let (mut person, mut first) = (Person::new(5), filter(13.5));
+    let (mut person, mut first) = (Person::new(5), filter(12.5));
     for _ in 0..1234 {
         let [e, u] = person.sample(GAINS_OF_A_PERSON, 0.05);
         first.step(e, u);
     }
     let mut numbers = Vec::new();
     first.visit(&mut |number| numbers.push(*number));
-    let mut second = filter(13.5);
+    let mut second = filter(12.5);
     let mut left = numbers.iter();
     second.visit(&mut |number| *number = *left.next().expect("as many numbers"));
     assert!(left.next().is_none());
@@ -328,7 +326,7 @@ fn a_copy_goes_on_with_the_same_digits() {
 
 #[test]
 fn what_says_nothing_does_no_harm() {
-    let mut silent = filter(13.5);
+    let mut silent = filter(12.5);
     for _ in 0..500 {
         assert_eq!(silent.step(0.0, 0.0).innovation, 0.0);
     }
@@ -340,7 +338,7 @@ fn what_says_nothing_does_no_harm() {
     }
     assert!(!silent.began());
 
-    let (mut person, mut filter) = (Person::new(9), filter(13.5));
+    let (mut person, mut filter) = (Person::new(9), filter(12.5));
     let [e, u] = person.sample(GAINS_OF_A_PERSON, 0.05);
     assert!(filter.step(e, u).innovation.is_finite() && !filter.began());
     for k in 0..2000 {
@@ -364,7 +362,7 @@ fn what_says_nothing_does_no_harm() {
 
 #[test]
 fn an_outlier_hardly_moves_the_estimate() {
-    let (mut person, mut filter) = (Person::new(11), filter(13.5));
+    let (mut person, mut filter) = (Person::new(11), filter(12.5));
     for _ in 0..1500 {
         let [e, u] = person.sample(GAINS_OF_A_PERSON, 0.05);
         filter.step(e, u);
@@ -515,8 +513,8 @@ fn what_is_known_stands_at_the_beginning() {
 fn a_stick_that_ends_does_not_make_the_person_answer_less() {
     let (mut told, mut taken) = (0.0, 0.0);
     for seed in 0..4 {
-        let (mut person, mut free) = (Person::new(400 + seed), filter(13.5));
-        let (mut knows, mut does_not) = (filter(13.5), filter(13.5));
+        let (mut person, mut free) = (Person::new(400 + seed), filter(12.5));
+        let (mut knows, mut does_not) = (filter(12.5), filter(13.5));
         let mut power = 0.0;
         for _ in 0..3000 {
             let [e, u] = person.sample(GAINS_OF_A_PERSON, 0.05);

@@ -260,20 +260,21 @@ impl Candidate {
     fn row(&self, white: &Whitened, innovation: f64, limit: f64) -> Row {
         let Regressors { x, by } = self.basis.regressors(&white.signals);
         let state = self.mixture.mean();
-        let (mut r, mut q) = ([0.0; LINEAR], [0.0; HELD]);
+        let (mut row, mut shift) = ([0.0; STATES], 0.0);
         for i in 0..GAINS {
-            r[i] = x[i];
+            row[i] = x[i];
             for j in 0..HELD {
-                r[i] += state[LINEAR + j] * by[j][i];
-                q[j] += state[i] * by[j][i];
+                row[i] += state[LINEAR + j] * by[j][i];
+                row[LINEAR + j] += state[i] * by[j][i];
             }
         }
-        r[GAINS] = white.level;
+        row[GAINS] = white.level;
+        for j in LINEAR..STATES {
+            shift += row[j] * state[j];
+        }
         Row {
-            r,
-            q,
-            p: core::array::from_fn(|j| state[LINEAR + j]),
-            y: self.limited(white.y, innovation, limit),
+            x: row,
+            y: self.limited(white.y, innovation, limit) + shift,
             innovation,
             variance: self.level[0],
         }

@@ -1,7 +1,7 @@
-//! What changed: the difference of two spans, with its full covariance.
+//! What changed: the difference of now from before, with its full covariance.
 //!
-//! Two spans have gains, level and what is held `s_0, s_1` with the covariances `C_0, C_1`. Of the
-//! difference `d = s_1 - s_0`, `W = (C_0 + C_1)^-1`, nobody asks for all at once: a delay that grows looks
+//! Gains, level and what is held differ by d with the covariance C (`contrast`). Of that difference, `W = C^-1`,
+//! nobody asks for all at once: a delay that grows looks
 //! like gains that turn, and seconds hardly tell them apart. So each group (the gains; natural frequency
 //! and damping; the delay) is supposed to have changed or not, the level always; what is in the set S is
 //! then
@@ -13,8 +13,8 @@
 //! of Schwarz (G. Schwarz, *Annals of Statistics* 6 (1978) 461-464).
 
 use super::{
-    blocks::WholeSpan,
     cholesky,
+    contrast::Contrast,
     sizes::{GAINS, LINEAR, STATES},
 };
 
@@ -40,12 +40,9 @@ pub struct Difference {
 crate::state!([] Difference { value, covariance, changed });
 
 impl Difference {
-    /// Between two spans, whose covariances are this many times larger than they say. `None` where they
-    /// do not determine it.
-    pub(super) fn of(before: &WholeSpan, after: &WholeSpan, level: f64) -> Option<Self> {
-        let d: [f64; STATES] = core::array::from_fn(|i| after.state[i] - before.state[i]);
-        let sum = |i: usize, j: usize| level * (before.covariance[i][j] + after.covariance[i][j]);
-        let mut factor: [[f64; STATES]; STATES] = core::array::from_fn(|i| core::array::from_fn(|j| sum(i, j)));
+    /// `None` where the contrast does not determine it.
+    pub(super) fn of(contrast: &Contrast) -> Option<Self> {
+        let (d, mut factor) = (contrast.difference, contrast.covariance);
         if !cholesky::factor(&mut factor, STATES) {
             return None;
         }
@@ -111,53 +108,45 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
 
-    /// Spans whose delay is told only together with the gains.
-    fn span(state: [f64; STATES], size: f64) -> WholeSpan {
+    /// A delay that is told only together with the gains.
+    fn contrast(difference: [f64; STATES]) -> Contrast {
         let mut covariance = [[0.0; STATES]; STATES];
         for (i, row) in covariance.iter_mut().enumerate() {
-            row[i] = size;
+            row[i] = 0.02;
         }
         for i in [0, 6] {
             for j in [0, 6] {
-                covariance[i][j] += if i == j { 0.9 } else { 0.899 };
+                covariance[i][j] += if i == j { 1.8 } else { 1.798 };
             }
         }
-        WholeSpan {
-            state,
+        Contrast {
+            difference,
             covariance,
-            left: 0.0,
+            ..Contrast::default()
         }
     }
 
     #[test]
     fn the_simplest_set_that_explains_is_told() {
-        let before = span([1.0, 2.0, 3.0, 0.0, 11.0, 0.25, 0.2], 0.01);
         // Along the delay alone: neither gains nor delay differ by much beside their own errors.
-        let mut state = before.state;
-        state[6] += 1.5;
-        let told = Difference::of(&before, &span(state, 0.01), 1.0).unwrap();
+        let told = Difference::of(&contrast([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.5])).unwrap();
         assert_eq!(told.changed, [false, false, true]);
         assert!((told.value[6] - 1.5).abs() < 1e-9 && told.value[0] == 0.0);
         // What is known of the delay once the gains are: far less than its marginal variance, 1.82.
         assert!(told.covariance[6][6] < 0.1, "{}", told.covariance[6][6]);
-        state = before.state;
-        state[1] += 1.5;
-        state[4] += 2.0;
-        let told = Difference::of(&before, &span(state, 0.01), 1.0).unwrap();
+        let told = Difference::of(&contrast([0.0, 1.5, 0.0, 0.0, 2.0, 0.0, 0.0])).unwrap();
         assert_eq!(told.changed, [true, true, false]);
         // All together are what the difference is.
-        state = before.state.map(|s| s + 2.0);
-        state[6] -= 14.0;
-        let told = Difference::of(&before, &span(state, 0.01), 1.0).unwrap();
+        let difference = [2.0, 2.0, 2.0, 2.0, 2.0, 2.0, -12.0];
+        let told = Difference::of(&contrast(difference)).unwrap();
         assert_eq!(told.changed, [true; 3]);
         for (i, value) in told.value.iter().enumerate() {
-            assert!((value - state[i] + before.state[i]).abs() < 1e-9);
+            assert!((value - difference[i]).abs() < 1e-9);
         }
     }
 
     #[test]
-    fn spans_that_say_nothing_have_no_difference() {
-        let nothing = WholeSpan::default();
-        assert!(Difference::of(&nothing, &nothing, 1.0).is_none());
+    fn a_contrast_that_says_nothing_has_no_difference() {
+        assert!(Difference::of(&Contrast::default()).is_none());
     }
 }

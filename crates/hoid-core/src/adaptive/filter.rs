@@ -332,8 +332,7 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
     /// What the detector says of the last blocks.
     fn look_for_changes(&mut self) {
         let held = core::array::from_fn(|j| self.live.mixture.mean()[LINEAR + j]);
-        let response = self.live.responses(self.prior.detection.frequency);
-        self.detector.look(&self.live.blocks, response, held);
+        self.detector.look(&self.live.blocks, held);
     }
 
     /// Starts again where a signal has overflowed.

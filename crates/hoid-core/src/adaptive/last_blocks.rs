@@ -111,12 +111,10 @@ impl LastBlocks {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::adaptive::sizes::{HELD, LINEAR};
+    use crate::adaptive::sizes::STATES;
 
     const ROW: Row = Row {
-        r: [1.0; LINEAR],
-        q: [0.0; HELD],
-        p: [0.0; HELD],
+        x: [1.0; STATES],
         y: 1.0,
         innovation: 0.0,
         variance: 1.0,

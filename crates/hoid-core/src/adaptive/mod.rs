@@ -29,10 +29,9 @@
 //! - **What else predicts as well** (`alternatives`). Other poles and delays that predict u about as well are in
 //!   the errors that are told.
 //! - **The end of the stick** (`saturation`). An output that stands there says that it would be at least so far.
-//! - **Declared changes** ([`detector`]). From the difference of Y at one frequency, or of gains
-//!   and what is held, between the last seconds and the time before ([`blocks`], `last_blocks`), each fitted by
-//!   least squares with a variance of its own (G. C. Chow, Econometrica 28 (1960) 591-605; unequal variances: B. L.
-//!   Welch, Biometrika 34 (1947) 28-35), in units of how much the same person varies without a change. What
+//! - **Declared changes** ([`detector`]). From the difference of gains and what is held between the last seconds
+//!   and the time before (`blocks`, `last_blocks`), by least squares, with the errors that the scores show
+//!   ([`contrast`]; G. C. Chow, Econometrica 28 (1960) 591-605; H. White, Econometrica 48 (1980) 817-838). What
 //!   changed is told by [`difference`].
 //!
 //! Nothing has to be fitted before: the estimate begins with the first second, whose ratio of
@@ -40,7 +39,7 @@
 //! ([`known`]), it begins there. [`AdaptiveFilter`] is the recursion.
 
 pub mod basis;
-pub mod blocks;
+pub mod contrast;
 pub mod detector;
 pub mod difference;
 pub mod known;
@@ -49,6 +48,7 @@ pub mod noise;
 pub mod usual;
 
 mod alternatives;
+mod blocks;
 mod candidate;
 mod cholesky;
 mod elimination;

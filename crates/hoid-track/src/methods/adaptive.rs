@@ -71,7 +71,7 @@ impl RecursiveMethod for AdaptiveOptions {
         About {
             name: "adaptive",
             help: "gains in a basis that people share, with a noise model of its own; starts without a fit",
-            source: "McRuer and Jex 1967; Magill 1965; Chow 1960; Welch 1947; the book, page Recursive methods",
+            source: "McRuer and Jex 1967; Magill 1965; Chow 1960; White 1980; the book, page Recursive methods",
             structures: &[Structure::BoxJenkins, Structure::OutputError, Structure::General],
             defaults: &[],
         }
@@ -240,20 +240,18 @@ impl AdaptiveRecursion {
         let map = self.model.gain_and_lead();
         let (at, hold) = (self.model.basis().point(), 0.5 * self.reported.sample_time_s());
         let beginning = [at.omega, at.zeta, at.tau - hold];
-        // The spans are compared in units of how much this person varies without a change.
-        let [of_response, of_all] = detector.usual_levels();
         let gain = |i: usize, state: &[f64], of: &dyn Fn(usize, usize) -> f64| {
             let value = map[i].iter().zip(state).map(|(m, s)| m * s).sum();
             let pairs = (0..GAINS).flat_map(|a| (0..GAINS).map(move |b| (a, b)));
             let variance = pairs.map(|(a, b)| map[i][a] * of(a, b) * map[i][b]).sum();
             Estimate::with_variance(value, variance)
         };
-        let (span, whole, by) = (&detector.spans()[0], &detector.whole_spans()[0], detector.difference());
+        let (told, by) = (detector.told(), detector.difference());
         let before = |i: usize| match i {
-            0 | 1 => gain(i, &span.state, &|a, b| of_response * span.covariance[a][b]),
+            0 | 1 => gain(i, &told.before, &|a, b| told.covariance_before[a][b]),
             _ => {
                 let k = LINEAR + i - 2;
-                Estimate::with_variance(beginning[i - 2] + whole.state[k], of_all * whole.covariance[k][k])
+                Estimate::with_variance(beginning[i - 2] + told.before[k], told.covariance_before[k][k])
             }
         };
         let difference = |i: usize| match i {
@@ -354,7 +352,6 @@ impl Recursion for AdaptiveRecursion {
         if !detector.declared() {
             return None;
         }
-        let [before, after] = detector.spans();
         let [old, by] = self.of_change();
         let z = |i: usize| match by[i].standard_error {
             Some(error) if error > 0.0 => by[i].value / error,
@@ -369,9 +366,10 @@ impl Recursion for AdaptiveRecursion {
             },
         };
         let pair = |i: usize| [old[i], new(i)];
-        let [of_response, of_all] = detector.usual_levels();
-        let log_variance = 2.0 / before.samples + 2.0 / after.samples;
-        let level = (after.variance / before.variance).ln() / (log_variance * of_response.max(of_all)).sqrt();
+        let told = detector.told();
+        let variance = detector.innovation_variances();
+        let log_variance = 2.0 / told.samples[0] + 2.0 / told.samples[1];
+        let level = (variance[1] / variance[0]).ln() / (log_variance * detector.usual_level()).sqrt();
         Some(Change {
             seconds_ago: detector.ago_s(),
             odds: self.change_odds()?,
@@ -381,7 +379,7 @@ impl Recursion for AdaptiveRecursion {
             zeta_nm: pair(3),
             tau_e_s: pair(4),
             t_l_s: [old[1].value / old[0].value, new(1).value / new(0).value],
-            innovation_variance: [before.variance, after.variance],
+            innovation_variance: variance,
             z: [z(0), z(1), z(2), z(3), level, z(4)],
             of_operator: true,
         })

@@ -1,0 +1,265 @@
+//! Now against before: the difference of two solutions, with the covariance that their scores show.
+//!
+//! The noise model whitens, but what it says of the band in which a person controls rests on few data:
+//! a noise model of 16 lags at 100 Hz sees .16 s, and a person turns within seconds. Where it is wrong by some factor
+//! there, `sigma^2 A^-1` is too. So the variance of the score `g = b - A s` is taken from the data as well: with
+//! the scores `g_k` of stretches of one second, which hardly depend on each other,
+//!
+//! `S = sum_k g_k g_k' / (1 - (N + 3) / K)`, `W_i = w n_i/n S + (1 - w) sigma^2 A_i`,
+//!
+//! for K stretches of both spans together, N unknowns and `n_i` of the n samples in a span: the two solutions take 2
+//! of the K, and the inverse of a Wishart matrix is `K / (K - N - 1)` times too large in the mean. S knows what the
+//! model does not; with few stretches it is uncertain, and the model's part keeps it from zero: [`SHOWN`] is w. Then
+//!
+//! `d = s_1 - s_0`, `C = A_0^-1 W_0 A_0^-1 + A_1^-1 W_1 A_1^-1`.
+//!
+//! sigma^2 and S are those of both spans: with a variance for each, a calm second is a change, and a louder remnant
+//! too.
+//!
+//! Sources: P. J. Huber, *Proc. Fifth Berkeley Symposium* 1 (1967) 221-233; H. White, *Econometrica* 48 (1980)
+//! 817-838; W. K. Newey and K. D. West, *Econometrica* 55 (1987) 703-708.
+
+use super::{blocks::Block, cholesky, sizes::STATES};
+
+type Matrix = [[f64; STATES]; STATES];
+
+/// Blocks of a stretch.
+const STRETCH: usize = 2;
+/// Share of what the scores show in the variance of the score, and where the noise model is believed.
+pub(super) const SHOWN: f64 = 2.0 / 3.0;
+pub(super) const BY_MODEL: f64 = 0.0;
+/// Least share of the degrees of freedom that is left.
+const LEAST_FREE: f64 = 0.3;
+
+/// A difference of now from before: gains, level, natural frequency, damping, delay.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Contrast {
+    /// Now less before.
+    pub difference: [f64; STATES],
+    /// Its covariance.
+    pub covariance: Matrix,
+    /// What was before, about the basis.
+    pub before: [f64; STATES],
+    /// Its covariance.
+    pub covariance_before: Matrix,
+    /// Sum of the squares of what is left on both sides.
+    pub left: f64,
+    /// Samples before and now.
+    pub samples: [f64; 2],
+}
+
+crate::state!([] Contrast { difference, covariance, before, covariance_before, left, samples });
+
+impl Contrast {
+    /// Between blocks before and now, to each of which `with_prior` adds what is known besides; `shown` is w.
+    /// `None` where one side determines nothing.
+    pub(super) fn between(sides: [&[Block]; 2], shown: f64, with_prior: impl Fn(Block) -> Block) -> Option<Self> {
+        let sums = sides.map(|blocks| with_prior(Block::of(blocks)));
+        let [Some(before), Some(now)] = sums.each_ref().map(Block::solved) else {
+            return None;
+        };
+        let solutions = [before, now];
+        let (mut squares, mut stretches) = ([[0.0; STATES]; STATES], 0.0);
+        for (blocks, solution) in sides.iter().zip(&solutions) {
+            for stretch in blocks.rchunks_exact(STRETCH) {
+                let score = Block::of(stretch).score(&solution.state);
+                for (row, a) in squares.iter_mut().zip(score) {
+                    row.iter_mut().zip(score).for_each(|(s, b)| *s += a * b);
+                }
+                stretches += 1.0;
+            }
+        }
+        let free = (1.0 - (STATES + 3) as f64 / stretches).max(LEAST_FREE);
+        let samples = sums.map(|s| s.samples);
+        let all = samples[0] + samples[1];
+        let left = before.left + now.left;
+        let variance = left / (all - 2.0 * STATES as f64).max(1.0);
+        let [covariance_before, covariance_now] = core::array::from_fn(|side| {
+            let (matrix, inverse) = (sums[side].matrix(), &solutions[side].inverse);
+            let share = shown * samples[side] / (all * free);
+            let model = (1.0 - shown) * variance;
+            let of_score = each(|i, j| share * squares[i][j] + model * matrix[i][j]);
+            product(&product(inverse, &of_score), inverse)
+        });
+        Some(Self {
+            difference: core::array::from_fn(|i| now.state[i] - before.state[i]),
+            covariance: each(|i, j| covariance_before[i][j] + covariance_now[i][j]),
+            before: before.state,
+            covariance_before,
+            left,
+            samples,
+        })
+    }
+
+    /// How many times larger the covariance is than another, in the mean: `tr(C_other^-1 C) / N`. `None` where the
+    /// other is not positive.
+    pub(super) fn dispersion(&self, other: &Self) -> Option<f64> {
+        let mut factor = other.covariance;
+        if !cholesky::factor(&mut factor, STATES) {
+            return None;
+        }
+        let mut trace = 0.0;
+        for i in 0..STATES {
+            let mut column = core::array::from_fn(|j| self.covariance[j][i]);
+            cholesky::solve(&factor, STATES, &mut column);
+            trace += column[i];
+        }
+        Some(trace / STATES as f64)
+    }
+
+    /// The same with covariances so many times larger.
+    pub(super) fn times(&self, factor: f64) -> Self {
+        Self {
+            covariance: self.covariance.map(|row| row.map(|c| factor * c)),
+            covariance_before: self.covariance_before.map(|row| row.map(|c| factor * c)),
+            ..*self
+        }
+    }
+
+    /// `d' C^-1 d` of those at these places; `None` where C is not positive.
+    pub(super) fn distance<const N: usize>(&self, places: [usize; N]) -> Option<f64> {
+        let d = places.map(|i| self.difference[i]);
+        let mut factor = places.map(|i| places.map(|j| self.covariance[i][j]));
+        let mut solved = d;
+        if !cholesky::factor(&mut factor, N) {
+            return None;
+        }
+        cholesky::solve(&factor, N, &mut solved);
+        let t: f64 = solved.iter().zip(d).map(|(s, d)| s * d).sum();
+        t.is_finite().then_some(t)
+    }
+}
+
+fn each(of: impl Fn(usize, usize) -> f64) -> Matrix {
+    core::array::from_fn(|i| core::array::from_fn(|j| of(i, j)))
+}
+
+fn product(a: &Matrix, b: &Matrix) -> Matrix {
+    each(|i, j| (0..STATES).map(|k| a[i][k] * b[k][j]).sum())
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use crate::adaptive::blocks::{EMPTY, Row};
+
+    /// A number of the standard normal distribution, but for its tails.
+    fn normal(state: &mut u64) -> f64 {
+        let uniform = |state: &mut u64| {
+            *state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
+            (*state >> 11) as f64 / (1_u64 << 53) as f64
+        };
+        (0..12).map(|_| uniform(state)).sum::<f64>() - 6.0
+    }
+
+    const STATE: [f64; STATES] = [1.0, -0.5, 0.3, 0.2, 0.1, -0.2, 0.4];
+    const PLACES: [usize; 6] = [0, 1, 2, 4, 5, 6];
+    /// Samples of a block.
+    const SAMPLES: usize = 25;
+
+    /// Blocks whose regressors and noise are first-order processes with these poles. The regressors carry
+    /// different signs of the noise's frequency, so that a slow noise meets slow regressors.
+    fn blocks(count: usize, state: &[f64; STATES], noise_pole: f64, random: &mut u64) -> std::vec::Vec<Block> {
+        let (mut x, mut v) = ([0.0; STATES], 0.0);
+        let mut all = std::vec::Vec::new();
+        for _ in 0..count {
+            let mut block = EMPTY;
+            for _ in 0..SAMPLES {
+                for x in &mut x {
+                    *x = 0.8 * *x + 0.6 * normal(random);
+                }
+                v = noise_pole * v + libm::sqrt(1.0 - noise_pole * noise_pole) * normal(random);
+                let y: f64 = x.iter().zip(state).map(|(x, s)| x * s).sum();
+                block.add(&Row {
+                    x,
+                    y: y + v,
+                    innovation: v,
+                    variance: 1.0,
+                });
+            }
+            all.push(block);
+        }
+        all
+    }
+
+    /// Mean and its standard error of T over so many pairs of 60 blocks before and 10 now, and by the model alone.
+    fn mean_distance(noise_pole: f64, runs: usize, seed: u64) -> [f64; 3] {
+        let mut random = seed;
+        let (mut sum, mut square, mut by_model) = (0.0, 0.0, 0.0);
+        for _ in 0..runs {
+            let all = blocks(70, &STATE, noise_pole, &mut random);
+            let sides = [&all[..60], &all[60..]];
+            let contrast = Contrast::between(sides, SHOWN, |sum| sum).unwrap();
+            let t = contrast.distance(PLACES).unwrap();
+            sum += t;
+            square += t * t;
+            let model = Contrast::between(sides, BY_MODEL, |sum| sum).unwrap();
+            by_model += model.distance(PLACES).unwrap();
+        }
+        let n = runs as f64;
+        let mean = sum / n;
+        [mean, libm::sqrt((square / n - mean * mean) / n), by_model / n]
+    }
+
+    #[test]
+    fn where_the_noise_is_white_the_distance_is_a_chi_square() {
+        let [mean, error, by_model] = mean_distance(0.0, 400, 1);
+        // The standard error of a mean of 400 with variance 12 is .17; S rests on 35 stretches, hence the margin.
+        assert!((by_model - 6.0).abs() < 0.7, "{by_model}");
+        assert!((mean - 6.0).abs() < 1.0 && error < 0.3, "{mean} {error}");
+    }
+
+    #[test]
+    fn where_it_is_not_the_scores_know() {
+        let [mean, error, by_model] = mean_distance(0.9, 400, 2);
+        // By the model alone the distance is several times too large.
+        assert!(by_model > 20.0, "{by_model}");
+        assert!(mean < 10.0 && error < 0.5, "{mean} {error}");
+    }
+
+    #[test]
+    fn the_dispersion_is_how_far_the_model_is_off() {
+        for (pole, [low, high]) in [(0.0, [0.9, 1.6]), (0.9, [3.0, 12.0])] {
+            let mut random = 5;
+            let all = blocks(70, &STATE, pole, &mut random);
+            let [shown, model] = [1.0, BY_MODEL].map(|w| {
+                let sides = [&all[..60], &all[60..]];
+                Contrast::between(sides, w, |sum| sum).unwrap()
+            });
+            let times = shown.dispersion(&model).unwrap();
+            assert!((low..high).contains(&times), "{pole}: {times}");
+            assert!((model.times(times).dispersion(&model).unwrap() - times).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn a_change_is_found_where_it_is_and_what_was_before_is_told() {
+        let mut random = 3;
+        let mut all = blocks(60, &STATE, 0.0, &mut random);
+        let changed = core::array::from_fn(|i| STATE[i] + if i == 1 { 1.0 } else { 0.0 });
+        all.extend(blocks(10, &changed, 0.0, &mut random));
+        let contrast = Contrast::between([&all[..60], &all[60..]], SHOWN, |sum| sum).unwrap();
+        assert!(contrast.distance(PLACES).unwrap() > 100.0);
+        for i in 0..STATES {
+            let expected = if i == 1 { 1.0 } else { 0.0 };
+            let error = libm::sqrt(contrast.covariance[i][i]);
+            assert!((contrast.difference[i] - expected).abs() < 4.0 * error);
+            let error = libm::sqrt(contrast.covariance_before[i][i]);
+            assert!((contrast.before[i] - STATE[i]).abs() < 4.0 * error);
+        }
+    }
+
+    #[test]
+    fn blocks_that_say_nothing_have_no_contrast() {
+        let mut random = 4;
+        let all = blocks(20, &STATE, 0.0, &mut random);
+        assert!(Contrast::between([&[], &all], SHOWN, |sum| sum).is_none());
+        assert!(Contrast::between([&all, &[EMPTY; 4]], SHOWN, |sum| sum).is_none());
+        let nothing = |sum: Block| sum;
+        assert!(Contrast::between([&[EMPTY; 10], &[EMPTY; 4]], SHOWN, nothing).is_none());
+        assert!(Contrast::default().distance(PLACES).is_none());
+    }
+}
