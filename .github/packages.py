@@ -24,7 +24,7 @@ LICENCES = ("LICENSE-MIT", "LICENSE-APACHE")
 #: The crate of the program.
 PROGRAM = "hoid-cli"
 #: What a user does first. Its output must begin with the verdict.
-TRIAL = "import pyhoid; print(pyhoid.identify_operator(pyhoid.simulate('C1', seed=1)))"
+TRIAL = "import pyhoid; print(pyhoid.identify(pyhoid.simulate('C1', seed=1)))"
 
 
 def contents(package: Path) -> dict[str, int]:

@@ -66,7 +66,7 @@ def test_simulate(run: Path) -> None:
 @pytest.mark.parametrize(
     ("keywords", "options"),
     [
-        ({}, ["--structure", "bj"]),
+        ({"structure": "bj"}, ["--structure", "bj"]),
         ({"structure": "bj", "nk": 29, "nd": 2}, ["--nk", 29, "--orders", "nd=2"]),
         ({"structure": "arx", "nk": (20, 35)}, ["--structure", "arx", "--nk", "20..35"]),
         (

@@ -1,5 +1,6 @@
 //! What ends a command early, and with which exit code.
 
+use hoid::analysis::AnalysisError;
 use hoid::ident::IdentError;
 use hoid::io::{IoError, ScenarioFileError};
 use hoid::model::{ModelError, Verdict, VerdictLevel};
@@ -50,6 +51,21 @@ pub enum CliError {
     /// The reproduction cannot be made.
     #[error(transparent)]
     Thesis(#[from] ThesisError),
+}
+
+impl From<AnalysisError> for CliError {
+    /// Options that contradict each other or the data are wrong usage.
+    fn from(error: AnalysisError) -> Self {
+        match error {
+            AnalysisError::Ident(error) => Self::Ident(error),
+            AnalysisError::Io(error) => Self::Io(error),
+            AnalysisError::Model(error) => Self::Model(error),
+            AnalysisError::SameSamples { .. }
+            | AnalysisError::NoSuchChannel { .. }
+            | AnalysisError::Prior { .. }
+            | AnalysisError::NoRecordings => Self::Usage(error.to_string()),
+        }
+    }
 }
 
 #[cfg(feature = "lab")]

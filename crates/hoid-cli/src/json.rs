@@ -1,5 +1,6 @@
 //! Results as JSON objects, the contract with other programs.
 
+use hoid::analysis::Account;
 use hoid::ident::{
     Choice, Fit, GreyBoxFit, IdentError, MarginEstimates, Root, Termination,
     grey_box::OrderCandidate,
@@ -14,7 +15,7 @@ use hoid::track::{Change, Determined, NoCrossover, OpenLoop, Response, TrackFaul
 use serde::Serialize;
 use serde_json::{Map, Value, json};
 
-use crate::{commands::reading::Account, error::CliError, output};
+use crate::{error::CliError, output};
 
 /// A number, or null where there is none: JSON has no NaN.
 pub fn number(value: f64) -> Value {

@@ -36,7 +36,7 @@ fn options_page(methods: &[MethodSpec]) -> String {
                     recursive method is a flag of `hoid track` and `hoid stream` (with hyphens), a key of an estimator in a plan, and a keyword \
                     of `pyhoid.track` and `pyhoid.Tracker`. In a plan a range of times carries its unit (`track_delay_s`); in Python `lambda` \
                     is called `forgetting_factor`. An option of a batch estimator is a flag of `hoid identify` and a keyword of \
-                    `pyhoid.identify`, those of `family` of `pyhoid.identify_operator` (where `orders` are `nc` and `nd`).\n"
+                    `pyhoid.identify` (where `orders` of `family` are `nc` and `nd`).\n"
         .to_owned();
     for spec in methods.iter().chain(&estimators()) {
         let structures: Vec<&str> = spec.structures.iter().map(|structure| structure.name()).collect();

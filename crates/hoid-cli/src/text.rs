@@ -1,5 +1,6 @@
 //! Results as tables for people.
 
+use hoid::analysis::Account;
 use hoid::ident::{
     Choice, Fit, GreyBoxFit, MarginEstimates,
     order_selection::Criterion,
@@ -11,7 +12,7 @@ use hoid::model::{
 };
 use hoid::report::numbers;
 
-use crate::{commands::reading::Account, table::Rows};
+use crate::table::Rows;
 
 /// Rows of a search that are printed; all of them are in the JSON.
 const CANDIDATES_SHOWN: usize = 8;

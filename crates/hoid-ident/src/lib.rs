@@ -118,7 +118,7 @@ pub use fit::{Fit, ResponsePoint, Series};
 pub use grey_box::{GreyBox, GreyBoxFit};
 pub use iv::{InstrumentalVariable, Instruments, IvMethod};
 pub use optimize::{Reason, SearchMethod, SearchOptions, Termination};
-pub use order_selection::{Candidate, Choice, NamedOrders, OrderRanges, choose_orders, identify};
+pub use order_selection::{Candidate, Choice, NamedOrders, OrderRanges, choose_orders, identify_box_jenkins};
 pub use pem::loss::Loss;
 pub use registry::{estimator_setting, estimators};
 pub use sigmoid::{

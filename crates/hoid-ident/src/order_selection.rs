@@ -267,13 +267,12 @@ pub struct Choice {
     pub criterion: Criterion,
 }
 
-/// Identifies a person as `hoid identify` does without options: the operator by a Box-Jenkins
-/// model, the delay searched over 0.05 to 0.6 s and the order of the noise model over 1 to 4,
+/// Identifies a person by a Box-Jenkins model, as `hoid identify --structure bj`: the delay searched over 0.05 to 0.6 s and the order of the noise model over 1 to 4,
 /// chosen by BIC.
 ///
 /// # Errors
 /// As [`choose_orders`]; [`IdentError::NoRecords`] without a record.
-pub fn identify(records: &[Record]) -> Result<Choice, IdentError> {
+pub fn identify_box_jenkins(records: &[Record]) -> Result<Choice, IdentError> {
     let structure = Structure::BoxJenkins;
     let first = records.first().ok_or(IdentError::NoRecords)?;
     let ranges = default_operator_ranges(structure, first.sample_time());

@@ -83,7 +83,7 @@ mod wording;
 
 pub use atomic::{file_names, make_directory, read_bytes, read_text, write_atomically};
 pub use column_expression::ColumnExpression;
-pub use data_quality::{Place, QualityIssue, QualityIssueKind};
+pub use data_quality::{Place, QualityIssue, QualityIssueKind, quality_of_record};
 pub use directory_lock::DirectoryLock;
 pub use error::IoError;
 pub use fit_file::{FitFile, FitParameter, is_fit_file, parse_fit, read_fit};

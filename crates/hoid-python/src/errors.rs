@@ -2,6 +2,7 @@
 //!
 //! The messages are those of the libraries, with keywords in place of command-line options.
 
+use hoid_analysis::AnalysisError;
 use hoid_ident::IdentError;
 use hoid_io::{IoError, ScenarioFileError};
 use hoid_model::{ModelError, NotConvertible, UnknownName};
@@ -112,6 +113,21 @@ impl From<IdentError> for Failure {
             | IdentError::NotSettled { .. } => EstimationError::new_err(text),
             _ => DataError::new_err(text),
         })
+    }
+}
+
+impl From<AnalysisError> for Failure {
+    fn from(error: AnalysisError) -> Self {
+        let text = in_python(&error.to_string());
+        match error {
+            AnalysisError::Ident(error) => error.into(),
+            AnalysisError::Io(error) => error.into(),
+            AnalysisError::Model(error) => error.into(),
+            AnalysisError::SameSamples { .. } => Self(DataError::new_err(text)),
+            AnalysisError::NoSuchChannel { .. } | AnalysisError::Prior { .. } | AnalysisError::NoRecordings => {
+                Self(OptionError::new_err(text))
+            }
+        }
     }
 }
 

@@ -1,17 +1,17 @@
-//! `pyhoid.identify_operator`: the operator of a person, of the family of operators.
+//! `pyhoid.identify` by default: the operator of a person, of the family of operators.
 
 use std::ops::RangeInclusive;
 
+use hoid_analysis::{Excitation, Identification, Identified, Recordings};
 use hoid_ident::{
-    IdentError, SearchOptions,
+    SearchOptions,
     family::{
         AgreementMethod, ClusterKind, FamilyEstimator, FamilyFit, FormFigures, HIGHEST_NOISE_ORDER, LoopMeasures,
         OperatorPrior, Parameter, ParameterPrior,
     },
-    frequency::{DescriptionOptions, describe_runs},
-    judgement::second_opinion::of_family,
 };
-use hoid_model::{ContinuousTransferFunction, Form, operator_family::Coordinate, uncertainty::Estimate};
+use hoid_io::Step;
+use hoid_model::{FaultHandling, Form, ModelError, operator_family::Coordinate, uncertainty::Estimate};
 use numpy::{PyArray1, PyArray2};
 use pyo3::{prelude::*, types::PyDict};
 
@@ -19,6 +19,7 @@ use crate::{
     arrays::{self, Wanted, array, matrix},
     controlled_element::ControlledElement,
     errors::{Outcome, bad_option},
+    faults::faults_of,
     figures::{self, Pair, VerdictParts, pair, verdict},
     fit::PyFit,
     interrupt, names,
@@ -31,11 +32,15 @@ const HIGHEST_BESIDE_NC: usize = 8;
 #[pyclass(name = "OperatorFit", module = "pyhoid._pyhoid", frozen)]
 pub struct PyOperatorFit {
     found: FamilyFit,
-    element: Option<ContinuousTransferFunction>,
+    data: Recordings,
+    /// How it was asked for.
+    asked: Identification,
     /// Channel of the excitation.
     channel: Option<String>,
-    records: usize,
 }
+
+/// Which of the given records a record is of, its parts, and what was done to it.
+type UsedRecord<'py> = (usize, Bound<'py, PyDict>, Vec<String>);
 
 /// Name, value, standard error of a parameter of another fit, and whether it is determined.
 type FoundRow = (String, Option<f64>, Option<f64>, bool);
@@ -87,7 +92,7 @@ impl PriorOfUser {
 
 #[pyfunction]
 #[pyo3(signature = (records, *, form, neuromuscular, prior, excitation, period, controlled_element, individual, delay, nc, nd, run_to_run,
-    initial_state, search_method, max_iterations, tolerance, second_opinion))]
+    initial_state, search_method, max_iterations, tolerance, faults, decimate, criterion, progress))]
 #[allow(clippy::too_many_arguments)]
 pub fn identify_operator(
     py: Python<'_>,
@@ -106,9 +111,14 @@ pub fn identify_operator(
     initial_state: &str,
     search_method: &str,
     max_iterations: usize,
-    tolerance: f64,
-    second_opinion: bool,
+    tolerance: Option<f64>,
+    faults: &str,
+    decimate: &str,
+    criterion: &str,
+    progress: Option<Bound<'_, PyAny>>,
 ) -> Outcome<PyOperatorFit> {
+    // The order of the noise is chosen by Akaike's; a word that is none is wrong all the same.
+    names::criterion(criterion)?;
     let records = arrays::records(&records, Wanted::All)?;
     let usual = FamilyEstimator::default();
     let estimator = FamilyEstimator {
@@ -127,49 +137,30 @@ pub fn identify_operator(
         search: SearchOptions {
             method: names::search_method(search_method)?,
             max_iterations,
-            tolerance,
+            tolerance: tolerance.unwrap_or(usual.search.tolerance),
         },
         ..usual
     };
-    let element = controlled_element.map(|e| e.transfer_function()).transpose()?;
-    let count = records.len();
-    let of_opinion = element.clone();
-    let work = move |_: &interrupt::Standing| {
-        let none = excitation.as_deref() == Some("none");
-        let options = DescriptionOptions {
-            excitation: excitation.clone(),
-            period_s: period,
-            ..DescriptionOptions::default()
-        };
-        let described = (!none).then(|| describe_runs(&records, &options));
-        let channel = match &described {
-            Some(Ok(found)) => found.channel.clone(),
-            _ => None,
-        };
-        let of_lines = match described {
-            Some(Ok(found)) => Some(Ok(found.function)),
-            // What was looked for by name is missed; what was looked for by itself is not.
-            Some(Err(error)) if excitation.is_some() => Some(Err(error)),
-            _ => None,
-        };
-        let named = excitation.clone().filter(|_| !none);
-        let estimator = FamilyEstimator {
-            excitation: channel.clone().or(named),
-            ..estimator.clone()
-        };
-        let mut found = estimator.fit_beside(&records, of_lines)?;
-        if second_opinion {
-            let opinions = of_family(&estimator, &found, &records, of_opinion.as_ref());
-            found.verdict = found.verdict.and(opinions);
-        }
-        Ok::<_, IdentError>((found, channel))
+    let asked = Identification {
+        operator: estimator,
+        excitation: Excitation::of_text(excitation.as_deref()),
+        period_s: period,
+        faults: names::choice::<FaultHandling>("faults", faults)?,
+        rate: decimate
+            .parse()
+            .map_err(|error: ModelError| bad_option(error.to_string()))?,
+        controlled_element: controlled_element.map(|e| e.transfer_function()).transpose()?,
     };
-    let (found, channel) = interrupt::run(py, 1, None, false, work)?;
+    let how = asked.clone();
+    let work = move |_: &interrupt::Standing| how.run(Recordings::of_records(records));
+    let Identified {
+        fit, data, described, ..
+    } = interrupt::run(py, 1, progress.as_ref(), false, work)?;
     Ok(PyOperatorFit {
-        found,
-        element,
-        channel,
-        records: count,
+        found: fit,
+        data,
+        asked,
+        channel: described.and_then(|found| found.channel),
     })
 }
 
@@ -300,7 +291,7 @@ impl PyOperatorFit {
         all.set_item("degrees_of_freedom", lines.degrees_of_freedom)?;
         all.set_item("held_out", lines.held_out_total())?;
         all.set_item("converged", lines.termination.converged())?;
-        if let Some(element) = &self.element {
+        if let Some(element) = &self.asked.controlled_element {
             let measures = self.found.loop_measures_at_lines(element);
             all.set_item("open_loop", loop_parts(py, measures)?)?;
             all.set_item("open_loop_intervals", loop_intervals(py, measures)?)?;
@@ -327,7 +318,7 @@ impl PyOperatorFit {
         all.set_item("nd", found.noise_order)?;
         all.set_item("converged", found.termination.converged())?;
         all.set_item("termination", found.termination.to_string())?;
-        if let Some(element) = &self.element {
+        if let Some(element) = &self.asked.controlled_element {
             let measures = self.found.loop_measures_by_instruments(element);
             all.set_item("open_loop", loop_parts(py, measures)?)?;
         }
@@ -373,13 +364,13 @@ impl PyOperatorFit {
     #[getter]
     fn open_loop<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
         let of = |element| loop_parts(py, self.found.loop_measures(0, element));
-        self.element.as_ref().map(of).transpose()
+        self.asked.controlled_element.as_ref().map(of).transpose()
     }
 
     #[getter]
     fn open_loop_intervals<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
         let of = |element| loop_intervals(py, self.found.loop_measures(0, element));
-        self.element.as_ref().map(of).transpose()
+        self.asked.controlled_element.as_ref().map(of).transpose()
     }
 
     #[getter]
@@ -441,13 +432,37 @@ impl PyOperatorFit {
         self.channel.as_deref()
     }
 
+    /// The records as they were fitted: which of those given each is a part of, the record, and what was done
+    /// to it.
+    fn records<'py>(&self, py: Python<'py>) -> PyResult<Vec<UsedRecord<'py>>> {
+        let data = &self.data;
+        let all = data.origins.iter().zip(&data.records).zip(&data.accounts);
+        all.map(|((origin, record), account)| {
+            let steps: Vec<String> = account.steps.iter().map(ToString::to_string).collect();
+            let leads = account.steps.iter().map(|step| match step {
+                Step::Rate { input_lead_s, .. } => *input_lead_s,
+                _ => 0.0,
+            });
+            let parts = arrays::parts(py, record.clone())?;
+            parts.set_item("input_lead", leads.sum::<f64>())?;
+            Ok((*origin, parts, steps))
+        })
+        .collect()
+    }
+
+    /// The faults of the records: which of those given, and the fault.
+    #[getter]
+    fn faults<'py>(&self, py: Python<'py>) -> PyResult<Vec<(usize, Bound<'py, PyDict>)>> {
+        faults_of(py, &self.data)
+    }
+
     /// The model of a record as polynomials.
     fn fit(&self, record: usize) -> PyFit {
         PyFit::new(
             self.found.operator(record).polynomial_fit.clone(),
             None,
             None,
-            self.records,
+            self.data.len(),
         )
     }
 }

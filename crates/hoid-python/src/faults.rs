@@ -1,7 +1,8 @@
-//! `mend`: the faults of a record, and the record without them.
+//! `repair`: the faults of records, and the records without them.
 
-use hoid_ident::{faults::mend as mend_record, level};
-use hoid_model::{FaultHandling, Verdict};
+use hoid_analysis::Recordings;
+use hoid_ident::level;
+use hoid_model::{Fault, FaultHandling, Verdict};
 use pyo3::{prelude::*, types::PyDict};
 
 use crate::{
@@ -11,31 +12,46 @@ use crate::{
     names::{self, Kind},
 };
 
-/// The segments of a record, what was found in it, and what that says of a result.
-type Mended<'py> = (Vec<Bound<'py, PyDict>>, Vec<Bound<'py, PyDict>>, VerdictParts);
+/// Which of the given records it belongs to, and its parts.
+type Of<'py> = (usize, Bound<'py, PyDict>);
+/// The segments of records, what was found in them, and what that says of a result.
+type Repaired<'py> = (Vec<Of<'py>>, Vec<Of<'py>>, VerdictParts);
 
+/// The faults of recordings: which of those given, and the fault.
+pub fn faults_of<'py>(py: Python<'py>, data: &Recordings) -> PyResult<Vec<Of<'py>>> {
+    let all = data.origins.iter().zip(&data.accounts);
+    all.flat_map(|(origin, account)| account.faults.iter().map(|fault| (*origin, fault)))
+        .map(|(origin, fault)| Ok((origin, fault_parts(py, fault)?)))
+        .collect()
+}
+
+/// A fault by the names of its fields.
+fn fault_parts<'py>(py: Python<'py>, fault: &Fault) -> PyResult<Bound<'py, PyDict>> {
+    let one = PyDict::new(py);
+    one.set_item("kind", fault.kind.name())?;
+    one.set_item("channel", &fault.channel)?;
+    one.set_item("from", fault.from_s)?;
+    one.set_item("to", fault.to_s)?;
+    one.set_item("samples", fault.samples)?;
+    one.set_item("size", fault.size)?;
+    one.set_item("deviations", fault.deviations)?;
+    one.set_item("action", fault.action.name())?;
+    one.set_item("words", fault.to_string())?;
+    Ok(one)
+}
+
+/// The records without their faults, as every fit takes them: a record that is cut gives several.
 #[pyfunction]
-#[pyo3(signature = (record, handling))]
-pub fn mend<'py>(py: Python<'py>, record: &Bound<'py, PyAny>, handling: &str) -> Outcome<Mended<'py>> {
+#[pyo3(signature = (records, handling))]
+pub fn repair<'py>(py: Python<'py>, records: Vec<Bound<'py, PyAny>>, handling: &str) -> Outcome<Repaired<'py>> {
     let handling = names::choice::<FaultHandling>("faults", handling)?;
-    let record = arrays::record(record, Wanted::All)?;
-    let found = py.detach(|| mend_record(&record, handling))?;
-    let mut faults = Vec::with_capacity(found.faults.len());
-    for fault in &found.faults {
-        let one = PyDict::new(py);
-        one.set_item("kind", fault.kind.name())?;
-        one.set_item("channel", &fault.channel)?;
-        one.set_item("from", fault.from_s)?;
-        one.set_item("to", fault.to_s)?;
-        one.set_item("samples", fault.samples)?;
-        one.set_item("size", fault.size)?;
-        one.set_item("deviations", fault.deviations)?;
-        one.set_item("action", fault.action.name())?;
-        one.set_item("words", fault.to_string())?;
-        faults.push(one);
-    }
-    let segments: PyResult<Vec<_>> = found.segments.into_iter().map(|s| parts(py, s)).collect();
-    Ok((segments?, faults, verdict(&Verdict::of(found.findings))))
+    let records = arrays::records(&records, Wanted::All)?;
+    let found = py.detach(|| Recordings::of_records(records).repaired(handling))?;
+    let faults = faults_of(py, &found)?;
+    let says = verdict(&Verdict::of(found.findings()));
+    let segments = found.origins.into_iter().zip(found.records);
+    let segments: PyResult<Vec<_>> = segments.map(|(origin, s)| Ok((origin, parts(py, s)?))).collect();
+    Ok((segments?, faults, says))
 }
 
 /// True for records that a level is estimated of.

@@ -61,7 +61,7 @@ fn _pyhoid(module: &Bound<'_, PyModule>) -> PyResult<()> {
         wrap_pyfunction!(describing::describe, module)?,
         wrap_pyfunction!(describing::describing_function, module)?,
         wrap_pyfunction!(family::identify_operator, module)?,
-        wrap_pyfunction!(faults::mend, module)?,
+        wrap_pyfunction!(faults::repair, module)?,
         wrap_pyfunction!(faults::may_have_level, module)?,
         wrap_pyfunction!(faults::without_level, module)?,
         wrap_pyfunction!(files::check_record, module)?,

@@ -19,7 +19,10 @@ fn main() -> Result<(), Box<dyn Error>> {
         .map_or(std::env::temp_dir().join("hoid-example"), PathBuf::from);
 
     let records = [record];
-    let choice = identify(&records)?;
+    let person = identify(&records)?;
+    println!("{person}\n");
+    // The same as polynomials, with the tests of its residuals.
+    let choice = identify_box_jenkins(&records)?;
     println!("{}\n", choice.fit);
     match choice.fit.operator() {
         Ok(operator) => println!("{operator}\n"),

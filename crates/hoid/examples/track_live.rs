@@ -12,7 +12,7 @@ use hoid::prelude::*;
 fn main() -> Result<(), Box<dyn Error>> {
     let run = Simulator::new(&Scenario::condition(Condition::C4))?.run(RunSeed::default(), false)?;
     let start = run.span(0.0, 20.0)?;
-    let fit = identify(std::slice::from_ref(&start))?.fit;
+    let fit = identify_box_jenkins(std::slice::from_ref(&start))?.fit;
 
     let options = TrackOptions::usual(Method::physical(), fit.orders().nk).with(&[("memory_of", "K_e=4s")])?;
     let mut tracker = Tracker::new(&options, Some(&start), run.sample_time())?;

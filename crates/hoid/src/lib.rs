@@ -18,8 +18,9 @@
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! let records = [read("run1.csv")?];                       // columns t, e and u
-//! let choice = identify(&records)?;                         // Box-Jenkins, delay and noise order by BIC
-//! println!("{}", choice.fit);
+//! let person = identify(&records)?;                         // as `hoid identify`: the operator of a person
+//! println!("{person}");                                     // its verdict, and its parameters
+//! let choice = identify_box_jenkins(&records)?;             // polynomials; delay and noise order by BIC
 //! println!("{}", choice.fit.validate(&records[0])?);
 //!
 //! let options = TrackOptions::usual(Method::multiple_model(), choice.fit.orders().nk);
@@ -52,13 +53,15 @@
 //! | feature | brings | default |
 //! |---|---|---|
 //! | none | [`model`], [`ident`], [`track`], [`sim`]: what estimates | |
-//! | `io` | [`io`]: files | yes |
+//! | `io` | [`io`]: files; [`analysis`]: from recordings to a result and its verdict | yes |
 //! | `study` | [`study`]: Monte Carlo studies and groups of runs | yes |
 //! | `report` | [`report`]: figures and HTML pages | yes |
 //! | `thesis` | [`thesis`]: the reference text, reproduced | yes |
 //!
 //! With `default-features = false` nothing that reads files or draws is built.
 
+#[cfg(feature = "io")]
+pub use hoid_analysis as analysis;
 pub use hoid_core as core;
 pub use hoid_ident as ident;
 #[cfg(feature = "io")]
@@ -76,8 +79,11 @@ pub use hoid_track as track;
 
 /// What most programs use: read, identify, validate, track, report, simulate.
 pub mod prelude {
+    #[cfg(feature = "io")]
+    pub use hoid_analysis::{Identification, Identified, Recordings, identify};
     pub use hoid_ident::{
-        Choice, Constraint, Estimator, Fit, GreyBox, IdentError, InitialState, OrderRanges, choose_orders, identify,
+        Choice, Constraint, Estimator, Fit, GreyBox, IdentError, InitialState, OrderRanges, choose_orders,
+        identify_box_jenkins,
     };
     #[cfg(feature = "io")]
     pub use hoid_io::{ReadOptions, read, read_record, write_record};

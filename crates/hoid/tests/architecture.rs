@@ -6,7 +6,7 @@ use std::{collections::BTreeMap, process::Command};
 use serde_json::Value;
 
 /// What each crate may depend on within the workspace.
-const ALLOWED: [(&str, &[&str]); 18] = [
+const ALLOWED: [(&str, &[&str]); 19] = [
     ("hoid-core", &[]),
     ("hoid-embedded", &["hoid-core"]),
     ("hoid-model", &["hoid-core"]),
@@ -15,6 +15,7 @@ const ALLOWED: [(&str, &[&str]); 18] = [
     ("hoid-track", &["hoid-core", "hoid-ident", "hoid-model"]),
     ("hoid-sim", &["hoid-core", "hoid-lanes", "hoid-model"]),
     ("hoid-io", &["hoid-model"]),
+    ("hoid-analysis", &["hoid-model", "hoid-ident", "hoid-io"]),
     (
         "hoid-ffi",
         &["hoid-ident", "hoid-io", "hoid-model", "hoid-sim", "hoid-track"],
@@ -37,7 +38,14 @@ const ALLOWED: [(&str, &[&str]); 18] = [
     ),
     (
         "hoid-study",
-        &["hoid-model", "hoid-ident", "hoid-sim", "hoid-track", "hoid-io"],
+        &[
+            "hoid-analysis",
+            "hoid-model",
+            "hoid-ident",
+            "hoid-sim",
+            "hoid-track",
+            "hoid-io",
+        ],
     ),
     (
         "hoid-report",
@@ -57,6 +65,7 @@ const ALLOWED: [(&str, &[&str]); 18] = [
     (
         "hoid",
         &[
+            "hoid-analysis",
             "hoid-core",
             "hoid-model",
             "hoid-ident",
@@ -73,6 +82,7 @@ const ALLOWED: [(&str, &[&str]); 18] = [
     (
         "hoid-python",
         &[
+            "hoid-analysis",
             "hoid-model",
             "hoid-ident",
             "hoid-sim",

@@ -3,7 +3,7 @@ the control output u.
 
 >>> import pyhoid
 >>> record = pyhoid.simulate("C1", seed=1)  # or pyhoid.read("run1.csv"), or pyhoid.Record(...)
->>> fit = pyhoid.identify(record)           # Box-Jenkins; searches the delay and the noise order
+>>> fit = pyhoid.identify(record)           # the operator of a person, and what it is worth
 >>> trace = pyhoid.track(record)            # the operator from sample to sample
 >>> pyhoid.plots.bode(fit)                  # matplotlib is imported here, not before
 
@@ -35,9 +35,8 @@ from .errors import (
 from .estimates import Estimate, Operator, Remnant
 from .fit import Fit, FrequencyResponse, Series, Validation
 from .groups import group, group_manifest, simulate_group, simulate_people
-from .identification import identify
+from .identification import identify, identify_operator
 from .operator_fit import OperatorFit
-from .operator_identification import identify_operator
 from .operator_parameters import OperatorParameter
 from .reading import info, read, read_segments, write
 from .record import Record

@@ -16,16 +16,12 @@ def mended(
     records: Sequence[Record], handling: str
 ) -> tuple[tuple[Record, ...], list[dict[str, Any]], Verdict]:
     """Records without their faults, what was found, and what that says of a fit."""
-    kept: list[Record] = []
-    faults: list[dict[str, Any]] = []
-    verdict = Verdict(_LEVELS[0], [], [])
-    for place, record in enumerate(records):
-        segments, found, says = _pyhoid.mend(record, handling)
-        # A record without faults stays the object that was given.
-        kept.extend([Record._of(parts) for parts in segments] if found else [record])
-        faults.extend({"record": place, **fault} for fault in found)
-        verdict = joined(verdict, Verdict(*says))
-    return tuple(kept), faults, verdict
+    segments, found, says = _pyhoid.repair(records, handling)
+    spoilt = {place for place, _ in found}
+    # A record without faults stays the object that was given.
+    kept = [Record._of(parts) if place in spoilt else records[place] for place, parts in segments]
+    faults = [{"record": place, **fault} for place, fault in found]
+    return tuple(kept), faults, Verdict(*says)
 
 
 def joined(one: Verdict, other: Verdict) -> Verdict:

@@ -22,7 +22,7 @@ __all__ = [
 ]
 
 #: What `identify` fits, but for time-varying.
-ModelStructure = Structure | Literal["grey-box", "grey_box"]
+ModelStructure = Structure | Literal["operator", "family", "grey-box", "grey_box"]
 
 #: How it is fitted.
 BatchMethod = Literal["pem", "iv4", "sriv", "rivbj"]

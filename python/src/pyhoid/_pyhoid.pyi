@@ -51,13 +51,13 @@ __all__ = [
     "info",
     "margins",
     "may_have_level",
-    "mend",
     "merge_shards",
     "plan_names",
     "read",
     "read_table",
     "recursive_methods",
     "renamed_method",
+    "repair",
     "reproduce",
     "simulate",
     "simulate_group",
@@ -192,6 +192,9 @@ class OperatorFit:
     def termination(self) -> dict[str, Any]: ...
     @property
     def excitation(self) -> str | None: ...
+    def records(self) -> list[tuple[int, dict[str, Any], list[str]]]: ...
+    @property
+    def faults(self) -> list[tuple[int, dict[str, Any]]]: ...
     def fit(self, record: int) -> Fit: ...
 
 @final
@@ -481,8 +484,11 @@ def identify_operator(
     initial_state: str,
     search_method: str,
     max_iterations: int,
-    tolerance: float,
-    second_opinion: bool,
+    tolerance: float | None,
+    faults: str,
+    decimate: str,
+    criterion: str,
+    progress: _Progress,
 ) -> OperatorFit: ...
 def even_times(times: npt.NDArray[np.float64]) -> tuple[float | None, int]: ...
 def info(path: _Path) -> dict[str, Any]: ...
@@ -496,9 +502,13 @@ def margins(
     noise_definition: str,
 ) -> dict[str, Any]: ...
 def may_have_level(records: Sequence[Record]) -> bool: ...
-def mend(
-    record: Record, handling: str
-) -> tuple[list[dict[str, Any]], list[dict[str, Any]], _Verdict]: ...
+def repair(
+    records: Sequence[Record], handling: str
+) -> tuple[
+    list[tuple[int, dict[str, Any]]],
+    list[tuple[int, dict[str, Any]]],
+    tuple[str, list[str], list[str]],
+]: ...
 def merge_shards(shards: Sequence[_Path], directory: _Path, csv: bool) -> _Left: ...
 def plan_names() -> list[tuple[str, str]]: ...
 def read(

@@ -332,7 +332,7 @@ def describe(
         ``e[k]`` belongs to ``u[k + offset_samples]``.
     detrend : {"none", "mean", "linear"}
     decimate : "auto", "off" or int
-        As in `identify_operator`. The response at the lines is the same at both rates.
+        As in `identify`. The response at the lines is the same at both rates.
 
     Returns
     -------

@@ -27,7 +27,7 @@ _ANSWERS = ("title", "parameters", "figures")
 
 
 class OperatorFit:
-    """The operator of a person. `identify_operator` makes it.
+    """The operator of a person. `identify` makes it.
 
     Attributes
     ----------
@@ -100,7 +100,7 @@ class OperatorFit:
 
     Examples
     --------
-    >>> fit = pyhoid.identify_operator(records, controlled_element="90/(s(s+6))")
+    >>> fit = pyhoid.identify(records, controlled_element="90/(s(s+6))")
     >>> fit.verdict.level, fit.parameters, fit.open_loop
     """
 
@@ -114,7 +114,9 @@ class OperatorFit:
         self._native = native
         self._call = call
         self.settings: dict[str, Any] = dict(settings or {})
-        self.records: tuple[Record, ...] = tuple(one.detrended("mean") for one in records)
+        self.records: tuple[Record, ...] = tuple(
+            _used(records[origin], parts, steps) for origin, parts, steps in native.records()
+        )
         self.form, self.neuromuscular = native.form
         self.operators: tuple[OperatorParameters, ...] = tuple(
             OperatorParameters(
@@ -129,7 +131,9 @@ class OperatorFit:
         )
         self.parameters = self.operators[0]
         self.verdict = Verdict(*native.verdict)
-        self.faults: list[dict[str, Any]] = []
+        self.faults: list[dict[str, Any]] = [
+            {"record": place, **fault} for place, fault in native.faults
+        ]
         self.forms: list[dict[str, Any]] = native.forms
         self.lines = native.lines
         if self.lines is not None:
@@ -358,6 +362,14 @@ class OperatorFit:
         parts.extend(operator._repr_html_() for operator in self.operators)
         parts.append(f"<p>{escape(self._closing())}</p>".replace("\n", "<br>"))
         return "".join(parts)
+
+
+def _used(given: Record, parts: Mapping[str, Any], steps: Sequence[str]) -> Record:
+    """A record as it was fitted, from the one that was given and what was done to it."""
+    lead = given.input_lead + parts["input_lead"]
+    record = Record._of({**parts, "input_lead": lead})
+    record.steps = [*given.steps, *steps]
+    return record
 
 
 def _loop(

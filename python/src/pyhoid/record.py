@@ -358,7 +358,7 @@ class Record:
         """The record at a lower rate: every n-th sample behind a linear-phase low-pass filter.
 
         The filter is the same for all channels; the input is taken in the middle of the n samples
-        over which it is held then, so that delays stay. It is what `identify_operator`, `track` and
+        over which it is held then, so that delays stay. It is what `identify`, `track` and
         `describe` do by themselves above 200 Hz.
 
         Parameters

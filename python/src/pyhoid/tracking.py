@@ -119,7 +119,7 @@ def track(
 
     A person, from an earlier fit of them, with the loop that they closed:
 
-    >>> fit = pyhoid.identify_operator(earlier)
+    >>> fit = pyhoid.identify(earlier)
     >>> trace = pyhoid.track(record, at=(1, 2.5), controlled_element="90/(s(s+6))", prior=fit)
     >>> trace["phase_margin_deg"], trace["phase_margin_deg_se"]
     """

@@ -3,7 +3,6 @@
 pub mod convert;
 pub mod demo;
 pub mod describe;
-pub mod faults;
 pub mod figure;
 pub mod fmu;
 pub mod group;

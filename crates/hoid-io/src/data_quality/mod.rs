@@ -11,6 +11,7 @@
 //! | `values` | saturation, quantisation, constants, missing values |
 //! | `search` | all of these, for columns that belong together |
 //! | `in_table` | the same for the columns that a record is made of |
+//! | `of_record` | the same for the channels of a record |
 //!
 //! An operator's channel may be smooth, quiet or constant for good reasons: the rules are made so
 //! that simulated operators without faults give no finding (tested), and say of what they find what
@@ -20,6 +21,7 @@ mod grid;
 mod holds;
 mod in_table;
 mod issue;
+mod of_record;
 mod search;
 mod signals;
 mod timing;
@@ -28,6 +30,7 @@ mod values;
 pub(crate) use grid::Grid;
 pub(crate) use in_table::{issues_of_record, issues_of_signals};
 pub use issue::{Place, QualityIssue, QualityIssueKind};
+pub use of_record::quality_of_record;
 pub(crate) use search::{issues_of, names_a_clock};
 pub(crate) use signals::{Signal, Signals};
 pub(crate) use values::{Levels, rails};

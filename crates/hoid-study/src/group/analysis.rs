@@ -14,6 +14,7 @@
 
 use std::path::Path;
 
+use hoid_analysis::Recordings;
 use hoid_ident::{Estimator, GreyBox, choose_orders, order_selection::Criterion};
 use hoid_io::OutputTable;
 use hoid_model::{Form, Orders, Record, Structure, uncertainty::Estimate};
@@ -94,18 +95,17 @@ pub(super) fn analyse_together(manifest: &Manifest, base: &Path, cell: &Cell<'_>
         ..cell.runs[0].clone()
     };
     let mut analysis = RunAnalysis::new(manifest, &all);
-    let read = |pairing| {
+    let read = |pairing| -> (Vec<&RunEntry>, Vec<Run>) {
         let one = |run: &'_ RunEntry| read_run(manifest, base, run, pairing).ok();
-        let runs = cell.runs.iter().filter_map(|&run| Some((run.run.as_str(), one(run)?)));
+        let runs = cell.runs.iter().filter_map(|&run| Some((run, one(run)?)));
         runs.unzip()
     };
-    let (names, runs): (Vec<&str>, Vec<Run>) = read(Pairing::Recorded);
+    let (entries, runs) = read(Pairing::Recorded);
     if let Some(run) = runs.first() {
         analysis.rows.at_the_rate_of(run);
     }
-    let records: Vec<Record> = runs.into_iter().map(|run| run.record).collect();
     let late_samples = analysis.rows.condition.offset_samples;
-    let people = match (&cell.changes, records.is_empty()) {
+    let people = match (&cell.changes, runs.is_empty()) {
         (Some(reason), _) => vec![Person::without(cell.key(), PersonStatus::Changes, reason)],
         // The run of a file that cannot be read says so.
         (None, true) => vec![Person::without(
@@ -115,12 +115,12 @@ pub(super) fn analyse_together(manifest: &Manifest, base: &Path, cell: &Cell<'_>
         )],
         // Only where u is late are there others.
         (None, false) if late_samples != 0.0 => {
-            let (names, paired) = read(Pairing::InTheLoop);
-            let paired: Vec<Record> = paired.into_iter().map(|run| run.record).collect();
-            analysis.family_together(cell.key(), &names, &paired)
+            let (entries, paired) = read(Pairing::InTheLoop);
+            analysis.family_together(manifest, cell.key(), &entries, &paired)
         }
-        (None, false) => analysis.family_together(cell.key(), &names, &records),
+        (None, false) => analysis.family_together(manifest, cell.key(), &entries, &runs),
     };
+    let records: Vec<Record> = runs.into_iter().map(|run| run.record).collect();
     if let Some(first) = records.first() {
         let tau_s = people[0].parameter("tau_e").map(|tau| tau.value);
         let nk = tau_s.map(|tau_s| run_orders::nk_of(tau_s, first.sample_time().s(), late_samples));
@@ -233,14 +233,26 @@ impl<'a> RunAnalysis<'a> {
     }
 
     /// The family of all runs: the people that it is of.
-    fn family_together(&mut self, key: (&str, &str), names: &[&str], records: &[Record]) -> Vec<Person> {
-        let fit = family_fits::estimator(self.settings, &self.rows.condition)
-            .and_then(|estimator| estimator.fit(records).map_err(|error| error.to_string()));
-        match fit {
-            Ok(fit) => {
-                let window = windows(self.settings, &records[0])[2];
-                family_fits::rows_of_fit(&mut self.rows, window, family_fits::OF_ALL, &fit, &records[0]);
-                family_fits::people_of_fit(key, names, &fit, self.rows.element())
+    fn family_together(
+        &mut self,
+        manifest: &Manifest,
+        key: (&str, &str),
+        entries: &[&RunEntry],
+        runs: &[Run],
+    ) -> Vec<Person> {
+        let mut recordings = Recordings::default();
+        for (entry, run) in entries.iter().zip(runs) {
+            let name = entry.file.display().to_string();
+            recordings.push(name, run.recorded.clone(), run.account.clone());
+        }
+        let found = family_fits::identification(manifest, key.1, &self.rows)
+            .and_then(|how| how.run(recordings).map_err(|error| error.to_string()));
+        match found {
+            Ok(found) => {
+                let record = &runs[0].record;
+                let window = windows(self.settings, record)[2];
+                family_fits::rows_of_fit(&mut self.rows, window, family_fits::OF_ALL, &found.fit, record);
+                family_fits::people_of_fit(key, entries, &found, self.rows.element())
             }
             Err(reason) => {
                 self.rows.failed(None, family_fits::OF_ALL, &reason);

@@ -1,12 +1,14 @@
 //! The family of operators fitted to the runs of a person in a condition, and to each run with the
 //! form of all of them.
 
+use hoid_analysis::{Excitation, Identification, Identified};
 use hoid_ident::family::{FamilyEstimator, FamilyFit};
 use hoid_model::{ContinuousTransferFunction, Form, Record, uncertainty::Estimate};
 
 use super::{
     analysis_settings::AnalysisSettings,
     condition_settings::ConditionSettings,
+    manifest::{Manifest, RunEntry},
     person::{ALL, Person},
     run_rows::RunRows,
     windows::Window,
@@ -17,8 +19,25 @@ pub(super) const OF_RUN: &str = "family";
 /// Label of the fit of all runs.
 pub(super) const OF_ALL: &str = "family, all runs";
 
-/// How the runs of a condition are fitted.
-pub(super) fn estimator(settings: &AnalysisSettings, condition: &ConditionSettings) -> Result<FamilyEstimator, String> {
+/// How all runs of a person in a condition are identified: as `hoid identify` does it.
+pub(super) fn identification(
+    manifest: &Manifest,
+    condition: &str,
+    rows: &RunRows<'_>,
+) -> Result<Identification, String> {
+    let facts = &rows.condition;
+    Ok(Identification {
+        operator: manifest.analysis.family()?,
+        excitation: (facts.excitation.clone()).map_or(Excitation::Nothing, Excitation::Named),
+        period_s: facts.period_s,
+        faults: manifest.read.faults.handling(),
+        rate: manifest.by_rate(condition)?,
+        controlled_element: rows.element().cloned(),
+    })
+}
+
+/// How one run is fitted.
+fn estimator(settings: &AnalysisSettings, condition: &ConditionSettings) -> Result<FamilyEstimator, String> {
     Ok(FamilyEstimator {
         excitation: condition.excitation.clone(),
         period_s: condition.period_s,
@@ -42,18 +61,28 @@ pub(super) fn estimator_of_run(
 /// The people of a fit: one, or one for each run where some parameters are individual.
 pub(super) fn people_of_fit(
     key: (&str, &str),
-    runs: &[&str],
-    fit: &FamilyFit,
+    runs: &[&RunEntry],
+    found: &Identified,
     element: Option<&ContinuousTransferFunction>,
 ) -> Vec<Person> {
+    let fit = &found.fit;
     let person = |run: &str, record| Person::of_fit(key, run, runs.len(), fit, record, element);
     if fit.operators.len() == 1 {
         return vec![person(ALL, 0)];
     }
-    runs.iter()
-        .enumerate()
-        .map(|(record, run)| person(run, record))
+    let names = found.data.names.iter().enumerate();
+    names
+        .map(|(record, name)| person(&run_of(runs, name), record))
         .collect()
+}
+
+/// The run that a recording is, with its span where the run was cut at a fault.
+fn run_of(runs: &[&RunEntry], recording: &str) -> String {
+    let of = |entry: &&RunEntry| {
+        let span = recording.strip_prefix(&entry.file.display().to_string())?;
+        (span.is_empty() || span.starts_with(" (")).then(|| format!("{}{span}", entry.run))
+    };
+    runs.iter().find_map(of).unwrap_or_else(|| recording.to_owned())
 }
 
 /// Parameters, loop and response of a fit of records that were put beside each other.

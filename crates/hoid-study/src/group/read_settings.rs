@@ -1,5 +1,6 @@
 //! How the files of a group are read: the keys of `[read]`.
 
+use hoid_model::FaultHandling;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -26,8 +27,9 @@ pub struct ReadSettings {
     pub fill: bool,
     /// What is taken out of e and u: none, mean or linear.
     pub detrend: Detrending,
-    /// Faults of the recordings: bridge, report or keep. Runs are not cut inside: where a fault is too
-    /// long to be bridged, the longest part without it counts.
+    /// Faults of the recordings: bridge, report or keep. Where a fault is too long to be bridged the operator
+    /// of a person is that of all parts without it, and of what is done with single runs the longest part
+    /// counts.
     pub faults: FaultTreatment,
 }
 
@@ -42,6 +44,17 @@ pub enum FaultTreatment {
     Report,
     /// They are not looked for.
     Keep,
+}
+
+impl FaultTreatment {
+    /// The same for who repairs.
+    pub(super) fn handling(self) -> FaultHandling {
+        match self {
+            Self::Bridge => FaultHandling::Bridge,
+            Self::Report => FaultHandling::Report,
+            Self::Keep => FaultHandling::Keep,
+        }
+    }
 }
 
 /// What is taken out of e and u.

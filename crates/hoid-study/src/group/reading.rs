@@ -2,14 +2,15 @@
 
 use std::path::Path;
 
+use hoid_analysis::Account;
 use hoid_ident::faults::{Mended, mend};
 use hoid_io::{ColumnKind, ColumnSchema, OutputTable, Preparation, ReadOptions, ReadRecord, Repair, Step, TableSchema};
-use hoid_model::{Detrend, Fault, FaultHandling, Record};
+use hoid_model::{Detrend, Fault, Record};
 
 use super::{
     alignment::read_aligned,
     manifest::{Manifest, RunEntry},
-    read_settings::{Detrending, FaultTreatment},
+    read_settings::Detrending,
 };
 use crate::columns::Rows;
 
@@ -52,11 +53,13 @@ fn read_file(manifest: &Manifest, condition: &str, path: &Path, pairing: Pairing
             .map_or(0.0, |facts| facts.offset_samples),
     };
     let read = read_aligned(path, &options, &preparation, late_samples).map_err(text)?;
-    let handling = match reading.faults {
-        FaultTreatment::Bridge => FaultHandling::Bridge,
-        FaultTreatment::Report => FaultHandling::Report,
-        FaultTreatment::Keep => FaultHandling::Keep,
+    let recorded = read.record.clone();
+    let account = Account {
+        steps: read.steps.clone(),
+        quality_issues: read.quality_issues.clone(),
+        ..Account::default()
     };
+    let handling = reading.faults.handling();
     let Mended { segments, faults, .. } = mend(&read.record, handling).map_err(|error| error.to_string())?;
     let longest = segments.into_iter().max_by_key(Record::len);
     let mut read = ReadRecord {
@@ -74,6 +77,8 @@ fn read_file(manifest: &Manifest, condition: &str, path: &Path, pairing: Pairing
         factor: done.map_or(1, |done| done.factor),
         read,
         faults,
+        recorded,
+        account,
     })
 }
 
@@ -83,6 +88,10 @@ pub(super) struct Looked {
     faults: Vec<Fault>,
     /// By how much its rate was lowered behind what counts samples as they were recorded.
     factor: usize,
+    /// As it was recorded and prepared, its faults and its rate with it.
+    recorded: Record,
+    /// What was done to that.
+    account: Account,
 }
 
 /// The tables of the account: what was done to the runs, one step a row, and what is wrong with
@@ -153,6 +162,10 @@ pub(super) struct Run {
     pub factor: usize,
     /// By how much a sample of the input is taken later than that of the output beside it, s.
     pub input_lead_s: f64,
+    /// As it was recorded and prepared, its faults and its rate with it: what an identification takes.
+    pub recorded: Record,
+    /// What was done to that.
+    pub account: Account,
 }
 
 impl Run {
@@ -171,7 +184,13 @@ pub(super) fn read_run(manifest: &Manifest, base: &Path, entry: &RunEntry, pairi
 pub(super) fn run_of(files: Vec<ReadFile<'_>>) -> Result<Run, String> {
     let mut run: Option<Run> = None;
     for (_, read) in files {
-        let Looked { read, factor, .. } = read?;
+        let Looked {
+            read,
+            factor,
+            recorded,
+            account,
+            ..
+        } = read?;
         let record = read.record;
         let lead = |step: &Step| match step {
             Step::Rate { input_lead_s, .. } => *input_lead_s,
@@ -183,16 +202,36 @@ pub(super) fn run_of(files: Vec<ReadFile<'_>>) -> Result<Run, String> {
                 seam_s: None,
                 factor,
                 input_lead_s: read.steps.iter().map(lead).sum(),
+                recorded,
+                account,
             },
             Some(first) => Run {
                 factor: first.factor,
                 input_lead_s: first.input_lead_s,
                 seam_s: Some(first.record.time_s(first.record.len())),
                 record: first.record.joined(&record).map_err(|error| error.to_string())?,
+                account: joined_account(first.account, &first.recorded, account, &recorded),
+                recorded: first.recorded.joined(&recorded).map_err(|error| error.to_string())?,
             },
         });
     }
     run.ok_or_else(|| "no file is named".to_owned())
+}
+
+/// The account of two records that are joined: a share of one is less of both.
+fn joined_account(mut first: Account, of_first: &Record, then: Account, of_then: &Record) -> Account {
+    let (a, b) = (of_first.len() as f64, of_then.len() as f64);
+    first
+        .quality_issues
+        .iter_mut()
+        .for_each(|issue| issue.share *= a / (a + b));
+    let behind = then.quality_issues.into_iter().map(|mut issue| {
+        issue.share *= b / (a + b);
+        issue
+    });
+    first.quality_issues.extend(behind);
+    first.steps.extend(then.steps);
+    first
 }
 
 /// What was done to the files of a run and what is wrong with them; nothing for one that cannot be

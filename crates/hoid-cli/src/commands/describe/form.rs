@@ -1,5 +1,6 @@
 //! A description as a page for people and as an object for programs.
 
+use hoid::analysis::Account;
 use hoid::ident::{
     MarginEstimates,
     frequency::{Description, Realisation},
@@ -8,7 +9,7 @@ use hoid::model::{ContinuousTransferFunction, Record, uncertainty::Estimate};
 use hoid::report::numbers;
 use serde_json::{Map, Value, json};
 
-use crate::{commands::reading::Account, json, text};
+use crate::{json, text};
 
 /// A description with what it was made from.
 pub struct Described<'a> {

@@ -4,4 +4,4 @@
 mod form;
 mod run;
 
-pub use run::{offset_of_output, run, without_offsets};
+pub use run::run;

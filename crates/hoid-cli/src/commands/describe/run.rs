@@ -2,18 +2,16 @@
 
 use std::path::{Path, PathBuf};
 
+use hoid::analysis::{Reading, late_samples, without_offsets};
 use hoid::ident::frequency::{Description, DescriptionOptions, describe_runs};
-use hoid::io::{Offset, Step};
-use hoid::model::{Detrend, Record};
+use hoid::io::Step;
+use hoid::model::Detrend;
 use hoid::report::figures::describing;
 
 use super::form::Described;
 use crate::{
-    args::{DescribeArgs, ReadArgs},
-    commands::{
-        faults, figure, places,
-        reading::{self, ReadAll},
-    },
+    args::DescribeArgs,
+    commands::{figure, places, reading},
     error::CliError,
     json, output,
 };
@@ -24,42 +22,25 @@ pub fn run(args: &DescribeArgs) -> Result<(), CliError> {
     }
     let inputs: Vec<&Path> = args.records.iter().map(PathBuf::as_path).collect();
     places::check(&inputs, &[args.picture.figure.as_deref()], &[])?;
-    let (read, offsets) = without_offsets(&args.read);
-    let ReadAll {
-        files,
-        records,
-        accounts,
-    } = faults::mended(
-        reading::read_all(&args.records, &read, &args.mask, true)?,
-        args.faults.faults,
-    )?;
-    let (late_samples, ts_s) = match records.first() {
-        Some(record) => (offset_of_output(record, &offsets)?, record.sample_time().s()),
+    let (reading, offsets) = without_offsets(&reading::of(&args.read, Some(&args.mask), true)?);
+    let read = reading.files(&args.records, reading::told)?;
+    let read = read.repaired(args.faults.faults)?;
+    let (late, ts_s) = match read.records.first() {
+        Some(record) => (late_samples(record, &offsets)?, record.sample_time().s()),
         None => (0.0, 1.0),
     };
-    let ReadAll {
-        files,
-        records,
-        accounts,
-    } = reading::all_decimated(
-        ReadAll {
-            files,
-            records,
-            accounts,
-        },
-        &args.read,
-        false,
-    )?;
+    let data = read.at_rate(args.read.prepare.rate.decimate, false)?;
     // A ratio of samples knows no hold: what the input was moved for it is taken back.
-    let moved_s = accounts
+    let moved_s = data
+        .accounts
         .iter()
         .flat_map(|account| &account.steps)
         .find_map(|step| match step {
             Step::Rate { input_lead_s, .. } => Some(*input_lead_s),
             _ => None,
         });
-    let offset_samples = match records.first() {
-        Some(record) => (late_samples * ts_s + moved_s.unwrap_or(0.0)) / record.sample_time().s(),
+    let offset_samples = match data.records.first() {
+        Some(record) => (late * ts_s + moved_s.unwrap_or(0.0)) / record.sample_time().s(),
         None => 0.0,
     };
     let options = DescriptionOptions {
@@ -72,14 +53,14 @@ pub fn run(args: &DescribeArgs) -> Result<(), CliError> {
         detrend: Detrend::None,
         ..DescriptionOptions::default()
     };
-    let mut found = describe_runs(&records, &options)?;
-    found.verdict = faults::judged(found.verdict, &files, &accounts);
+    let mut found = describe_runs(&data.records, &options)?;
+    found.verdict = data.judged(found.verdict);
     let described = Described {
-        files: &files,
-        records: &records,
-        accounts: &accounts,
+        files: &data.names,
+        records: &data.records,
+        accounts: &data.accounts,
         found: &found,
-        settings: settings(args, late_samples, &found),
+        settings: settings(args, &reading, late, &found),
         element: args.controlled_element.as_ref(),
     };
     if let Some(path) = &args.picture.figure {
@@ -97,51 +78,8 @@ pub fn run(args: &DescribeArgs) -> Result<(), CliError> {
     CliError::of_verdict(&found.verdict)
 }
 
-/// How to read without moving rows, and the offsets. A row that is cut would leave less than whole
-/// periods, and of what is periodic an offset is a phase. With another sampling frequency, which the
-/// offset comes before, it stays with the reading.
-pub fn without_offsets(read: &ReadArgs) -> (ReadArgs, Vec<(String, Offset)>) {
-    let mut read = read.clone();
-    let offsets = if read.prepare.new_fs.is_none() {
-        std::mem::take(&mut read.prepare.offset)
-    } else {
-        Vec::new()
-    };
-    (read, offsets)
-}
-
-/// By how many samples the output is later than the input. The offset of another channel turns its
-/// own phase alone, which no average depends on.
-pub fn offset_of_output(record: &Record, offsets: &[(String, Offset)]) -> Result<f64, CliError> {
-    let names: Vec<&str> = record.channels().map(|c| c.name.as_str()).collect();
-    let mut late = 0.0;
-    for (name, offset) in reading::by_channel("--offset", offsets)? {
-        let role = match name.as_str() {
-            "e" => Some(0),
-            "u" => Some(1),
-            _ => None,
-        };
-        let Some(channel) = names.iter().position(|known| *known == name).or(role) else {
-            return Err(CliError::Usage(format!(
-                "--offset: there is no channel {name:?}; the record has {}, and e and u stand for input and output",
-                names.join(", ")
-            )));
-        };
-        let samples = match offset {
-            Offset::Samples(samples) => samples,
-            Offset::Seconds(seconds) => seconds / record.sample_time().s(),
-        };
-        match channel {
-            0 => late -= samples,
-            1 => late += samples,
-            _ => {}
-        }
-    }
-    Ok(late)
-}
-
-fn settings(args: &DescribeArgs, late_samples: f64, found: &Description) -> Vec<(String, String)> {
-    let mut list = reading::settings(&args.read, true);
+fn settings(args: &DescribeArgs, reading: &Reading, late_samples: f64, found: &Description) -> Vec<(String, String)> {
+    let mut list = reading::rows(reading.settings(args.read.prepare.rate.decimate));
     if late_samples != 0.0 {
         list.push((
             "offset of the output".to_owned(),

@@ -2,103 +2,54 @@
 
 use std::path::Path;
 
+use hoid::analysis::{Excitation, Identification, Identified, Reading, Recordings, prior_of_text};
 use hoid::ident::{
-    IdentError, SearchOptions,
-    family::{FamilyEstimator, HIGHEST_NOISE_ORDER, OperatorPrior},
+    SearchOptions,
+    family::{FamilyEstimator, HIGHEST_NOISE_ORDER},
     frequency::Description,
-    judgement::second_opinion,
 };
-use hoid::io::{IoError, is_fit_file, read_fit};
-use hoid::model::{Detrend, Record, VerdictLevel, operator_family::Coordinate};
+use hoid::model::{Detrend, operator_family::Coordinate};
 use hoid::report::{
     ModelSection, Picture, Report,
     figures::{ModelCurve, describing},
     write_report,
 };
 
-use super::{
-    family_form::Found,
-    level,
-    picture::{description, of_polynomials},
-    settings::common_settings,
-};
+use super::{family_form::Found, picture::of_polynomials};
 use crate::{
     args::IdentifyArgs,
-    commands::{
-        faults, figure,
-        reading::{self, Account},
-    },
+    commands::{figure, reading},
     error::CliError,
     json, orders, output,
 };
 
-pub fn run(args: &IdentifyArgs, files: &[String], records: &[Record], accounts: &[Account]) -> Result<(), CliError> {
-    let mut estimator = estimator(args)?;
-    let described = description(args, records);
-    // What was found, or what was named: instruments need no lines.
-    estimator.excitation = match &described {
-        Ok(found) => found.channel.clone(),
-        Err(_) => args.excitation.clone().filter(|e| e != "none"),
-    };
-    let of_lines = match &described {
-        Ok(found) => Some(Ok(found.function.clone())),
-        // What was looked for by name is missed; what was looked for by itself is not.
-        Err(CliError::Ident(error)) if args.excitation.as_deref().is_some_and(|e| e != "none") => {
-            Some(Err(error.clone()))
-        }
-        Err(_) => None,
-    };
-    let mut fit = output::watched("fitting", || estimator.fit_beside(records, of_lines))?;
-    if args.faults.looks() {
-        let element = args.controlled_element.as_ref();
-        let opinions = output::watched("a second opinion", || {
-            second_opinion::of_family(&estimator, &fit, records, element)
-        });
-        fit.verdict = fit.verdict.and(opinions);
-    }
-    if let Some(element) = &args.controlled_element {
-        fit.verdict = fit.verdict.clone().and(fit.loop_finding(0, element));
-    }
-    fit.verdict = faults::judged(fit.verdict, files, accounts);
-    let described = described.ok();
-    let validation = match &args.validate {
-        Some(path) => {
-            let other = reading::read(path, &args.read, true)?.0;
-            let other = reading::decimated(other, &args.read, false)?
-                .0
-                .detrended(estimator.detrend);
-            Some((
-                path.display().to_string(),
-                fit.operator(0).polynomial_fit.quality(&[other])?,
-            ))
-        }
-        None => None,
-    };
-    let mut settings = settings(args, &estimator);
-    settings.extend(common_settings(args, true));
-    if let Some(channel) = described.as_ref().and_then(|d| d.channel.clone()) {
-        settings.push(("excitation".to_owned(), channel));
-    }
-    let mut accounts = accounts.to_vec();
-    if estimator.detrend == Detrend::Mean {
-        level::into_accounts(&mut accounts, records, |k, record| {
-            fit.operator(k).polynomial_fit.level(record)
-        });
-    }
-    let prepared: Vec<Record> = records.iter().map(|r| r.clone().detrended(estimator.detrend)).collect();
+pub fn run(args: &IdentifyArgs, reading: &Reading, read: Recordings) -> Result<(), CliError> {
+    let identification = identification(args)?;
+    // Read before anything is written: a bad validation file leaves nothing behind.
+    let other = args.validate.as_deref();
+    let other = other.map(|path| reading.file(path, reading::told)).transpose()?;
+    let identified = output::watched("fitting", || identification.run(read))?;
+    let validation = other.map(|other| identified.validated(other)).transpose()?;
+    let Identified {
+        fit,
+        data,
+        described,
+        settings,
+        ..
+    } = identified;
     let found = Found {
         fit: &fit,
-        files,
-        records: &prepared,
-        accounts: &accounts,
+        files: &data.names,
+        records: &data.records,
+        accounts: &data.accounts,
         element: args.controlled_element.as_ref(),
-        validation: validation.as_ref().map(|(file, q)| (file.as_str(), *q)),
-        settings: &settings,
+        validation: validation.as_ref().map(|v| (v.name.as_str(), v.quality)),
+        settings: &reading::rows(settings),
     };
     if let Some(path) = &args.picture.figure {
         let svg = match &described {
             Some(described) => picture(&found, described),
-            None => of_polynomials(&fit.operator(0).polynomial_fit, &prepared, None),
+            None => of_polynomials(&fit.operator(0).polynomial_fit, &data.records, None),
         };
         figure::write(path, &svg, args.picture.width)?;
     }
@@ -110,11 +61,18 @@ pub fn run(args: &IdentifyArgs, files: &[String], records: &[Record], accounts: 
     } else {
         output::show(&found.page(args.show.verbose)?)?;
     }
-    if fit.verdict.level == VerdictLevel::NotDetermined {
-        let reasons: Vec<&str> = fit.verdict.reasons().collect();
-        return Err(CliError::NotDetermined(reasons.join("; ")));
-    }
-    Ok(())
+    CliError::of_verdict(&fit.verdict)
+}
+
+fn identification(args: &IdentifyArgs) -> Result<Identification, CliError> {
+    Ok(Identification {
+        operator: estimator(args)?,
+        excitation: Excitation::of_text(args.excitation.as_deref()),
+        period_s: args.period,
+        faults: args.faults.faults,
+        rate: args.read.prepare.rate.decimate,
+        controlled_element: args.controlled_element.clone(),
+    })
 }
 
 fn estimator(args: &IdentifyArgs) -> Result<FamilyEstimator, CliError> {
@@ -128,7 +86,7 @@ fn estimator(args: &IdentifyArgs) -> Result<FamilyEstimator, CliError> {
     Ok(FamilyEstimator {
         forms: args.form.map_or(usual.forms, |form| vec![form]),
         neuromuscular: args.neuromuscular,
-        prior: args.prior.as_deref().map_or(Ok(usual.prior), prior)?,
+        prior: args.prior.as_deref().map_or(Ok(usual.prior), prior_of_text)?,
         delay_range_s: args.delay.unwrap_or(usual.delay_range_s),
         nc,
         nd,
@@ -189,64 +147,6 @@ fn coordinate(name: &str) -> Result<Coordinate, CliError> {
             "--individual: there is no parameter {name}; expected K, T_L, T_I, omega_nm, zeta_nm or tau_e"
         ))
     })
-}
-
-/// `population`, `none`, `NAME=CENTRE:SPREAD,...`, or the JSON of another fit.
-pub(super) fn prior(text: &str) -> Result<OperatorPrior, CliError> {
-    let usage = |reason: String| CliError::Usage(format!("--prior: {reason}"));
-    if !is_fit_file(text) {
-        return text.parse().map_err(|error: IdentError| usage(error.to_string()));
-    }
-    let found = read_fit(Path::new(text)).map_err(|error| match error {
-        unreadable @ IoError::Unreadable { .. } => unreadable.into(),
-        other => usage(other.to_string()),
-    })?;
-    let parameters = found.parameters.iter();
-    let prior = OperatorPrior::of_parameters(parameters.map(|p| (p.name.as_str(), p.estimate, p.determined)), text)?;
-    if prior.entries().is_empty() {
-        return Err(usage(format!(
-            "{text}: no parameter in it is determined and has an error"
-        )));
-    }
-    Ok(prior)
-}
-
-fn settings(args: &IdentifyArgs, estimator: &FamilyEstimator) -> Vec<(String, String)> {
-    let forms: Vec<&str> = estimator.forms.iter().map(|form| form.name()).collect();
-    let range = |r: &std::ops::RangeInclusive<usize>| {
-        if r.start() == r.end() {
-            r.start().to_string()
-        } else {
-            format!("{}..{}", r.start(), r.end())
-        }
-    };
-    let (low, high) = estimator.delay_range_s;
-    let mut list = vec![
-        ("structure".to_owned(), "grey-box".to_owned()),
-        (
-            "form".to_owned(),
-            match args.form {
-                Some(form) => form.to_string(),
-                None => format!("auto of {}", forms.join(", ")),
-            },
-        ),
-        (
-            "neuromuscular".to_owned(),
-            if estimator.neuromuscular { "yes" } else { "no" }.to_owned(),
-        ),
-        ("prior".to_owned(), estimator.prior.to_string()),
-        (
-            "noise orders".to_owned(),
-            format!("nc={}, nd={}, by AIC", range(&estimator.nc), range(&estimator.nd)),
-        ),
-        ("delay in s".to_owned(), format!("{low}..{high}")),
-        ("taken out of e and u".to_owned(), estimator.detrend.to_string()),
-        ("variation from run to run".to_owned(), estimator.run_to_run.to_string()),
-    ];
-    if !args.individual.is_empty() {
-        list.push(("individual".to_owned(), args.individual.join(", ")));
-    }
-    list
 }
 
 /// The fitted operator, by prediction error and at the lines.

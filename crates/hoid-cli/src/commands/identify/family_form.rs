@@ -1,5 +1,6 @@
 //! The operator of a person, shown to people and to programs.
 
+use hoid::analysis::Account;
 use hoid::ident::{
     MarginEstimates,
     family::{
@@ -13,7 +14,6 @@ use hoid::report::{Answer, AnswerRow, numbers, sentence};
 use serde_json::{Map, Value, json};
 
 use crate::{
-    commands::reading::Account,
     error::CliError,
     json::{self, number, optional},
     text,

@@ -3,7 +3,6 @@
 mod estimate;
 mod family;
 mod family_form;
-mod level;
 mod picture;
 mod run;
 mod settings;

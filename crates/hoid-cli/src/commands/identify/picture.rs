@@ -1,58 +1,22 @@
 //! The figure of a fit: the model through the describing function of the records, where they have a
 //! periodic excitation; else its frequency response with the bands of its coefficients.
 
-use hoid::ident::{
-    Fit,
-    frequency::{Description, DescriptionOptions, describe_runs},
-};
-use hoid::model::{Detrend, Record};
+use hoid::analysis::{Excitation, Recordings};
+use hoid::ident::{Fit, frequency::Description};
+use hoid::model::Record;
 use hoid::report::{
     Picture,
     figures::{BodeModel, ModelCurve, bode, describing},
 };
 
-use crate::{
-    args::IdentifyArgs,
-    commands::{
-        describe::{offset_of_output, without_offsets},
-        faults, reading,
-    },
-    error::CliError,
-};
+use crate::args::IdentifyArgs;
 
-/// The describing function of the records without the offset of u, which is a phase of it: moved
-/// rows would leave less than whole periods.
-pub fn description(args: &IdentifyArgs, records: &[Record]) -> Result<Description, CliError> {
-    let (read, offsets) = without_offsets(&args.read);
-    let unmoved;
-    let (records, offset_samples) = if offsets.is_empty() {
-        (records, 0.0)
-    } else {
-        let again = reading::read_again(&args.records, &read, &args.mask)?;
-        let again = faults::mended_again(again, args.faults.faults)?;
-        let late = again.first().map_or(Ok(0.0), |r| offset_of_output(r, &offsets))?;
-        let ts_s = again.first().map_or(1.0, |r| r.sample_time().s());
-        // Of what is fitted beside it.
-        let used_s = records.first().map_or(ts_s, |r| r.sample_time().s());
-        let used = |r: Record| {
-            r.decimated((used_s / ts_s).round().max(1.0) as usize)
-                .map(|found| found.0)
-        };
-        unmoved = again.into_iter().map(used).collect::<Result<Vec<_>, _>>()?;
-        let late = late * ts_s / used_s;
-        (unmoved.as_slice(), late)
-    };
-    if args.excitation.as_deref() == Some("none") {
-        return Err(CliError::Usage("no excitation was asked for".to_owned()));
-    }
-    let options = DescriptionOptions {
-        excitation: args.excitation.clone(),
-        period_s: args.period,
-        offset_samples,
-        detrend: Detrend::None,
-        ..DescriptionOptions::default()
-    };
-    Ok(describe_runs(records, &options)?)
+/// The describing function of the records, where they have a recorded excitation.
+pub fn description(args: &IdentifyArgs, data: &Recordings) -> Option<Description> {
+    let excitation = Excitation::of_text(args.excitation.as_deref());
+    data.described(&excitation, args.period, args.faults.faults)
+        .ok()
+        .flatten()
 }
 
 /// A polynomial model in a figure.

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use hoid::analysis::{Setting, levels_into, may_have_level};
 use hoid::ident::{
     Fit, MarginEstimates,
     judgement::second_opinion,
@@ -15,17 +16,14 @@ use hoid::report::{Answer, ModelSection, Report, known_operator, write_report};
 
 use super::{
     estimate::{self, Estimated, FittedBy},
-    family, level,
+    family,
     picture::{description, for_page, of_polynomials},
     settings::common_settings,
     sigmoid,
 };
 use crate::{
     args::{IdentifyArgs, ModelKind},
-    commands::{
-        faults, figure, places,
-        reading::{self, ReadAll},
-    },
+    commands::{figure, places, reading},
     error::CliError,
     family_operator::{self, Converted},
     json::{self, Identified},
@@ -42,38 +40,34 @@ pub fn run(args: &IdentifyArgs) -> Result<(), CliError> {
         ModelKind::Polynomial(structure) => structure.has_input(),
         ModelKind::Family | ModelKind::GreyBox | ModelKind::TimeVarying => true,
     };
-    let read = faults::mended(
-        reading::read_all(&args.records, &args.read, &args.mask, with_input)?,
-        args.faults.faults,
-    )?;
-    let ReadAll {
-        files,
-        records,
-        mut accounts,
-    } = reading::all_decimated(read, &args.read, kind.counts_samples())?;
-    if kind == ModelKind::TimeVarying {
-        return sigmoid::run(args, &files, &records, &mut accounts);
-    }
+    let reading = reading::of(&args.read, Some(&args.mask), with_input)?;
+    let read = reading.files(&args.records, reading::told)?;
     if kind == ModelKind::Family {
-        return family::run(args, &files, &records, &accounts);
+        return family::run(args, &reading, read);
     }
-    let (records, as_read) = if level::is_estimated(args, with_input, &records) {
-        (without_level(&records), Some(records))
-    } else {
-        (records, None)
-    };
+    let (rate, counts) = (args.read.prepare.rate.decimate, kind.counts_samples());
+    let read = read.repaired(args.faults.faults)?;
+    reading::say_kept(read.kept_rate(rate, counts));
+    let mut data = read.at_rate(rate, counts)?;
+    if kind == ModelKind::TimeVarying {
+        return sigmoid::run(args, data);
+    }
+    let as_read = may_have_level(&data, with_input, args.faults.faults).then(|| {
+        let without = without_level(&data.records);
+        std::mem::replace(&mut data.records, without)
+    });
     let Estimated {
         fit,
         choice,
         grey_box,
         estimator,
         settings: chosen,
-    } = estimate::fit(args, kind, &records)?;
+    } = estimate::fit(args, kind, &data.records)?;
     // Read before anything is written: a bad validation file leaves nothing behind.
     let validation = match &args.validate {
         Some(path) => {
-            let other = reading::read(path, &args.read, with_input)?.0;
-            let mut other = vec![reading::decimated(other, &args.read, kind.counts_samples())?.0];
+            let other = reading.file(path, reading::told)?.at_rate(rate, counts)?;
+            let mut other = other.records;
             if as_read.is_some() {
                 other = without_level(&other);
             }
@@ -84,10 +78,11 @@ pub fn run(args: &IdentifyArgs) -> Result<(), CliError> {
     let mut settings = chosen;
     if let Some(as_read) = &as_read {
         let of = |k: usize| grey_box.as_ref().map_or(&fit, |found| found.polynomial_fit(k));
-        level::into_accounts(&mut accounts, as_read, |k, record| of(k).level(record));
-        settings.push(level::setting());
+        levels_into(&mut data.accounts, as_read, |k, record| of(k).level(record));
+        settings.extend(reading::rows(vec![Setting::level()]));
     }
-    settings.extend(common_settings(args, with_input));
+    settings.extend(common_settings(args, &data));
+    let records = &data.records;
     let operator = fit.operator();
     // Three poles or one are no gain with a lead, but may be another form.
     let family = match &operator {
@@ -100,16 +95,16 @@ pub fn run(args: &IdentifyArgs) -> Result<(), CliError> {
         .as_ref()
         .map(|element| loop_margins(&fit, element));
     let validations = records.iter().map(|r| fit.validate(r)).collect::<Result<Vec<_>, _>>()?;
-    let ahead = args.horizon.map(|k| prediction_ahead(&fit, &records, k)).transpose()?;
+    let ahead = args.horizon.map(|k| prediction_ahead(&fit, records, k)).transpose()?;
     let verdict = match &grey_box {
-        Some(found) => found.verdict(&records)?,
-        None => fit.verdict(&records, choice.as_ref())?,
+        Some(found) => found.verdict(records)?,
+        None => fit.verdict(records, choice.as_ref())?,
     };
     let element = args.controlled_element.as_ref();
     let opinions = match (&estimator, &grey_box) {
         _ if !args.faults.looks() => Vec::new(),
-        (Some(FittedBy::Polynomials(e)), _) => second_opinion::of_polynomials(e, &fit, &records, element),
-        (Some(FittedBy::GreyBox(e)), Some(found)) => second_opinion::of_grey_box(e, found, &records, element),
+        (Some(FittedBy::Polynomials(e)), _) => second_opinion::of_polynomials(e, &fit, records, element),
+        (Some(FittedBy::GreyBox(e)), Some(found)) => second_opinion::of_grey_box(e, found, records, element),
         _ => Vec::new(),
     };
     let level = match &estimator {
@@ -117,16 +112,16 @@ pub fn run(args: &IdentifyArgs) -> Result<(), CliError> {
         Some(FittedBy::Polynomials(e))
             if args.faults.looks() && as_read.is_none() && args.read.detrend == Detrend::None =>
         {
-            second_opinion::of_level(e, &fit, &records)
+            second_opinion::of_level(e, &fit, records)
         }
         _ => None,
     };
-    let verdict = faults::judged(verdict, &files, &accounts).and(opinions).and(level);
+    let verdict = data.judged(verdict).and(opinions).and(level);
     let identified = Identified {
         verdict: &verdict,
-        files: &files,
-        records: &records,
-        accounts: &accounts,
+        files: &data.names,
+        records,
+        accounts: &data.accounts,
         quality: GoodnessOfFit::pooled(records.iter().zip(&validations)),
         fit: &fit,
         choice: choice.as_ref(),
@@ -141,11 +136,11 @@ pub fn run(args: &IdentifyArgs) -> Result<(), CliError> {
         settings: &settings,
     };
     let pictured = with_input && (args.report.is_some() || args.picture.figure.is_some());
-    let described = pictured.then(|| description(args, &records).ok()).flatten();
+    let described = pictured.then(|| description(args, &data)).flatten();
     if let Some(path) = &args.picture.figure {
         figure::write(
             path,
-            &of_polynomials(&fit, &records, described.as_ref()),
+            &of_polynomials(&fit, records, described.as_ref()),
             args.picture.width,
         )?;
     }
@@ -156,19 +151,19 @@ pub fn run(args: &IdentifyArgs) -> Result<(), CliError> {
         };
         let mut facts = vec![
             ("hoid".to_owned(), env!("CARGO_PKG_VERSION").to_owned()),
-            ("records".to_owned(), files.join(", ")),
+            ("records".to_owned(), data.names.join(", ")),
         ];
         facts.extend(settings.iter().cloned());
-        facts.extend(reading::accounts(&files, &accounts));
+        facts.extend(reading::accounts(&data.names, &data.accounts));
         let report = Report {
             title,
             settings: facts,
             models: vec![ModelSection {
                 name: fit.title(),
                 fit: &fit,
-                records: &records,
+                records,
                 candidates: choice.as_ref(),
-                truth: known_operator(&records),
+                truth: known_operator(records),
                 margins,
             }],
             notes: Vec::new(),
@@ -177,7 +172,7 @@ pub fn run(args: &IdentifyArgs) -> Result<(), CliError> {
                 sentence: identified.sentence(),
                 parameters: Vec::new(),
             }),
-            pictures: for_page(&fit, &records, described.as_ref()).into_iter().collect(),
+            pictures: for_page(&fit, records, described.as_ref()).into_iter().collect(),
         };
         let page = write_report(directory, &report.to_html()?)?;
         output::notice("", format!("report: {}", page.display()));

@@ -1,5 +1,6 @@
 //! `hoid identify --structure time-varying`: the operator whose gains change once.
 
+use hoid::analysis::{Account, Recordings, Setting, levels_into, may_have_level, prior_of_text};
 use hoid::ident::{
     ChangedOperator, InitialState, SigmoidChange, SigmoidFit,
     judgement::second_opinion,
@@ -10,21 +11,16 @@ use hoid::model::{Channel, Form, GainUnit, Record, Verdict};
 use hoid::report::numbers;
 use serde_json::{Map, Value, json};
 
-use super::{estimate::search, family::prior, level, settings::common_settings};
+use super::{estimate::search, settings::common_settings};
 use crate::{
     args::IdentifyArgs,
-    commands::{faults, reading::Account},
+    commands::reading,
     error::CliError,
     json::{self, number},
     orders, output, text,
 };
 
-pub fn run(
-    args: &IdentifyArgs,
-    files: &[String],
-    records: &[Record],
-    accounts: &mut [Account],
-) -> Result<(), CliError> {
+pub fn run(args: &IdentifyArgs, mut data: Recordings) -> Result<(), CliError> {
     if args.initial_state.is_some_and(|rule| rule != InitialState::Estimate) {
         return Err(CliError::Usage(
             "--initial-state: the time-varying fit estimates the initial states; give auto or estimate".to_owned(),
@@ -34,8 +30,8 @@ pub fn run(
     let mut estimator = SigmoidChange {
         form: args.form.unwrap_or(usual.form),
         neuromuscular: args.neuromuscular,
-        level: level::is_estimated(args, true, records),
-        prior: args.prior.as_deref().map_or(Ok(usual.prior.clone()), prior)?,
+        level: may_have_level(&data, true, args.faults.faults),
+        prior: args.prior.as_deref().map_or(Ok(usual.prior.clone()), prior_of_text)?,
         nd: noise_order(args)?,
         constraints: orders::constraints(args.fix.as_deref(), args.bound.as_deref())?,
         search: search(args),
@@ -44,7 +40,7 @@ pub fn run(
     if let Some(delay) = args.delay {
         estimator.delay_range_s = delay;
     }
-    let fit = output::watched("fitting", || estimator.fit(records))?;
+    let fit = output::watched("fitting", || estimator.fit(&data.records))?;
     let (low, high) = estimator.delay_range_s;
     let mut settings = vec![
         ("structure".to_owned(), "time-varying".to_owned()),
@@ -58,10 +54,11 @@ pub fn run(
         ("delay in s".to_owned(), format!("{low}..{high}")),
     ];
     if estimator.level {
-        level::into_accounts(accounts, records, |_, record| fit.level(record));
-        settings.push(level::setting());
+        levels_into(&mut data.accounts, &data.records, |_, record| fit.level(record));
+        settings.extend(reading::rows(vec![Setting::level()]));
     }
-    settings.extend(common_settings(args, true));
+    settings.extend(common_settings(args, &data));
+    let records = data.records.as_slice();
     if let Some(path) = &args.trace {
         write_record(path, &trace(&fit, &records[0])?)?;
         output::message(&format!("trace of {}: {}", args.records[0].display(), path.display()));
@@ -76,13 +73,13 @@ pub fn run(
         .looks()
         .then(|| second_opinion::of_sigmoid(&estimator, &fit, records))
         .flatten();
-    let verdict = faults::judged(fit.verdict(records)?, files, accounts).and(opinion);
+    let verdict = data.judged(fit.verdict(records)?).and(opinion);
     let found = Found {
         fit: &fit,
         verdict: &verdict,
-        files,
+        files: &data.names,
         records,
-        accounts,
+        accounts: &data.accounts,
         tests: &tests,
         settings: &settings,
     };

@@ -2,13 +2,13 @@
 
 use std::collections::BTreeMap;
 
+use hoid::analysis::Account;
 use hoid::ident::{Choice, Fit};
 use hoid::io::{ColumnValues, OutputColumn, OutputTable};
 use hoid::model::{NotConvertible, Record, Verdict, uncertainty::OperatorEstimate};
 use hoid::track::{CovarianceChoice, NoCrossover, Trace};
 
 use super::errors::relative_errors;
-use crate::commands::reading::Account;
 
 /// Everything that was found.
 pub struct Tracked<'a> {

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use hoid::analysis::{Recordings, findings_of_quality};
 use hoid::io::{check_table_path, write_table};
 use hoid::model::Record;
 use hoid::track::{
@@ -11,7 +12,7 @@ use hoid::track::{
 use super::{report, result::Tracked};
 use crate::{
     args::TrackArgs,
-    commands::{faults, figure, places, reading},
+    commands::{figure, places, reading},
     error::CliError,
     json, output, recursion,
     recursion::Plan,
@@ -46,12 +47,14 @@ pub fn run(args: &TrackArgs) -> Result<(), CliError> {
         &[args.report.as_deref()],
     )?;
     let with_input = recursion::structure(&args.recursion)?.has_input();
-    let (record, mut account) = reading::read(&args.record, &args.read, with_input)?;
+    let reading = reading::of(&args.read, None, with_input)?;
+    let rate = args.read.prepare.rate.decimate;
+    let read = reading.file(&args.record, reading::told)?;
     let counts_samples = recursion::counts_samples(&args.recursion)?;
-    let read_ts = record.sample_time();
-    reading::say_kept(read_ts, &args.read, counts_samples);
-    let (record, step) = reading::decimated(record, &args.read, counts_samples)?;
-    account.steps.extend(step);
+    let read_ts = read.records[0].sample_time();
+    reading::say_kept(read.kept_rate(rate, counts_samples));
+    let Recordings { records, accounts, .. } = read.at_rate(rate, counts_samples)?;
+    let (record, account) = (&records[0], &accounts[0]);
     // Rows as far apart as samples of the file were to be.
     let every = ((args.every as f64 * read_ts.s() / record.sample_time().s()).round() as usize).max(1);
     let every = if args.read.prepare.new_fs.is_some() {
@@ -60,7 +63,7 @@ pub fn run(args: &TrackArgs) -> Result<(), CliError> {
         every
     };
     let plan = Plan::new(&args.recursion, record.sample_time())?;
-    let span_s = start_span(args, &plan, &record)?;
+    let span_s = start_span(args, &plan, record)?;
     let span = record.span(span_s.0, span_s.1);
     let (options, choice) = if plan.is_settled() {
         (plan.options().clone(), None)
@@ -73,18 +76,17 @@ pub fn run(args: &TrackArgs) -> Result<(), CliError> {
     };
     let options = TrackOptions {
         start,
-        update_from_s: update_from(args, &record)?,
+        update_from_s: update_from(args, record)?,
         ..options
     };
     let validation = match &args.validate {
         Some(path) => Some((
             path.display().to_string(),
-            reading::decimated(
-                reading::read(path, &args.read, with_input)?.0,
-                &args.read,
-                counts_samples,
-            )?
-            .0,
+            reading
+                .file(path, reading::told)?
+                .at_rate(rate, counts_samples)?
+                .records
+                .swap_remove(0),
         )),
         None => None,
     };
@@ -92,17 +94,17 @@ pub fn run(args: &TrackArgs) -> Result<(), CliError> {
     let mut options = options;
     let trace = match &validation {
         Some((_, other)) if args.update_covariance => {
-            track_validated(&record, other, &options, &CovarianceUpdates::default(), every)?
+            track_validated(record, other, &options, &CovarianceUpdates::default(), every)?
         }
         Some((file, other)) => {
             let choice;
-            (options, choice) = choose_covariance(&record, other, &options)?;
+            (options, choice) = choose_covariance(record, other, &options)?;
             covariance = Some((file.clone(), choice));
-            track(&record, &options, every)?
+            track(record, &options, every)?
         }
-        None => track(&record, &options, every)?,
+        None => track(record, &options, every)?,
     };
-    let rows = averaged_rows(args, every, &record)?;
+    let rows = averaged_rows(args, every, record)?;
     let trace = trace.moving_average(rows);
 
     let mut settings = plan.settings(&options, choice.as_ref());
@@ -148,19 +150,19 @@ pub fn run(args: &TrackArgs) -> Result<(), CliError> {
         let lag = (rows - 1) as f64 / 2.0 * every as f64 * record.sample_time().s();
         settings.push(("moving average".to_owned(), format!("{rows} rows, lags by {lag:.3} s")));
     }
-    settings.extend(reading::settings(&args.read, with_input));
+    settings.extend(reading::rows(reading.settings(rate)));
     settings.push(("rows of the trace".to_owned(), format!("every {every} samples")));
 
-    let verdict = trace.verdict(&record, choice.as_ref())?;
-    let verdict = verdict.behind(faults::of_quality(&account, &record));
+    let verdict = trace.verdict(record, choice.as_ref())?;
+    let verdict = verdict.behind(findings_of_quality(account, record));
     let tracked = Tracked {
         verdict: &verdict,
         file: args.record.display().to_string(),
         span: span.ok().filter(|_| trace.start().is_some()),
         operators: trace.operators(),
         out: args.out.display().to_string(),
-        record: &record,
-        account: &account,
+        record,
+        account,
         trace: &trace,
         choice: choice.as_ref(),
         covariance: covariance.as_ref(),

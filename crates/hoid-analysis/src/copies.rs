@@ -1,0 +1,25 @@
+//! Runs that are given twice.
+//!
+//! Errors come from the scatter between runs: a run that stands for two has none, and the errors of a
+//! result would be too small by up to the square root of two.
+
+use hoid_model::Record;
+
+use crate::{AnalysisError, recordings::Recordings};
+
+/// Refuses recordings of which two hold the same samples.
+pub(crate) fn refuse_copies(all: &Recordings) -> Result<(), AnalysisError> {
+    for (i, record) in all.records.iter().enumerate() {
+        let same = |other: &&Record| {
+            let times = record.sample_time() == other.sample_time();
+            times && record.input() == other.input() && record.output() == other.output()
+        };
+        if let Some(j) = all.records[..i].iter().position(|other| same(&other)) {
+            return Err(AnalysisError::SameSamples {
+                first: all.names[j].clone(),
+                second: all.names[i].clone(),
+            });
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,103 @@
+//! The describing function of recordings, beside a fit: at the lines of the excitation, over whole periods.
+
+use hoid_ident::{
+    IdentError,
+    frequency::{Description, DescriptionOptions, describe_runs},
+};
+use hoid_model::{Detrend, FaultHandling};
+
+use crate::{
+    AnalysisError,
+    offset::{late_samples, without_offsets},
+    recordings::Recordings,
+    repair::repaired_alike,
+};
+
+/// Which channel holds the recorded disturbance or target.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub enum Excitation {
+    /// The first of the usual names whose power stands in lines.
+    #[default]
+    Found,
+    /// None: no fit at lines.
+    Nothing,
+    /// This channel: where it has no lines the result says so.
+    Named(String),
+}
+
+impl Excitation {
+    /// As users write it: a channel or `none`; found by itself where nothing is said.
+    pub fn of_text(text: Option<&str>) -> Self {
+        match text {
+            None => Self::Found,
+            Some("none") => Self::Nothing,
+            Some(name) => Self::Named(name.to_owned()),
+        }
+    }
+
+    /// The channel that was named.
+    pub fn named(&self) -> Option<&str> {
+        match self {
+            Self::Named(name) => Some(name),
+            Self::Found | Self::Nothing => None,
+        }
+    }
+}
+
+impl Recordings {
+    /// The describing function of the recordings as they are used, without the offset of u, which is a phase
+    /// of it: moved rows would leave less than whole periods. `None` where no excitation is wanted.
+    ///
+    /// # Errors
+    /// [`AnalysisError`], where there are no lines, or the files cannot be read again.
+    pub fn described(
+        &self,
+        excitation: &Excitation,
+        period_s: Option<f64>,
+        handling: FaultHandling,
+    ) -> Result<Option<Description>, AnalysisError> {
+        if *excitation == Excitation::Nothing {
+            return Ok(None);
+        }
+        let options = |offset_samples| DescriptionOptions {
+            excitation: excitation.named().map(str::to_owned),
+            period_s,
+            offset_samples,
+            // It is part of reading.
+            detrend: Detrend::None,
+            ..DescriptionOptions::default()
+        };
+        let moved = self
+            .source
+            .as_ref()
+            .map(|source| (source, without_offsets(&source.reading)));
+        let Some((source, (reading, offsets))) = moved.filter(|(_, (_, offsets))| !offsets.is_empty()) else {
+            return Ok(Some(describe_runs(&self.records, &options(0.0))?));
+        };
+        let again = reading.files(&source.paths, |_, _| ())?;
+        let again = repaired_alike(again.records, handling)?;
+        let late = again.first().map_or(Ok(0.0), |r| late_samples(r, &offsets))?;
+        let ts_s = again.first().map_or(1.0, |r| r.sample_time().s());
+        // At the rate of what is fitted beside it.
+        let used_s = self.records.first().map_or(ts_s, |r| r.sample_time().s());
+        let factor = (used_s / ts_s).round().max(1.0) as usize;
+        let unmoved = again
+            .into_iter()
+            .map(|r| r.decimated(factor).map(|found| found.0))
+            .collect::<Result<Vec<_>, _>>()?;
+        Ok(Some(describe_runs(&unmoved, &options(late * ts_s / used_s))?))
+    }
+}
+
+/// What a fit beside the lines is told of them: what was looked for by name is missed, what was looked for by
+/// itself is not.
+pub(crate) fn of_lines(
+    described: &Result<Option<Description>, AnalysisError>,
+    excitation: &Excitation,
+) -> Option<Result<hoid_ident::frequency::DescribingFunction, IdentError>> {
+    match described {
+        Ok(found) => found.as_ref().map(|found| Ok(found.function.clone())),
+        Err(AnalysisError::Ident(error)) if excitation.named().is_some() => Some(Err(error.clone())),
+        Err(_) => None,
+    }
+}

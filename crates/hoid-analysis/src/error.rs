@@ -1,0 +1,47 @@
+//! Why an analysis gives no result.
+
+use hoid_ident::IdentError;
+use hoid_io::IoError;
+use hoid_model::ModelError;
+use thiserror::Error;
+
+/// Why an analysis gives no result.
+#[derive(Debug, Error)]
+pub enum AnalysisError {
+    /// A recording is given twice.
+    #[error(
+        "{first} and {second} hold the same samples of e and u; runs of one person must be different recordings: give each once"
+    )]
+    SameSamples {
+        /// The one.
+        first: String,
+        /// The other.
+        second: String,
+    },
+    /// An offset of a channel that is not there.
+    #[error("--offset: there is no channel {name:?}; the record has {known}, and e and u stand for input and output")]
+    NoSuchChannel {
+        /// What was asked for.
+        name: String,
+        /// What there is.
+        known: String,
+    },
+    /// A prior that cannot be understood, or says nothing.
+    #[error("--prior: {reason}")]
+    Prior {
+        /// What was found, what was expected, what to do.
+        reason: String,
+    },
+    /// There is no recording.
+    #[error("no recording was given; name at least one run")]
+    NoRecordings,
+    /// An estimator refuses.
+    #[error(transparent)]
+    Ident(#[from] IdentError),
+    /// A file cannot be read.
+    #[error(transparent)]
+    Io(#[from] IoError),
+    /// A record cannot be made.
+    #[error(transparent)]
+    Model(#[from] ModelError),
+}

@@ -1,0 +1,62 @@
+//! From files to recordings: columns, span, units, alignment, and what is left out.
+
+use std::path::{Path, PathBuf};
+
+use hoid_io::{IoError, ReadRecord, read_prepared, read_segments};
+use hoid_model::Record;
+
+use crate::{
+    reading::{Reading, Source},
+    recordings::{Account, Recordings},
+};
+
+impl Reading {
+    /// Reads the files; each file that was read is told, with what a user should know of it.
+    ///
+    /// # Errors
+    /// Those of reading.
+    pub fn files(&self, paths: &[PathBuf], mut told: impl FnMut(&Path, &ReadRecord)) -> Result<Recordings, IoError> {
+        let mut all = Recordings::default();
+        for path in paths {
+            for read in read_segments(path, &self.options, &self.preparation, &self.mask, self.shortest_s)? {
+                told(path, &read);
+                let (record, account) = with_account(read);
+                // The label of a segment ends in its span.
+                let span = record.label().rfind(" (").filter(|_| !self.mask.is_empty());
+                let span = span.map_or("", |at| &record.label()[at..]);
+                all.push(format!("{}{span}", path.display()), record, account);
+            }
+        }
+        all.source = Some(Source {
+            paths: paths.to_vec(),
+            reading: self.clone(),
+        });
+        Ok(all)
+    }
+
+    /// Reads one file, of which nothing is left out.
+    ///
+    /// # Errors
+    /// Those of reading.
+    pub fn file(&self, path: &Path, told: impl FnOnce(&Path, &ReadRecord)) -> Result<Recordings, IoError> {
+        let read = read_prepared(path, &self.options, &self.preparation)?;
+        told(path, &read);
+        let (record, account) = with_account(read);
+        let mut one = Recordings::default();
+        one.push(path.display().to_string(), record, account);
+        one.source = Some(Source {
+            paths: vec![path.to_owned()],
+            reading: self.clone(),
+        });
+        Ok(one)
+    }
+}
+
+fn with_account(read: ReadRecord) -> (Record, Account) {
+    let account = Account {
+        steps: read.steps,
+        quality_issues: read.quality_issues,
+        ..Account::default()
+    };
+    (read.record, account)
+}

@@ -1,0 +1,61 @@
+//! From recordings to a result and what it is worth, once for all who ask.
+//!
+//! An estimator takes each sample at its word, and its error bars are those of its model. What a result
+//! is worth follows from more: what was wrong with the recording and what was done about it, what a second
+//! fit without suspicious samples says, whether anybody could have held the loop. These rules stand here
+//! and nowhere else; command line, groups and Python parse options and show results.
+//!
+//! ```text
+//! files -- Reading --> Recordings -- Identification { options }.run --> Identified { fit, data, settings }
+//! ```
+//!
+//! | step of [`Identification::run`] | rules |
+//! |---|---|
+//! | files are read (before it) | `files`, `reading`; kept with what was done to them in `recordings` |
+//! | runs that are given twice are refused | `copies` |
+//! | faults are looked for and mended, channels are judged | `repair`, `quality` |
+//! | a high rate is lowered | `rate` |
+//! | the describing function, where the excitation is recorded | `description`, `offset` |
+//! | the operator, by prediction error beside the lines | [`hoid_ident::family`] |
+//! | a second opinion, the loop, what the recordings say | `identification` |
+//! | the level of u, the settings that were used | `level`, `settings` |
+//!
+//! ```
+//! use hoid_analysis::{Identification, Recordings};
+//! use hoid_model::scenario::{Condition, Scenario};
+//! use hoid_sim::{RunSeed, Simulator};
+//!
+//! let simulator = Simulator::new(&Scenario::condition(Condition::C1))?;
+//! let record = simulator.run(RunSeed::default(), false)?;
+//! let found = Identification::default().run(Recordings::of_records([record]))?;
+//! let tau = found.fit.operator(0).parameters.iter().find(|p| p.name == "tau_e");
+//! assert!(tau.is_some_and(|tau| (tau.value - 0.28).abs() < 0.02));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+mod copies;
+mod description;
+mod error;
+mod files;
+mod identification;
+mod level;
+mod offset;
+mod prior;
+mod quality;
+mod rate;
+mod reading;
+mod recordings;
+mod repair;
+mod settings;
+
+pub use description::Excitation;
+pub use error::AnalysisError;
+pub use identification::{Identification, Identified, Validated, identify};
+pub use level::{levels_into, may_have_level};
+pub use offset::{late_samples, without_offsets};
+pub use prior::prior_of_text;
+pub use quality::findings_of_quality;
+pub use rate::kept_rate;
+pub use reading::Reading;
+pub use recordings::{Account, Recordings};
+pub use settings::{Setting, shared_settings};

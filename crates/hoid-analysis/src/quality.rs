@@ -1,0 +1,78 @@
+//! What the quality of the channels says of any result.
+//!
+//! | finding | where | why |
+//! |---|---|---|
+//! | `stick-at-its-end` | u at an end of its range in more than 5 % of the rows | what the person would have done beyond it is lost: gains and margins are those of the stick |
+//! | `coarse` | e in steps of more than .05, u of more than .15 of its deviation | rounding is no remnant: intervals and bands are too narrow |
+//! | `bridged` | a gap of more than .25 s on a straight line | the line counts as tracking |
+//!
+//! No error bar knows of these.
+
+use hoid_io::{QualityIssueKind, Step};
+use hoid_model::{Finding, Record};
+
+use crate::recordings::Account;
+
+/// Shares of the rows at the ends of the stick, and steps of e and u over their deviations, beyond which a
+/// result is doubtful: what is cut off or rounded is lost.
+const AT_ENDS: f64 = 0.05;
+const COARSE: [f64; 2] = [0.05, 0.15];
+/// Longest gap that may be bridged by a straight line, s.
+const BRIDGED_S: f64 = 0.25;
+
+/// What the quality of the channels says of any result.
+pub fn findings_of_quality(account: &Account, record: &Record) -> Vec<Finding> {
+    let mut all = Vec::new();
+    let issues = |kind: QualityIssueKind| account.quality_issues.iter().filter(move |issue| issue.kind == kind);
+    let output = record.output_channel().name.as_str();
+    let at_ends: f64 = issues(QualityIssueKind::Saturated)
+        .filter(|issue| issue.channel == output)
+        .map(|issue| issue.share)
+        .sum();
+    if at_ends > AT_ENDS {
+        all.push(Finding::doubt(
+            "stick-at-its-end",
+            format!(
+                "{output} stands at an end of its range in {:.0} % of the rows: what the person would have done beyond it is lost, \
+                 and gain and margins are those of the stick",
+                100.0 * at_ends
+            ),
+        ));
+    }
+    let input = record.input_channel().map_or("", |channel| channel.name.as_str());
+    for (channel, values, least) in [(input, record.input(), COARSE[0]), (output, record.output(), COARSE[1])] {
+        let deviation = deviation(values);
+        let coarse = issues(QualityIssueKind::Quantised).find(|issue| issue.channel == channel);
+        if let Some(issue) = coarse.filter(|issue| issue.size > least * deviation) {
+            all.push(Finding::doubt(
+                "coarse",
+                format!(
+                    "{channel} is rounded to steps of {:.2} of its standard deviation: intervals and bands are too narrow",
+                    issue.size / deviation
+                ),
+            ));
+        }
+    }
+    let seconds = |step: &Step| match step {
+        Step::Fill { longest, .. } => *longest as f64 * record.sample_time().s(),
+        Step::Interpolate { longest_step_s, .. } => *longest_step_s,
+        _ => 0.0,
+    };
+    let longest = account.steps.iter().map(seconds).fold(0.0, f64::max);
+    if longest > BRIDGED_S {
+        all.push(Finding::doubt(
+            "bridged",
+            format!(
+                "gaps of up to {longest:.2} s are bridged by straight lines, which count as tracking here; leave them out by \
+                 --mask gap in a fit, by hoid stream in a tracker"
+            ),
+        ));
+    }
+    all
+}
+
+fn deviation(values: &[f64]) -> f64 {
+    let n = values.len().max(1) as f64;
+    let mean = values.iter().sum::<f64>() / n;
+    (values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n).sqrt()
+}

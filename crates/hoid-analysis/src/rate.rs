@@ -1,0 +1,57 @@
+//! The rate at which recordings are used. Where orders and delays count samples a high rate stays, unless a
+//! factor is named.
+
+use hoid_io::Step;
+use hoid_model::{Decimation, SampleTime};
+
+use crate::{AnalysisError, recordings::Recordings};
+
+impl Recordings {
+    /// The recordings at the rate at which they are used, with what was done; for an estimator that counts
+    /// samples only where a factor was named, and not where the rate was named in reading.
+    ///
+    /// # Errors
+    /// Those of the decimation.
+    pub fn at_rate(mut self, decimation: Decimation, counts_samples: bool) -> Result<Self, AnalysisError> {
+        if self
+            .source
+            .as_ref()
+            .is_some_and(|source| source.reading.settles_the_rate())
+        {
+            return Ok(self);
+        }
+        let decimation = if counts_samples {
+            decimation.when_named()
+        } else {
+            decimation
+        };
+        for (record, account) in self.records.iter_mut().zip(&mut self.accounts) {
+            let (lower, done) = decimation.of(record.clone())?;
+            *record = lower;
+            account.steps.extend(done.map(Step::from));
+        }
+        Ok(self)
+    }
+
+    /// What to say where a high rate was kept because samples are counted.
+    pub fn kept_rate(&self, decimation: Decimation, counts_samples: bool) -> Option<String> {
+        let settled = self
+            .source
+            .as_ref()
+            .is_some_and(|source| source.reading.settles_the_rate());
+        let record = self.records.first().filter(|_| !settled)?;
+        kept_rate(record.sample_time(), decimation, counts_samples)
+    }
+}
+
+/// What to say where a high rate is kept because samples are counted.
+pub fn kept_rate(sample_time: SampleTime, decimation: Decimation, counts_samples: bool) -> Option<String> {
+    let factor = decimation.factor(sample_time);
+    let kept = counts_samples && decimation == Decimation::Auto && factor > 1;
+    let hz = (1e4 / sample_time.s()).round() / 1e4;
+    kept.then(|| {
+        format!(
+            "{hz} Hz is kept, since orders and delays count samples here; --decimate {factor} brings it near 100 Hz"
+        )
+    })
+}

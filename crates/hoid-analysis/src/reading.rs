@@ -1,0 +1,43 @@
+//! How files are read, as a value that goes with what was read.
+
+use std::path::PathBuf;
+
+use hoid_io::{NewRate, Preparation, QualityIssueKind, ReadOptions};
+
+/// How files are read.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Reading {
+    /// Columns, sampling, span, repair.
+    pub options: ReadOptions,
+    /// Units, scale, offset, rate, run-in, detrend.
+    pub preparation: Preparation,
+    /// What is left out: the record is cut there.
+    pub mask: Vec<QualityIssueKind>,
+    /// Shortest segment between masked samples, s.
+    pub shortest_s: f64,
+}
+
+impl Default for Reading {
+    fn default() -> Self {
+        Self {
+            options: ReadOptions::default(),
+            preparation: Preparation::default(),
+            mask: Vec::new(),
+            shortest_s: 2.0,
+        }
+    }
+}
+
+/// Files, and how they were read.
+#[derive(Debug, Clone)]
+pub(crate) struct Source {
+    pub paths: Vec<PathBuf>,
+    pub reading: Reading,
+}
+
+impl Reading {
+    /// Whether the rate was named in Hz, and is not to be lowered again.
+    pub(crate) fn settles_the_rate(&self) -> bool {
+        matches!(self.preparation.rate, NewRate::Hz(_))
+    }
+}

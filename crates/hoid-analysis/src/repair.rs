@@ -1,0 +1,59 @@
+//! Faults of recordings, looked for and mended before anything else is done with them.
+
+use hoid_ident::faults::mend;
+use hoid_model::{FaultHandling, ModelError, Record};
+
+use crate::{
+    AnalysisError,
+    copies::refuse_copies,
+    quality::findings_of_quality,
+    recordings::{Account, Recordings},
+};
+
+impl Recordings {
+    /// The recordings without their faults; one that is cut gives several. What was found and what it says
+    /// of any result stands in the account of the first of them.
+    ///
+    /// # Errors
+    /// [`AnalysisError::SameSamples`] for runs that are given twice.
+    pub fn repaired(self, handling: FaultHandling) -> Result<Self, AnalysisError> {
+        refuse_copies(&self)?;
+        let mut all = Self {
+            source: self.source,
+            ..Self::default()
+        };
+        let one = self.names.into_iter().zip(self.records).zip(self.accounts);
+        for (((name, record), account), origin) in one.zip(self.origins) {
+            let found = mend(&record, handling)?;
+            let whole = found.segments.len() == 1 && found.segments[0].len() == record.len();
+            let mut findings = found.findings;
+            findings.extend(findings_of_quality(&account, &record));
+            let mut account = Account {
+                faults: found.faults,
+                findings,
+                ..account
+            };
+            for segment in found.segments {
+                let span = format!(" ({:.3} to {:.3} s)", segment.time_s(0), segment.time_s(segment.len()));
+                let label = format!("{}{span}", segment.label());
+                let (name, segment) = if whole {
+                    (name.clone(), segment)
+                } else {
+                    (format!("{name}{span}"), segment.labelled(label))
+                };
+                // What was found is told once.
+                all.push_part(origin, name, segment, std::mem::take(&mut account));
+            }
+        }
+        Ok(all)
+    }
+}
+
+/// The same records read another way, mended alike.
+pub(crate) fn repaired_alike(records: Vec<Record>, handling: FaultHandling) -> Result<Vec<Record>, ModelError> {
+    let mut all = Vec::with_capacity(records.len());
+    for record in records {
+        all.extend(mend(&record, handling)?.segments);
+    }
+    Ok(all)
+}

@@ -1,0 +1,263 @@
+//! From recordings to a verdict: each rule with a recording that trips it, beside one that does not.
+#![allow(clippy::unwrap_used)]
+
+use std::{collections::BTreeMap, fs, path::Path};
+
+use hoid_analysis::{
+    AnalysisError, Excitation, Identification, Reading, Recordings, late_samples, prior_of_text, without_offsets,
+};
+use hoid_ident::family::FamilyEstimator;
+use hoid_io::{NewRate, Offset, write_record};
+use hoid_model::{
+    Channel, ContinuousTransferFunction, Decimation, FaultHandling, Form, Record, SampleTime, VerdictLevel,
+    scenario::{Condition, Scenario},
+};
+use hoid_sim::{RunSeed, Simulator};
+
+/// A run as it is recorded: e and u alone.
+fn recorded(seed: u64, change: impl Fn(f64, f64) -> (f64, f64)) -> Record {
+    let simulator = Simulator::new(&Scenario::condition(Condition::C1)).unwrap();
+    let run = RunSeed {
+        seed,
+        ..RunSeed::default()
+    };
+    let record = simulator.run(run, false).unwrap();
+    let (e, u) = record
+        .input()
+        .iter()
+        .zip(record.output())
+        .map(|(e, u)| change(*e, *u))
+        .unzip();
+    Record::new(record.sample_time(), Channel::new("e", "", e), Channel::new("u", "", u))
+        .unwrap()
+        .labelled(format!("run {seed}"))
+}
+
+fn clipped(seed: u64) -> Record {
+    recorded(seed, |e, u| (e, u.clamp(-0.086, 0.086)))
+}
+
+/// One form and few orders of the noise: what is tested here is not the choice.
+fn quick() -> Identification {
+    Identification {
+        operator: FamilyEstimator {
+            forms: vec![Form::Lead],
+            nd: 0..=4,
+            ..FamilyEstimator::default()
+        },
+        ..Identification::default()
+    }
+}
+
+#[test]
+fn a_stick_at_its_end_is_told_of_files_and_of_records_alike() {
+    let clean = quick()
+        .run(Recordings::of_records([recorded(1, |e, u| (e, u))]))
+        .unwrap();
+    assert_eq!(
+        clean.fit.verdict.level,
+        VerdictLevel::Trustworthy,
+        "{}",
+        clean.fit.verdict
+    );
+    let shown = clean.to_string();
+    assert!(
+        shown.starts_with("Verdict: trustworthy\n") && shown.contains("\ntau_e = 0.28"),
+        "{shown}"
+    );
+    let two = [clipped(1), clipped(2)];
+    let of_records = quick().run(Recordings::of_records(two.clone())).unwrap();
+    assert_eq!(of_records.fit.verdict.level, VerdictLevel::Doubtful);
+    let directory = tempfile::tempdir().unwrap();
+    let paths = ["run 1", "run 2"].map(|name| directory.path().join(format!("{name}.csv")));
+    for (path, record) in paths.iter().zip(&two) {
+        write_record(path, record).unwrap();
+    }
+    let of_files = quick()
+        .run(Reading::default().files(&paths, |_, _| ()).unwrap())
+        .unwrap();
+    let place = format!("{}/", directory.path().display());
+    let words = |found: &hoid_analysis::Identified| -> Vec<String> {
+        let all = found.fit.verdict.findings().iter();
+        all.map(|f| f.words.replace(&place, "").replace(".csv", "")).collect()
+    };
+    assert_eq!(words(&of_records), words(&of_files));
+    let first = &words(&of_files)[0];
+    assert!(
+        first.starts_with("run 1: u stands at an end of its range in 28 % of the rows"),
+        "{first}"
+    );
+}
+
+#[test]
+fn runs_that_are_no_two_runs_are_refused() {
+    let record = recorded(1, |e, u| (e, u));
+    let copy = record.clone().labelled("again");
+    let refused = quick().run(Recordings::of_records([record.clone(), copy])).unwrap_err();
+    assert!(matches!(refused, AnalysisError::SameSamples { .. }));
+    let words = refused.to_string();
+    assert!(words.starts_with("run 1 and again hold the same samples"), "{words}");
+    let nothing = quick().run(Recordings::default()).unwrap_err();
+    assert!(matches!(nothing, AnalysisError::NoRecordings));
+    // Nothing moves: the estimator says so.
+    let resting = quick().run(Recordings::of_records([recorded(1, |e, _| (e, 0.0))]));
+    assert!(matches!(resting.unwrap_err(), AnalysisError::Ident(_)));
+    let short = record.span(0.0, 0.5).unwrap();
+    assert!(matches!(
+        quick().run(Recordings::of_records([short])).unwrap_err(),
+        AnalysisError::Ident(_)
+    ));
+}
+
+#[test]
+fn a_loop_that_nobody_could_hold_is_told_where_the_element_is_known() {
+    let reversed = || Recordings::of_records([recorded(1, |e, u| (-e, u))]);
+    let element = ContinuousTransferFunction::new(&[90.0], &[1.0, 6.0, 0.0]).unwrap();
+    let with = Identification {
+        controlled_element: Some(element.clone()),
+        ..quick()
+    };
+    let right = with.run(Recordings::of_records([recorded(1, |e, u| (e, u))])).unwrap();
+    assert_eq!(
+        right.fit.verdict.level,
+        VerdictLevel::Trustworthy,
+        "{}",
+        right.fit.verdict
+    );
+    let wrong = with.run(reversed()).unwrap();
+    assert_ne!(wrong.fit.verdict.level, VerdictLevel::Trustworthy);
+    assert!(
+        right
+            .settings
+            .iter()
+            .any(|s| s.name == "controlled element" && s.value == element.to_string())
+    );
+}
+
+#[test]
+fn settings_are_the_values_that_were_used() {
+    let mut how = quick();
+    how.operator.search.tolerance = 1e-7;
+    let found = how.run(Recordings::of_records([recorded(1, |e, u| (e, u))])).unwrap();
+    let value = |name: &str| found.settings.iter().find(|s| s.name == name).map(|s| s.value.as_str());
+    assert_eq!(value("search"), Some("auto, relative tolerance 1e-7"));
+    assert_eq!(value("initial state"), Some("estimate"));
+    assert_eq!(value("form"), Some("lead"));
+    assert_eq!(value("taken out of e and u"), Some("mean"));
+    assert!(found.data.accounts[0].level.is_some());
+}
+
+#[test]
+fn faults_are_mended_or_kept() {
+    let spoilt = || {
+        let record = recorded(1, |e, u| (e, u));
+        let mut u = record.output().to_vec();
+        u[3000] = 5.0;
+        let e = Channel::new("e", "", record.input().to_vec());
+        Recordings::of_records([Record::new(record.sample_time(), e, Channel::new("u", "", u)).unwrap()])
+    };
+    let mended = quick().run(spoilt()).unwrap();
+    assert_eq!(mended.data.accounts[0].faults.len(), 1);
+    let kept = Identification {
+        faults: FaultHandling::Keep,
+        ..quick()
+    };
+    let kept = kept.run(spoilt()).unwrap();
+    assert!(kept.data.accounts[0].faults.is_empty());
+    assert!(kept.fit.loss > 3.0 * mended.fit.loss);
+}
+
+#[test]
+fn a_high_rate_is_lowered_but_for_what_counts_samples() {
+    let ts = SampleTime::new(0.002).unwrap();
+    let wave = |phase: f64| (0..4000).map(|k| (0.01 * f64::from(k) - phase).sin()).collect();
+    let record = Record::new(ts, Channel::new("e", "", wave(0.0)), Channel::new("u", "", wave(0.3))).unwrap();
+    let all = || Recordings::of_records([record.clone()]);
+    let lower = all().at_rate(Decimation::Auto, false).unwrap();
+    assert!((lower.records[0].sample_time().s() - 0.01).abs() < 1e-12);
+    assert_eq!(lower.accounts[0].steps.len(), 1);
+    let kept = all().at_rate(Decimation::Auto, true).unwrap();
+    assert_eq!(kept.records[0].len(), 4000);
+    let words = all().kept_rate(Decimation::Auto, true).unwrap();
+    assert!(
+        words.starts_with("500 Hz is kept") && words.contains("--decimate 5"),
+        "{words}"
+    );
+    assert_eq!(all().kept_rate(Decimation::By(5), true), None);
+    assert_eq!(all().at_rate(Decimation::By(5), true).unwrap().records[0].len(), 800);
+}
+
+#[test]
+fn a_rate_in_hz_is_not_lowered_again() {
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().join("run.csv");
+    write_record(&path, &recorded(1, |e, u| (e, u))).unwrap();
+    let mut reading = Reading::default();
+    reading.preparation.rate = NewRate::Hz(400.0);
+    let read = reading.file(&path, |_, _| ()).unwrap();
+    let used = read.at_rate(Decimation::Auto, false).unwrap();
+    assert!((used.records[0].sample_time().s() - 0.0025).abs() < 1e-9);
+}
+
+#[test]
+fn an_offset_is_a_phase_of_what_is_periodic() {
+    let record = recorded(1, |e, u| (e, u));
+    let of = |name: &str, offset| BTreeMap::from([(name.to_owned(), offset)]);
+    assert_eq!(late_samples(&record, &of("u", Offset::Samples(2.0))).unwrap(), 2.0);
+    assert_eq!(late_samples(&record, &of("e", Offset::Seconds(0.01))).unwrap(), -1.0);
+    let wrong = late_samples(&record, &of("y", Offset::Samples(1.0))).unwrap_err();
+    assert_eq!(
+        wrong.to_string(),
+        "--offset: there is no channel \"y\"; the record has e, u, and e and u stand for input and output"
+    );
+    let mut reading = Reading::default();
+    reading.preparation.offset = of("u", Offset::Samples(1.0));
+    let (unmoved, offsets) = without_offsets(&reading);
+    assert!(unmoved.preparation.offset.is_empty() && offsets.len() == 1);
+    reading.preparation.rate = NewRate::Hz(50.0);
+    assert_eq!(without_offsets(&reading), (reading, BTreeMap::new()));
+}
+
+#[test]
+fn an_excitation_that_was_named_is_missed() {
+    let named = Identification {
+        excitation: Excitation::of_text(Some("f_t")),
+        ..quick()
+    };
+    let found = named.run(Recordings::of_records([recorded(1, |e, u| (e, u))])).unwrap();
+    assert!(found.fit.no_lines.is_some_and(|why| why.contains("f_t")));
+    let looked_for = quick()
+        .run(Recordings::of_records([recorded(1, |e, u| (e, u))]))
+        .unwrap();
+    assert_eq!(looked_for.fit.no_lines, None);
+    assert_eq!(Excitation::of_text(Some("none")), Excitation::Nothing);
+}
+
+#[test]
+fn a_prior_is_named_or_stands_in_a_file() {
+    assert!(prior_of_text("none").unwrap().entries().is_empty());
+    for (text, says) in [("omega_nm", "--prior: "), ("nowhere.json", "nowhere.json")] {
+        let words = prior_of_text(text).unwrap_err().to_string();
+        assert!(words.contains(says), "{words}");
+    }
+    let directory = tempfile::tempdir().unwrap();
+    let path = directory.path().join("fit.json");
+    fs::write(&path, "{\"parameters\": []}").unwrap();
+    assert!(prior_of_text(Path::new(&path).to_str().unwrap()).is_err());
+}
+
+#[test]
+fn another_run_of_the_person_judges_the_operator() {
+    let found = quick()
+        .run(Recordings::of_records([recorded(1, |e, u| (e, u))]))
+        .unwrap();
+    let other = Recordings::of_records([recorded(2, |e, u| (e, u))]);
+    let judged = found.validated(other).unwrap();
+    assert_eq!(judged.name, "run 2");
+    assert!(
+        judged.quality.vaf_simulation > 80.0,
+        "{}",
+        judged.quality.vaf_simulation
+    );
+    assert!(found.validated(Recordings::default()).is_err());
+}

@@ -1,0 +1,155 @@
+//! The same recordings have the same verdict wherever they are identified.
+#![allow(clippy::unwrap_used)]
+
+mod common;
+
+use std::{collections::BTreeSet, fs, path::Path};
+
+use serde_json::Value;
+use tempfile::TempDir;
+
+use common::{good, json_of_any_worth};
+
+const ELEMENT: &str = "90/(s(s+6))";
+const ROWS: usize = 4096;
+
+type Rows = Vec<[f64; 2]>;
+/// What a fault is called, and how it comes into a recording.
+type Spoilt = (&'static str, fn(&mut Rows));
+
+/// What went wrong with both runs of a person.
+const SPOILT: [Spoilt; 9] = [
+    ("clean", |_| ()),
+    ("clipped", |rows| {
+        rows.iter_mut().for_each(|row| row[1] = row[1].clamp(-0.086, 0.086))
+    }),
+    ("coarse", |rows| {
+        rows.iter_mut().for_each(|row| row[1] = (row[1] / 0.02).round() * 0.02)
+    }),
+    ("frozen", |rows| {
+        let e = rows[1000][0];
+        rows[1000..1300].iter_mut().for_each(|row| row[0] = e);
+    }),
+    ("held", |rows| {
+        let u = rows[2000][1];
+        rows[2000..2006].iter_mut().for_each(|row| row[1] = u);
+    }),
+    ("spikes", |rows| {
+        rows[700][1] = 4.0;
+        rows[3001][0] = -30.0;
+    }),
+    ("reversed", |rows| rows.iter_mut().for_each(|row| row[0] = -row[0])),
+    ("late", |rows| {
+        for k in (20..ROWS).rev() {
+            rows[k][1] = rows[k - 20][1];
+        }
+    }),
+    ("stepped", |rows| rows[2500..].iter_mut().for_each(|row| row[1] += 0.3)),
+];
+
+fn simulated(at: &Path, seed: usize) -> Rows {
+    let seed = seed.to_string();
+    good(
+        at,
+        &["simulate", "--condition", "C1", "--seed", &seed, "--out", "run.csv"],
+    );
+    let text = fs::read_to_string(at.join("run.csv")).unwrap();
+    let mut lines = text.lines().filter(|line| !line.starts_with('#'));
+    let names: Vec<&str> = lines.next().unwrap().split(',').collect();
+    let columns = ["e", "u"].map(|name| names.iter().position(|n| *n == name).unwrap());
+    let row = |line: &str| {
+        let cells: Vec<&str> = line.split(',').collect();
+        columns.map(|c| cells[c].parse().unwrap())
+    };
+    lines.take(ROWS).map(row).collect()
+}
+
+/// Two runs of each person, as files of a group.
+fn people(at: &Path) {
+    let runs = [simulated(at, 1), simulated(at, 2)];
+    fs::create_dir(at.join("people")).unwrap();
+    for (name, spoil) in SPOILT {
+        for (k, run) in runs.iter().enumerate() {
+            let mut rows = run.clone();
+            spoil(&mut rows);
+            let lines = rows
+                .iter()
+                .enumerate()
+                .map(|(k, [e, u])| format!("{},{e},{u}\n", k as f64 / 100.0));
+            let text = "t,e,u\n".to_owned() + &lines.collect::<String>();
+            fs::write(at.join(format!("people/{name}_C1_{}.csv", k + 1)), text).unwrap();
+        }
+    }
+}
+
+fn strings(of: &Value) -> Vec<&str> {
+    of.as_array().unwrap().iter().map(|one| one.as_str().unwrap()).collect()
+}
+
+#[test]
+fn a_group_finds_word_for_word_what_identify_finds() {
+    let directory = TempDir::new().unwrap();
+    let at = directory.path();
+    people(at);
+    good(at, &["group", "init", "people", "--controlled-element", ELEMENT]);
+    let found = json_of_any_worth(at, &["group", "people", "--out", "out", "--json"]);
+    let all = found["people"].as_array().unwrap();
+    assert_eq!(all.len(), SPOILT.len());
+    let mut seen = BTreeSet::new();
+    for (name, _) in SPOILT {
+        let person = all.iter().find(|one| one["subject"] == name).unwrap();
+        let [one, two] = [1, 2].map(|run| format!("{name}_C1_{run}.csv"));
+        let arguments = ["identify", &one, &two, "--controlled-element", ELEMENT, "--json"];
+        let alone = json_of_any_worth(&at.join("people"), &arguments);
+        let verdict = &alone["verdict"];
+        assert_eq!(person["verdict"]["level"], verdict["level"], "{name}: {person}");
+        assert_eq!(
+            strings(&person["verdict"]["reasons"]),
+            strings(&verdict["reasons"]),
+            "{name}"
+        );
+        assert_eq!(
+            strings(&person["verdict"]["notes"]),
+            strings(&verdict["notes"]),
+            "{name}"
+        );
+        for parameter in alone["parameters"].as_array().unwrap() {
+            let there = &person["parameters"][parameter["name"].as_str().unwrap()];
+            for key in ["value", "standard_error", "interval"] {
+                assert_eq!(there[key], parameter[key], "{name}: {}", parameter["name"]);
+            }
+        }
+        let kinds = verdict["findings"].as_array().unwrap().iter();
+        seen.extend(kinds.map(|finding| finding["kind"].as_str().unwrap().to_owned()));
+    }
+    // The recordings do trip the rules.
+    for kind in ["stick-at-its-end", "coarse", "faults"] {
+        assert!(seen.contains(kind), "{kind}: {seen:?}");
+    }
+    let clipped = all.iter().find(|one| one["subject"] == "clipped").unwrap();
+    assert_eq!(clipped["verdict"]["level"], "doubtful");
+}
+
+#[test]
+fn a_run_that_stands_for_two_is_refused_by_both() {
+    let directory = TempDir::new().unwrap();
+    let at = directory.path();
+    people(at);
+    let inside = at.join("people");
+    for file in fs::read_dir(&inside).unwrap().map(|entry| entry.unwrap().path()) {
+        if !file.ends_with("clean_C1_1.csv") {
+            fs::remove_file(file).unwrap();
+        }
+    }
+    fs::copy(inside.join("clean_C1_1.csv"), inside.join("clean_C1_2.csv")).unwrap();
+    good(at, &["group", "init", "people"]);
+    let found = json_of_any_worth(at, &["group", "people", "--out", "out", "--json"]);
+    let alone = common::hoid(&inside, &["identify", "clean_C1_1.csv", "clean_C1_2.csv"]);
+    assert_eq!(alone.status.code(), Some(2));
+    let said = String::from_utf8(alone.stderr).unwrap();
+    let reason = found["people"][0]["reason"].as_str().unwrap();
+    assert!(
+        reason.contains("hold the same samples") && said.contains(reason),
+        "{reason}\n{said}"
+    );
+}

@@ -1,0 +1,121 @@
+"""`pyhoid.identify` is `hoid identify`: the same default, the same digits, the same verdict word for word."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+import pyhoid
+
+pytestmark = pytest.mark.filterwarnings("ignore::UserWarning")
+
+Signals = tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]
+
+
+def _frozen(e: npt.NDArray[np.float64], u: npt.NDArray[np.float64]) -> Signals:
+    e = e.copy()
+    e[2000:2300] = e[2000]
+    return e, u
+
+
+def _spikes(e: npt.NDArray[np.float64], u: npt.NDArray[np.float64]) -> Signals:
+    e, u = e.copy(), u.copy()
+    u[1500], e[3500] = 4.0, -30.0
+    return e, u
+
+
+#: What is wrong with a recording; the last number is that of a stick with an offset and another unit.
+RECORDED: dict[str, Callable[..., Signals]] = {
+    "as recorded": lambda e, u: (e, 12.5 * (u + 0.05)),
+    "clipped": lambda e, u: (e, np.clip(u, -0.086, 0.086)),
+    "coarse": lambda e, u: (e, np.round(u / 0.02) * 0.02),
+    "frozen": _frozen,
+    "spikes": _spikes,
+    "reversed": lambda e, u: (-e, u),
+}
+
+
+@pytest.fixture(scope="module")
+def runs() -> list[pyhoid.Record]:
+    return [pyhoid.simulate("C1", seed=seed) for seed in (1, 2)]
+
+
+def spoilt(record: pyhoid.Record, how: str) -> pyhoid.Record:
+    assert record.e is not None
+    e, u = RECORDED[how](record.e, record.u)
+    return pyhoid.Record(e=e, u=u, sample_time=record.sample_time)
+
+
+def same(person: pyhoid.OperatorFit, found: dict[str, Any], where: str) -> None:
+    def bare(words: list[str]) -> list[str]:
+        return [one.replace(where, "").replace(".csv", "") for one in words]
+
+    assert person.form == found["form"]
+    assert person.verdict.level == found["verdict"]["level"]
+    assert bare(person.verdict.reasons) == bare(found["verdict"]["reasons"])
+    assert bare(person.verdict.notes) == bare(found["verdict"]["notes"])
+    assert list(person.parameters) == [p["name"] for p in found["parameters"]]
+    for p in found["parameters"]:
+        here = person.parameters[p["name"]]
+        assert (here.value, here.standard_error) == (p["value"], p["standard_error"])
+        assert here.determined == p["determined"]
+    assert person.loss == found["loss"]
+
+
+@pytest.mark.parametrize("how", RECORDED)
+def test_a_recording_has_one_verdict(
+    how: str, runs: list[pyhoid.Record], tmp_path: Path, cli: Any
+) -> None:
+    path = tmp_path / "run.csv"
+    pyhoid.write(path, spoilt(runs[0], how))
+    found = cli.json("identify", path, "--controlled-element", "90/(s(s+6))")
+    record = pyhoid.read(path)
+    person = pyhoid.identify(record, controlled_element="90/(s(s+6))")
+    assert isinstance(person, pyhoid.OperatorFit)
+    same(person, found, f"{tmp_path}/")
+    assert str(person).startswith(f"Verdict: {person.verdict.level}")
+    # Another name of the same call.
+    again = pyhoid.identify_operator(record, controlled_element="90/(s(s+6))")
+    assert again.parameters == person.parameters and again.verdict == person.verdict
+
+
+def test_two_runs_with_a_stick_at_its_end_are_doubtful(
+    runs: list[pyhoid.Record], tmp_path: Path, cli: Any
+) -> None:
+    paths = [tmp_path / f"run{k}.csv" for k in (1, 2)]
+    for path, record in zip(paths, runs):
+        pyhoid.write(path, spoilt(record, "clipped"))
+    person = pyhoid.identify([pyhoid.read(path) for path in paths])
+    assert person.verdict.level == "doubtful"
+    assert "run1: u stands at an end of its range" in person.verdict.reasons[0]
+    same(person, cli.json("identify", *paths), f"{tmp_path}/")
+    # Polynomials are of the same recordings.
+    fit = pyhoid.identify([pyhoid.read(path) for path in paths], "bj", nk=29, nd=1)
+    assert "stands at an end" in fit.verdict.reasons[0]
+
+
+def test_a_run_that_is_given_twice_is_refused(runs: list[pyhoid.Record]) -> None:
+    with pytest.raises(pyhoid.DataError, match="hold the same samples"):
+        pyhoid.identify([runs[0], runs[0]])
+    with pytest.raises(pyhoid.DataError, match="hold the same samples"):
+        pyhoid.identify([runs[0], runs[0]], "arx", nk=29)
+
+
+def test_what_is_fitted_is_told_from_the_options(runs: list[pyhoid.Record]) -> None:
+    record = runs[0]
+    assert isinstance(pyhoid.identify(record, nk=29, nd=1), pyhoid.Fit)
+    assert isinstance(pyhoid.identify(record, method="sriv", nk=29), pyhoid.Fit)
+    for name in ("operator", "family", "grey-box", "grey_box"):
+        person = pyhoid.identify(record, name, form="lead", nd=2)
+        assert isinstance(person, pyhoid.OperatorFit) and person.form == "lead"
+    remnant = pyhoid.identify(record, "grey-box", remnant_order=1)
+    assert isinstance(remnant, pyhoid.Fit) and remnant.structure == "grey-box"
+    with pytest.raises(pyhoid.OptionError, match="nk belongs to"):
+        pyhoid.identify(record, "operator", nk=29)
+    with pytest.raises(pyhoid.OptionError, match="excitation belongs to"):
+        pyhoid.identify(record, "bj", excitation="f_t")
