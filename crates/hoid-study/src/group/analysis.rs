@@ -26,7 +26,7 @@ use super::{
     family_fits,
     manifest::{Manifest, RunEntry},
     person::{ALL, Person, PersonStatus, people_of, people_table},
-    reading::{Pairing, Run, account, read_files, read_run, run_of},
+    reading::{Pairing, Recorded, Run, account, read_files, read_run, run_of},
     run_orders::{self, label_of},
     run_rows::{RunRows, RunTables},
     traces,
@@ -242,8 +242,9 @@ impl<'a> RunAnalysis<'a> {
     ) -> Vec<Person> {
         let mut recordings = Recordings::default();
         for (entry, run) in entries.iter().zip(runs) {
-            let name = entry.file.display().to_string();
-            recordings.push(name, run.recorded.clone(), run.account.clone());
+            if let Some(Recorded { record, account }) = run.recorded.clone() {
+                recordings.push(entry.file.display().to_string(), record, account);
+            }
         }
         let found = family_fits::identification(manifest, key.1, &self.rows)
             .and_then(|how| how.run(recordings).map_err(|error| error.to_string()));

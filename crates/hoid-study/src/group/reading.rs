@@ -53,11 +53,13 @@ fn read_file(manifest: &Manifest, condition: &str, path: &Path, pairing: Pairing
             .map_or(0.0, |facts| facts.offset_samples),
     };
     let read = read_aligned(path, &options, &preparation, late_samples).map_err(text)?;
-    let recorded = read.record.clone();
-    let account = Account {
-        steps: read.steps.clone(),
-        quality_issues: read.quality_issues.clone(),
-        ..Account::default()
+    let recorded = Recorded {
+        record: read.record.clone(),
+        account: Account {
+            steps: read.steps.clone(),
+            quality_issues: read.quality_issues.clone(),
+            ..Account::default()
+        },
     };
     let handling = reading.faults.handling();
     let Mended { segments, faults, .. } = mend(&read.record, handling).map_err(|error| error.to_string())?;
@@ -78,7 +80,6 @@ fn read_file(manifest: &Manifest, condition: &str, path: &Path, pairing: Pairing
         read,
         faults,
         recorded,
-        account,
     })
 }
 
@@ -88,10 +89,7 @@ pub(super) struct Looked {
     faults: Vec<Fault>,
     /// By how much its rate was lowered behind what counts samples as they were recorded.
     factor: usize,
-    /// As it was recorded and prepared, its faults and its rate with it.
-    recorded: Record,
-    /// What was done to that.
-    account: Account,
+    recorded: Recorded,
 }
 
 /// The tables of the account: what was done to the runs, one step a row, and what is wrong with
@@ -162,9 +160,15 @@ pub(super) struct Run {
     pub factor: usize,
     /// By how much a sample of the input is taken later than that of the output beside it, s.
     pub input_lead_s: f64,
-    /// As it was recorded and prepared, its faults and its rate with it: what an identification takes.
-    pub recorded: Record,
-    /// What was done to that.
+    /// What an identification takes; nothing of a run that is joined of two, whose task changes at the seam.
+    pub recorded: Option<Recorded>,
+}
+
+/// A run as it was recorded and prepared, its faults and its rate with it.
+#[derive(Clone)]
+pub(super) struct Recorded {
+    pub record: Record,
+    /// What was done to it.
     pub account: Account,
 }
 
@@ -185,11 +189,7 @@ pub(super) fn run_of(files: Vec<ReadFile<'_>>) -> Result<Run, String> {
     let mut run: Option<Run> = None;
     for (_, read) in files {
         let Looked {
-            read,
-            factor,
-            recorded,
-            account,
-            ..
+            read, factor, recorded, ..
         } = read?;
         let record = read.record;
         let lead = |step: &Step| match step {
@@ -202,36 +202,18 @@ pub(super) fn run_of(files: Vec<ReadFile<'_>>) -> Result<Run, String> {
                 seam_s: None,
                 factor,
                 input_lead_s: read.steps.iter().map(lead).sum(),
-                recorded,
-                account,
+                recorded: Some(recorded),
             },
             Some(first) => Run {
                 factor: first.factor,
                 input_lead_s: first.input_lead_s,
                 seam_s: Some(first.record.time_s(first.record.len())),
                 record: first.record.joined(&record).map_err(|error| error.to_string())?,
-                account: joined_account(first.account, &first.recorded, account, &recorded),
-                recorded: first.recorded.joined(&recorded).map_err(|error| error.to_string())?,
+                recorded: None,
             },
         });
     }
     run.ok_or_else(|| "no file is named".to_owned())
-}
-
-/// The account of two records that are joined: a share of one is less of both.
-fn joined_account(mut first: Account, of_first: &Record, then: Account, of_then: &Record) -> Account {
-    let (a, b) = (of_first.len() as f64, of_then.len() as f64);
-    first
-        .quality_issues
-        .iter_mut()
-        .for_each(|issue| issue.share *= a / (a + b));
-    let behind = then.quality_issues.into_iter().map(|mut issue| {
-        issue.share *= b / (a + b);
-        issue
-    });
-    first.quality_issues.extend(behind);
-    first.steps.extend(then.steps);
-    first
 }
 
 /// What was done to the files of a run and what is wrong with them; nothing for one that cannot be
