@@ -307,7 +307,8 @@ def identify(
         (``fit.levels``), and ``fit.records`` are without their means; keep leaves data as they are.
     decimate : "auto", "off" or int
         Keep every n-th sample behind a linear-phase low-pass filter. ``"auto"``: above 200 Hz by the
-        number that comes nearest to 100 Hz for operators; polynomial structures, whose orders and delay count samples, take all samples unless a number is given.
+        number that comes nearest to 100 Hz for operators; polynomial structures, whose orders and
+        delay count samples, take all samples unless a number is given.
         ``fit.records`` are the decimated records.
     progress : bool or callable
         True shows on standard error how far a search is; a callable gets the number of
