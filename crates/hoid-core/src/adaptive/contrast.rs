@@ -9,7 +9,7 @@
 //!
 //! for K stretches of both spans together, N unknowns and `n_i` of the n samples in a span: the two solutions take 2
 //! of the K, and the inverse of a Wishart matrix is `K / (K - N - 1)` times too large in the mean. S knows what the
-//! model does not; with few stretches it is uncertain, and the model's part keeps it from zero: [`SHOWN`] is w. Then
+//! model does not; with few stretches it is uncertain, and the model's part keeps it from zero: w is `SHOWN`. Then
 //!
 //! `d = s_1 - s_0`, `C = A_0^-1 W_0 A_0^-1 + A_1^-1 W_1 A_1^-1`.
 //!
