@@ -1,7 +1,7 @@
 //! What is to be tracked, and how.
 
 use hoid_ident::{Estimator, IdentError, SearchOptions};
-use hoid_model::{ContinuousTransferFunction, Orders, Record, Structure};
+use hoid_model::{ContinuousTransferFunction, Orders, Record, SampleTime, Structure};
 
 use crate::{
     forgetting::ForgettingRule,
@@ -9,7 +9,7 @@ use crate::{
     memory::Memory,
     method::bad,
     methods::Method,
-    setup::{Setup, StartAt, parameter_names, polynomial_orders},
+    setup::{Setup, StartAt, USUAL_DELAY_S, parameter_names, polynomial_orders},
 };
 
 /// Options of a recursive estimate: the method with its own, and what all methods share.
@@ -50,6 +50,11 @@ impl TrackOptions {
             at_rad_s: Vec::new(),
             controlled_element: None,
         }
+    }
+
+    /// The usual ones of a method that starts itself and is told nothing of the person.
+    pub fn told_nothing(method: Method, sample_time: SampleTime) -> Self {
+        Self::usual(method, sample_time.nk(USUAL_DELAY_S))
     }
 
     /// Default options with the structure and the orders that the method takes when none are named,

@@ -67,23 +67,30 @@ pub fn run(args: &DemoArgs) -> Result<(), CliError> {
     Ok(())
 }
 
-/// Traces of the whole run, from the batch fit before the change on: the two methods of the text,
-/// and the one in physical parameters.
+/// Traces of the whole run: the default, which is told nothing, and the two methods of the text, from the batch
+/// fit before the change on.
 fn tracked(record: &Record, stages: &[Stage]) -> Result<Vec<(String, Trace)>, CliError> {
     let (_, from, to) = SPANS[0];
     let nk = stages[0].choice.fit.orders().nk;
-    [Method::rls(), Method::rpem(), Method::physical()]
+    [Method::adaptive(), Method::rls(), Method::rpem()]
         .into_iter()
         .map(|method| {
             let structure = method.usual_structure();
-            let options = TrackOptions {
-                start: StartAt::Span(Some((from, to))),
-                ..TrackOptions::new(method.clone(), structure, structure.operator_orders(nk))
+            let told_nothing = method.starts_itself();
+            let options = if told_nothing {
+                TrackOptions::told_nothing(method.clone(), record.sample_time())
+            } else {
+                TrackOptions {
+                    start: StartAt::Span(Some((from, to))),
+                    ..TrackOptions::new(method.clone(), structure, structure.operator_orders(nk))
+                }
             };
-            Ok((
-                format!("{}, {}", method.name(), structure.label()),
-                track(record, &options, 1)?,
-            ))
+            let told = if told_nothing {
+                "told nothing".to_owned()
+            } else {
+                structure.label()
+            };
+            Ok((format!("{}, {told}", method.name()), track(record, &options, 1)?))
         })
         .collect()
 }
@@ -101,7 +108,8 @@ fn errors_over_time(record: &Record, traces: &[(String, Trace)]) -> String {
     ]);
     for (name, trace) in traces {
         let operators: Vec<_> = (0..trace.len()).map(|row| trace.operator(row)).collect();
-        let first = trace.times_s().partition_point(|t| *t < trace.updated_from_s());
+        let from_s = trace.updated_from_s().max(SPANS[0].2);
+        let first = trace.times_s().partition_point(|t| *t < from_s);
         let errors = relative_errors(record, trace, &operators, first, &OPERATOR_COLUMNS);
         let error = |column: &str| errors.iter().find(|(name, _)| *name == column);
         let mut row = vec![name.clone()];

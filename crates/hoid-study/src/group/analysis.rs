@@ -18,7 +18,7 @@ use hoid_analysis::Recordings;
 use hoid_ident::{Estimator, GreyBox, choose_orders, order_selection::Criterion};
 use hoid_io::OutputTable;
 use hoid_model::{Form, Orders, Record, Structure, uncertainty::Estimate};
-use hoid_track::{StartAt, TrackOptions, track};
+use hoid_track::{Method, StartAt, TrackOptions, track};
 
 use super::{
     analysis_settings::AnalysisSettings,
@@ -182,38 +182,46 @@ impl<'a> RunAnalysis<'a> {
                     Err(reason) => self.rows.failed(Some(window), label, &reason),
                 }
             }
-            // Their names were checked with the manifest.
-            for method in self.settings.recursions().unwrap_or_default() {
-                if method.usual_structure() == structure {
-                    let options = TrackOptions {
-                        start: StartAt::Span(Some((windows[0].from_s, windows[0].to_s))),
-                        ..TrackOptions::new(method.clone(), structure, orders)
-                    };
-                    let every = run.samples(self.settings.trace_every as f64).round().max(1.0);
-                    match track(record, &options, every as usize) {
-                        Ok(trace) => {
-                            self.rows.trace_rows(&trace);
-                            for window in &windows[..2] {
-                                for (name, values) in traces::values_within(&trace, window.from_s, window.to_s) {
-                                    let middle = median(&values);
-                                    if middle.is_finite() {
-                                        self.rows.row(
-                                            Some(*window),
-                                            &traces::label_of(&method),
-                                            &name,
-                                            Estimate::fixed(middle),
-                                        );
-                                    }
-                                }
-                            }
-                        }
-                        Err(error) => self.rows.failed(None, &traces::label_of(&method), &error.to_string()),
-                    }
-                }
-            }
+        }
+        // Their names were checked with the manifest.
+        for method in self.settings.recursions().unwrap_or_default() {
+            self.track(run, &windows, &method, from_cell);
         }
         if self.settings.grey_box {
             self.grey_box(record, &windows);
+        }
+    }
+
+    /// A recursion over the run: one that starts itself is told nothing, another has the orders of the cell and
+    /// starts from a fit of the first window.
+    fn track(&mut self, run: &Run, windows: &[Window; 3], method: &Method, from_cell: &FromCell) {
+        let record = &run.record;
+        let label = traces::label_of(method);
+        let structure = method.usual_structure();
+        let options = if method.starts_itself() {
+            TrackOptions::told_nothing(method.clone(), record.sample_time())
+        } else {
+            match from_cell.orders(structure) {
+                Ok(orders) => TrackOptions {
+                    start: StartAt::Span(Some((windows[0].from_s, windows[0].to_s))),
+                    ..TrackOptions::new(method.clone(), structure, *orders)
+                },
+                Err(reason) => return self.rows.failed(None, &label, reason),
+            }
+        };
+        let every = run.samples(self.settings.trace_every as f64).round().max(1.0);
+        let trace = match track(record, &options, every as usize) {
+            Ok(trace) => trace,
+            Err(error) => return self.rows.failed(None, &label, &error.to_string()),
+        };
+        self.rows.trace_rows(&trace);
+        for window in &windows[..2] {
+            for (name, values) in traces::values_within(&trace, window.from_s, window.to_s) {
+                let middle = median(&values);
+                if middle.is_finite() {
+                    self.rows.row(Some(*window), &label, &name, Estimate::fixed(middle));
+                }
+            }
         }
     }
 

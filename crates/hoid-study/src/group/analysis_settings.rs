@@ -19,7 +19,7 @@ pub struct AnalysisSettings {
     pub nd: (usize, usize),
     /// Range of the delay of ARX and Box-Jenkins models, s.
     pub delay_s: (f64, f64),
-    /// Recursions by name, as in `hoid track`. Default: rls, rpem, physical.
+    /// Recursions by name, as in `hoid track`. Default: adaptive, rls, rpem.
     #[schemars(extend("items" = serde_json::json!({ "enum": method_names() })))]
     pub methods: Vec<String>,
     /// Samples from one kept point of a trace to the next.
@@ -65,7 +65,7 @@ impl Default for AnalysisSettings {
             windows_s: None,
             nd: (1, 1),
             delay_s: (0.05, 0.6),
-            methods: ["rls", "rpem", "physical"].map(str::to_owned).to_vec(),
+            methods: ["adaptive", "rls", "rpem"].map(str::to_owned).to_vec(),
             trace_every: 16,
             grey_box: false,
             form: AUTO.to_owned(),

@@ -16,7 +16,7 @@
 //! [analysis]
 //! windows_s = [[5.0, 25.0], [25.0, 45.0]] # sub-batches; default: the first and the last three eighths of each record
 //! nd = [1, 4]                             # least and greatest order of the noise model, chosen by BIC; default [1, 1]
-//! methods = ["rls", "rpem"]               # recursions; default rls, rpem, physical
+//! methods = ["rls", "rpem"]               # recursions; default adaptive, rls, rpem
 //!
 //! [conditions.fo]
 //! controlled_element = "1/1,0"
