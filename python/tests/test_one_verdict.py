@@ -84,6 +84,55 @@ def test_a_recording_has_one_verdict(
     assert again.parameters == person.parameters and again.verdict == person.verdict
 
 
+#: Every other estimator: keywords of Python, options of the command line.
+OTHERS: dict[str, tuple[dict[str, Any], list[str]]] = {
+    "bj": (
+        {"structure": "bj", "nk": 29, "nd": 1},
+        ["--structure", "bj", "--nk", "29", "--orders", "nd=1"],
+    ),
+    "sriv": ({"method": "sriv", "nk": 29}, ["--method", "sriv", "--nk", "29"]),
+    "remnant": ({"remnant_order": 1}, ["--remnant-order", "1"]),
+    "sigmoid": ({"structure": "time-varying"}, ["--structure", "time-varying"]),
+}
+
+
+@pytest.mark.parametrize("estimator", OTHERS)
+@pytest.mark.parametrize("how", ["as recorded", "clipped", "spikes"])
+def test_so_it_is_by_every_estimator(
+    how: str, estimator: str, runs: list[pyhoid.Record], tmp_path: Path, cli: Any
+) -> None:
+    path = tmp_path / "run.csv"
+    pyhoid.write(path, spoilt(runs[0], how))
+    keywords, options = OTHERS[estimator]
+    found = cli.json("identify", path, *options)
+    fit = pyhoid.identify(pyhoid.read(path), **keywords)
+    assert (fit.verdict.level, fit.verdict.reasons, fit.verdict.notes) == (
+        found["verdict"]["level"],
+        found["verdict"]["reasons"],
+        found["verdict"]["notes"],
+    )
+    assert fit.loss == found["loss"]
+    # The list of the program has what is wrong with the channels too.
+    faults = [fault for fault in found["faults"] if fault["kind"] != "saturated"]
+    assert [fault["kind"] for fault in fit.faults] == [fault["kind"] for fault in faults]
+    told = found["records"][0].get("level")
+    if told is not None:
+        assert fit.levels[0] is not None and fit.levels[0].value == told["value"]
+    if how == "clipped":
+        assert "stands at an end of its range" in fit.verdict.reasons[0]
+
+
+def test_a_trace_hears_of_its_channels(
+    runs: list[pyhoid.Record], tmp_path: Path, cli: Any
+) -> None:
+    path = tmp_path / "run.csv"
+    pyhoid.write(path, spoilt(runs[0], "clipped"))
+    found = cli.json("track", path, "--out", tmp_path / "trace.csv")
+    trace = pyhoid.track(pyhoid.read(path))
+    assert trace.verdict.reasons == found["verdict"]["reasons"]
+    assert "stands at an end of its range" in trace.verdict.reasons[0]
+
+
 def test_two_runs_with_a_stick_at_its_end_are_doubtful(
     runs: list[pyhoid.Record], tmp_path: Path, cli: Any
 ) -> None:

@@ -32,6 +32,12 @@ pub enum AnalysisError {
         /// What was found, what was expected, what to do.
         reason: String,
     },
+    /// Options that contradict each other or the model.
+    #[error("{reason}")]
+    Options {
+        /// What was found, what was expected, what to do.
+        reason: String,
+    },
     /// There is no recording.
     #[error("no recording was given; name at least one run")]
     NoRecordings,

@@ -1,28 +1,28 @@
-//! The operator of a person from recordings: what is done, in its order, and what is found.
+//! From recordings to a result of any batch estimator: what is done, in its order, and what is found.
 
 use std::fmt;
 
 use hoid_ident::{
     family::{FamilyEstimator, FamilyFit},
     frequency::Description,
-    judgement::second_opinion,
-    validation::GoodnessOfFit,
 };
-use hoid_model::{ContinuousTransferFunction, Decimation, Detrend, FaultHandling, Record, uncertainty::Estimate};
+use hoid_model::{
+    ContinuousTransferFunction, Decimation, Detrend, FaultHandling, Record, Verdict, uncertainty::Estimate,
+};
 
 use crate::{
     AnalysisError,
-    description::{Excitation, of_lines},
-    level::levels_into,
+    description::Excitation,
+    estimators::{BatchEstimator, Fitted},
     recordings::Recordings,
-    settings::{Setting, operator_settings, shared_settings},
+    settings::{Setting, shared_settings},
 };
 
-/// How the operator of a person is identified from recordings.
-#[derive(Debug, Clone, Default)]
-pub struct Identification {
-    /// Forms, noise, prior, delay, what is individual. Its excitation and period are those below.
-    pub operator: FamilyEstimator,
+/// How a model is identified from recordings: by default the operator of a person.
+#[derive(Debug, Clone)]
+pub struct Identification<E = FamilyEstimator> {
+    /// What is fitted, and how. Its excitation and period are those below.
+    pub estimator: E,
     /// The channel of the recorded disturbance or target.
     pub excitation: Excitation,
     /// Its period, s; found from its lines where it is not given.
@@ -37,9 +37,11 @@ pub struct Identification {
 
 /// What was identified.
 #[derive(Debug, Clone)]
-pub struct Identified {
-    /// The operator, with the verdict of all that is known.
-    pub fit: FamilyFit,
+pub struct Identified<F = FamilyFit> {
+    /// The result.
+    pub fit: F,
+    /// What it is worth, of all that is known.
+    pub verdict: Verdict,
     /// The recordings as they were fitted, without their means where these were taken out, and what was done
     /// to them.
     pub data: Recordings,
@@ -48,16 +50,8 @@ pub struct Identified {
     /// The settings that were used.
     pub settings: Vec<Setting>,
     rate: Decimation,
-    detrend: Detrend,
-}
-
-/// How well an operator tells a recording that it was not fitted to.
-#[derive(Debug, Clone)]
-pub struct Validated {
-    /// The recording.
-    pub name: String,
-    /// How well.
-    pub quality: GoodnessOfFit,
+    counts_samples: bool,
+    taken_out: Detrend,
 }
 
 /// The operator of a person from their runs, by the defaults.
@@ -68,66 +62,61 @@ pub fn identify(records: &[Record]) -> Result<Identified, AnalysisError> {
     Identification::default().run(Recordings::of_records(records.iter().cloned()))
 }
 
-impl Identification {
+impl Default for Identification {
+    fn default() -> Self {
+        Self::of(FamilyEstimator::default())
+    }
+}
+
+impl<E: BatchEstimator> Identification<E> {
+    /// By an estimator, everything else by default.
+    pub fn of(estimator: E) -> Self {
+        Self {
+            estimator,
+            excitation: Excitation::default(),
+            period_s: None,
+            faults: FaultHandling::default(),
+            rate: Decimation::default(),
+            controlled_element: None,
+        }
+    }
+
     /// Repairs the recordings, fits, asks for a second opinion, and forms the verdict.
     ///
     /// # Errors
-    /// [`AnalysisError`] where there is no result. One that is doubtful is none: see
-    /// [`FamilyFit::verdict`].
-    pub fn run(&self, recordings: Recordings) -> Result<Identified, AnalysisError> {
+    /// [`AnalysisError`] where there is no result. One that is doubtful is none: see [`Identified::verdict`].
+    pub fn run(&self, recordings: Recordings) -> Result<Identified<E::Fit>, AnalysisError> {
         if recordings.is_empty() {
             return Err(AnalysisError::NoRecordings);
         }
-        let mut data = recordings.repaired(self.faults)?.at_rate(self.rate, false)?;
-        let described = data.described(&self.excitation, self.period_s, self.faults);
-        let channel = match &described {
-            // What was found, or what was named: instruments need no lines.
-            Ok(Some(found)) => found.channel.clone(),
-            _ => self.excitation.named().map(str::to_owned),
-        };
-        let estimator = FamilyEstimator {
-            excitation: channel,
-            period_s: self.period_s,
-            ..self.operator.clone()
-        };
-        let mut fit = estimator.fit_beside(&data.records, of_lines(&described, &self.excitation))?;
-        let element = self.controlled_element.as_ref();
-        if self.faults != FaultHandling::Keep {
-            let opinions = second_opinion::of_family(&estimator, &fit, &data.records, element);
-            fit.verdict = fit.verdict.and(opinions);
-        }
-        if let Some(element) = element {
-            fit.verdict = fit.verdict.clone().and(fit.loop_finding(0, element));
-        }
-        fit.verdict = data.judged(fit.verdict);
-        let mut settings = operator_settings(&estimator);
+        let counts_samples = self.estimator.counts_samples();
+        let mut data = recordings.repaired(self.faults)?.at_rate(self.rate, counts_samples)?;
+        let Fitted {
+            mut fit,
+            verdict,
+            described,
+            taken_out,
+            mut settings,
+        } = E::fit(self, &mut data)?;
+        let verdict = data.judged(verdict);
+        E::judged(&mut fit, &verdict);
         settings.extend(shared_settings(
             &data,
-            estimator.initial_state.name(),
+            self.estimator.initial_state(),
             self.rate,
             self.faults,
-            &estimator.search,
-            element,
+            self.estimator.search(),
+            self.controlled_element.as_ref(),
         ));
-        let described = described.ok().flatten();
-        if let Some(channel) = described.as_ref().and_then(|d| d.channel.clone()) {
-            settings.push(Setting::new("excitation", channel));
-        }
-        if estimator.detrend == Detrend::Mean {
-            levels_into(&mut data.accounts, &data.records, |k, record| {
-                fit.operator(k).polynomial_fit.level(record)
-            });
-        }
-        for record in &mut data.records {
-            *record = record.clone().detrended(estimator.detrend);
-        }
         Ok(Identified {
             fit,
+            verdict,
             data,
             described,
             settings,
             rate: self.rate,
-            detrend: estimator.detrend,
+            counts_samples,
+            taken_out,
         })
     }
 }
@@ -135,7 +124,7 @@ impl Identification {
 impl fmt::Display for Identified {
     /// The verdict, and the parameters of each operator.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}\n\n{}", self.fit.verdict, self.fit.title())?;
+        write!(f, "{}\n\n{}", self.verdict, self.fit.title())?;
         for of in &self.fit.operators {
             for p in &of.parameters {
                 let estimate = Estimate {
@@ -153,21 +142,19 @@ impl fmt::Display for Identified {
     }
 }
 
-impl Identified {
-    /// How well the operator of the first recording tells another recording of the person, prepared as those
-    /// that it was fitted to were.
+impl<F> Identified<F> {
+    /// Other recordings of the person, prepared as those that were fitted: to judge the fit on them.
     ///
     /// # Errors
-    /// [`AnalysisError`] where the recording is of another rate, or too short.
-    pub fn validated(&self, other: Recordings) -> Result<Validated, AnalysisError> {
-        let name = other.names.first().cloned().ok_or(AnalysisError::NoRecordings)?;
-        let records: Vec<Record> = other
-            .at_rate(self.rate, false)?
-            .records
-            .into_iter()
-            .map(|record| record.detrended(self.detrend))
-            .collect();
-        let quality = self.fit.operator(0).polynomial_fit.quality(&records)?;
-        Ok(Validated { name, quality })
+    /// [`AnalysisError`] where there is none, or its rate cannot be lowered.
+    pub fn alike(&self, other: Recordings) -> Result<Recordings, AnalysisError> {
+        if other.is_empty() {
+            return Err(AnalysisError::NoRecordings);
+        }
+        let mut other = other.at_rate(self.rate, self.counts_samples)?;
+        for record in &mut other.records {
+            *record = record.clone().detrended(self.taken_out);
+        }
+        Ok(other)
     }
 }

@@ -6,7 +6,7 @@
 //! and nowhere else; command line, groups and Python parse options and show results.
 //!
 //! ```text
-//! files -- Reading --> Recordings -- Identification { options }.run --> Identified { fit, data, settings }
+//! files -- Reading --> Recordings -- Identification { options }.run --> Identified { fit, verdict, data, settings }
 //! ```
 //!
 //! | step of [`Identification::run`] | rules |
@@ -16,9 +16,9 @@
 //! | faults are looked for and mended, channels are judged | `repair`, `quality` |
 //! | a high rate is lowered | `rate` |
 //! | the describing function, where the excitation is recorded | `description`, `offset` |
-//! | the operator, by prediction error beside the lines | [`hoid_ident::family`] |
-//! | a second opinion, the loop, what the recordings say | `identification` |
-//! | the level of u, the settings that were used | `level`, `settings` |
+//! | the fit, a second opinion, the loop, the settings of the estimator | `estimators`: a file each |
+//! | what the recordings say | `identification`, `recordings` |
+//! | the level of u, the settings that all share | `level`, `settings` |
 //!
 //! ```
 //! use hoid_analysis::{Identification, Recordings};
@@ -36,6 +36,7 @@
 mod copies;
 mod description;
 mod error;
+mod estimators;
 mod files;
 mod identification;
 mod level;
@@ -50,12 +51,12 @@ mod settings;
 
 pub use description::Excitation;
 pub use error::AnalysisError;
-pub use identification::{Identification, Identified, Validated, identify};
-pub use level::{levels_into, may_have_level};
+pub use estimators::{BatchEstimator, Fitted, PolynomialFit, Polynomials};
+pub use identification::{Identification, Identified, identify};
 pub use offset::{late_samples, without_offsets};
 pub use prior::prior_of_text;
 pub use quality::findings_of_quality;
 pub use rate::kept_rate;
 pub use reading::Reading;
 pub use recordings::{Account, Recordings};
-pub use settings::{Setting, shared_settings};
+pub use settings::Setting;

@@ -1,10 +1,8 @@
 //! The settings that were used, as they are printed: the values that the numerics received.
 
-use std::ops::RangeInclusive;
-
-use hoid_ident::{SearchOptions, family::FamilyEstimator};
+use hoid_ident::SearchOptions;
 use hoid_io::QualityIssueKind;
-use hoid_model::{ContinuousTransferFunction, Decimation, FaultHandling, Form};
+use hoid_model::{ContinuousTransferFunction, Decimation, FaultHandling};
 
 use crate::{reading::Reading, recordings::Recordings};
 
@@ -76,7 +74,7 @@ impl Reading {
 }
 
 /// The settings that every kind of fit shares, defaults included.
-pub fn shared_settings(
+pub(crate) fn shared_settings(
     recordings: &Recordings,
     initial_state: &str,
     decimation: Decimation,
@@ -100,40 +98,5 @@ pub fn shared_settings(
         Setting::new("largest number of steps", search.max_iterations.to_string()),
     ]);
     list.extend(element.map(|element| Setting::new("controlled element", element.to_string())));
-    list
-}
-
-/// What an operator was fitted by.
-pub(crate) fn operator_settings(estimator: &FamilyEstimator) -> Vec<Setting> {
-    let range = |r: &RangeInclusive<usize>| {
-        if r.start() == r.end() {
-            r.start().to_string()
-        } else {
-            format!("{}..{}", r.start(), r.end())
-        }
-    };
-    let names: Vec<&str> = estimator.forms.iter().map(|form: &Form| form.name()).collect();
-    let form = match names.as_slice() {
-        [only] => (*only).to_owned(),
-        all => format!("auto of {}", all.join(", ")),
-    };
-    let (low, high) = estimator.delay_range_s;
-    let mut list = vec![
-        Setting::new("structure", "grey-box"),
-        Setting::new("form", form),
-        Setting::new("neuromuscular", if estimator.neuromuscular { "yes" } else { "no" }),
-        Setting::new("prior", estimator.prior.to_string()),
-        Setting::new(
-            "noise orders",
-            format!("nc={}, nd={}, by AIC", range(&estimator.nc), range(&estimator.nd)),
-        ),
-        Setting::new("delay in s", format!("{low}..{high}")),
-        Setting::new("taken out of e and u", estimator.detrend.to_string()),
-        Setting::new("variation from run to run", estimator.run_to_run.to_string()),
-    ];
-    if !estimator.individual.is_empty() {
-        let names: Vec<&str> = estimator.individual.iter().map(|c| c.parameter()).collect();
-        list.push(Setting::new("individual", names.join(", ")));
-    }
     list
 }

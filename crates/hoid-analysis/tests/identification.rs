@@ -4,12 +4,13 @@
 use std::{collections::BTreeMap, fs, path::Path};
 
 use hoid_analysis::{
-    AnalysisError, Excitation, Identification, Reading, Recordings, late_samples, prior_of_text, without_offsets,
+    AnalysisError, BatchEstimator, Excitation, Identification, Polynomials, Reading, Recordings, late_samples,
+    prior_of_text, without_offsets,
 };
-use hoid_ident::family::FamilyEstimator;
+use hoid_ident::{GreyBox, SigmoidChange, family::FamilyEstimator};
 use hoid_io::{NewRate, Offset, write_record};
 use hoid_model::{
-    Channel, ContinuousTransferFunction, Decimation, FaultHandling, Form, Record, SampleTime, VerdictLevel,
+    Channel, ContinuousTransferFunction, Decimation, FaultHandling, Form, Record, SampleTime, Structure, VerdictLevel,
     scenario::{Condition, Scenario},
 };
 use hoid_sim::{RunSeed, Simulator};
@@ -40,7 +41,7 @@ fn clipped(seed: u64) -> Record {
 /// One form and few orders of the noise: what is tested here is not the choice.
 fn quick() -> Identification {
     Identification {
-        operator: FamilyEstimator {
+        estimator: FamilyEstimator {
             forms: vec![Form::Lead],
             nd: 0..=4,
             ..FamilyEstimator::default()
@@ -137,7 +138,7 @@ fn a_loop_that_nobody_could_hold_is_told_where_the_element_is_known() {
 #[test]
 fn settings_are_the_values_that_were_used() {
     let mut how = quick();
-    how.operator.search.tolerance = 1e-7;
+    how.estimator.search.tolerance = 1e-7;
     let found = how.run(Recordings::of_records([recorded(1, |e, u| (e, u))])).unwrap();
     let value = |name: &str| found.settings.iter().find(|s| s.name == name).map(|s| s.value.as_str());
     assert_eq!(value("search"), Some("auto, relative tolerance 1e-7"));
@@ -252,12 +253,60 @@ fn another_run_of_the_person_judges_the_operator() {
         .run(Recordings::of_records([recorded(1, |e, u| (e, u))]))
         .unwrap();
     let other = Recordings::of_records([recorded(2, |e, u| (e, u))]);
-    let judged = found.validated(other).unwrap();
-    assert_eq!(judged.name, "run 2");
+    let other = found.alike(other).unwrap();
+    assert_eq!(other.names, ["run 2"]);
+    let quality = found.fit.operator(0).polynomial_fit.quality(&other.records).unwrap();
+    assert!(quality.vaf_simulation > 80.0, "{}", quality.vaf_simulation);
+    assert!(found.alike(Recordings::default()).is_err());
+}
+
+#[test]
+fn orders_of_polynomials_are_those_that_were_given_and_the_operators() {
+    let ts = SampleTime::HUNDREDTH;
+    let usual = Polynomials::new(Structure::BoxJenkins).ranges(ts).unwrap();
+    assert_eq!((usual.nk, usual.nd, usual.nb), (6..=61, 1..=4, 2..=2));
+    let some = Polynomials {
+        orders: [("nd".to_owned(), 2..=2)].into(),
+        delay_s: Some((0.28, 0.28)),
+        ..Polynomials::new(Structure::BoxJenkins)
+    };
+    let found = some.ranges(ts).unwrap();
+    assert_eq!((found.nk, found.nd, found.nf), (29..=29, 2..=2, 2..=2));
+    let none = Polynomials {
+        orders: [("nx".to_owned(), 2..=2)].into(),
+        ..Polynomials::new(Structure::Arx)
+    };
+    assert!(matches!(none.ranges(ts), Err(AnalysisError::Options { .. })));
+}
+
+/// The rule of a stick at its end holds in all estimators; a start of a search among several models in none.
+#[test]
+fn every_estimator_hears_of_the_recordings() {
+    fn doubted<E: BatchEstimator>(estimator: E, record: &Record) {
+        let found = Identification::of(estimator)
+            .run(Recordings::of_records([record.clone()]))
+            .unwrap();
+        let first = found.verdict.reasons().next().unwrap_or_default().to_owned();
+        assert!(first.contains("stands at an end of its range"), "{first}");
+    }
+    let record = clipped(1);
+    let polynomials = Polynomials {
+        orders: [("nd".to_owned(), 1..=1), ("nk".to_owned(), 29..=29)].into(),
+        ..Polynomials::new(Structure::BoxJenkins)
+    };
+    doubted(polynomials.clone(), &record);
+    doubted(GreyBox::new(1..=1), &record);
+    doubted(SigmoidChange::default(), &record);
+    let searched = Polynomials {
+        orders: [("nk".to_owned(), 28..=29)].into(),
+        start: Some([("b0".to_owned(), 0.04)].into()),
+        ..polynomials
+    };
+    let refused = Identification::of(searched).run(Recordings::of_records([record]));
     assert!(
-        judged.quality.vaf_simulation > 80.0,
-        "{}",
-        judged.quality.vaf_simulation
+        refused
+            .unwrap_err()
+            .to_string()
+            .contains("--start belongs to one model")
     );
-    assert!(found.validated(Recordings::default()).is_err());
 }

@@ -63,6 +63,7 @@ impl From<AnalysisError> for CliError {
             AnalysisError::SameSamples { .. }
             | AnalysisError::NoSuchChannel { .. }
             | AnalysisError::Prior { .. }
+            | AnalysisError::Options { .. }
             | AnalysisError::NoRecordings => Self::Usage(error.to_string()),
         }
     }

@@ -2,9 +2,8 @@
 
 use std::{collections::BTreeMap, ops::RangeInclusive};
 
-use hoid::ident::{Constraint, NamedOrders, OrderRanges, Prior, order_selection::default_operator_ranges};
-use hoid::model::{MAX_DELAY, MAX_ORDER, Orders, SampleTime, Structure};
-use hoid::track::theta_of;
+use hoid::ident::{Constraint, NamedOrders, Prior};
+use hoid::model::{MAX_DELAY, MAX_ORDER, SampleTime};
 
 use crate::error::CliError;
 
@@ -42,6 +41,14 @@ impl DelayRange {
         match self {
             Self::Samples(range) => range.clone(),
             Self::Seconds(low, high) => sample_time.nk(*low)..=sample_time.nk(*high),
+        }
+    }
+
+    /// Both ends in s; none of samples.
+    pub fn seconds(&self) -> Option<(f64, f64)> {
+        match self {
+            Self::Samples(_) => None,
+            Self::Seconds(low, high) => Some((*low, *high)),
         }
     }
 }
@@ -101,12 +108,8 @@ pub fn parse_numbers(text: &str) -> Result<Vec<(String, f64)>, String> {
         .collect()
 }
 
-/// The orders that were typed.
-pub fn named_orders(
-    orders: Option<&str>,
-    nk: Option<&DelayRange>,
-    sample_time: SampleTime,
-) -> Result<NamedOrders, CliError> {
+/// The orders that were typed; a delay in seconds is none of them yet.
+pub fn named_orders(orders: Option<&str>, nk: Option<&DelayRange>) -> Result<NamedOrders, CliError> {
     let mut all = NamedOrders::new();
     for (name, value) in parse_pairs(orders.unwrap_or_default()).map_err(CliError::Usage)? {
         if name == "nk" && nk.is_some() {
@@ -117,8 +120,8 @@ pub fn named_orders(
         let range = parse_range(&value).map_err(|e| CliError::Usage(format!("--orders {name}: {e}")))?;
         all.insert(name, range);
     }
-    if let Some(nk) = nk {
-        all.insert("nk".to_owned(), nk.samples(sample_time));
+    if let Some(DelayRange::Samples(nk)) = nk {
+        all.insert("nk".to_owned(), nk.clone());
     }
     for (name, range) in &all {
         let most = match name.as_str() {
@@ -138,20 +141,6 @@ pub fn named_orders(
         }
     }
     Ok(all)
-}
-
-/// What is to be searched: the defaults of the structure, changed by what was typed.
-pub fn ranges(
-    structure: Structure,
-    orders: Option<&str>,
-    nk: Option<&DelayRange>,
-    sample_time: SampleTime,
-) -> Result<OrderRanges, CliError> {
-    let usual = default_operator_ranges(structure, sample_time);
-    let usage = |error: hoid::ident::IdentError| CliError::Usage(error.to_string());
-    let ranges = (usual.with(&named_orders(orders, nk, sample_time)?)).map_err(usage)?;
-    ranges.candidates().map_err(usage)?;
-    Ok(ranges)
 }
 
 /// `name=value` pairs of an option, each turned into what it means.
@@ -215,15 +204,15 @@ pub fn priors(text: Option<&str>) -> Result<BTreeMap<String, Prior>, CliError> {
     )
 }
 
-/// Theta from `f1=..,b0=..`: every coefficient of the orders, each once.
-pub fn theta(orders: &Orders, text: &str) -> Result<Vec<f64>, CliError> {
+/// A start from `f1=..,b0=..`, each coefficient once.
+pub fn start(text: &str) -> Result<BTreeMap<String, f64>, CliError> {
     let mut start = BTreeMap::new();
     for (name, value) in parse_numbers(text).map_err(|e| CliError::Usage(format!("--start: {e}")))? {
         if start.insert(name.clone(), value).is_some() {
             return Err(CliError::Usage(format!("--start: {name} is given twice")));
         }
     }
-    theta_of(&orders.parameter_names(), &start).map_err(|reason| CliError::Usage(format!("--start {reason}")))
+    Ok(start)
 }
 
 #[cfg(test)]
@@ -255,20 +244,17 @@ mod tests {
     }
 
     #[test]
-    fn defaults_stay_where_nothing_is_typed() {
-        let ts = SampleTime::HUNDREDTH;
-        let all = ranges(Structure::BoxJenkins, None, None, ts).unwrap();
-        assert_eq!((all.nk.clone(), all.nd.clone(), all.nb.clone()), (6..=61, 1..=4, 2..=2));
-        let some = ranges(
-            Structure::BoxJenkins,
-            Some("nd=2, nc=1"),
-            Some(&DelayRange::Samples(29..=29)),
-            ts,
-        )
-        .unwrap();
-        assert_eq!((some.nk, some.nd, some.nc, some.nf), (29..=29, 2..=2, 1..=1, 2..=2));
-        assert!(ranges(Structure::Arx, Some("nx=2"), None, ts).is_err());
-        assert!(ranges(Structure::Arx, Some("nk=2"), Some(&DelayRange::Samples(3..=3)), ts).is_err());
+    fn orders_as_typed() {
+        let some = named_orders(Some("nd=2, nc=1..3"), Some(&DelayRange::Samples(29..=29))).unwrap();
+        assert_eq!(
+            (&some["nd"], &some["nc"], &some["nk"]),
+            (&(2..=2), &(1..=3), &(29..=29))
+        );
+        assert!(named_orders(None, None).unwrap().is_empty());
+        assert!(named_orders(Some("nx=2"), None).is_err());
+        for twice in [DelayRange::Samples(3..=3), DelayRange::Seconds(0.2, 0.3)] {
+            assert!(named_orders(Some("nk=2"), Some(&twice)).is_err());
+        }
     }
 
     #[test]
@@ -294,12 +280,10 @@ mod tests {
     }
 
     #[test]
-    fn a_start_is_complete_or_refused() {
-        let orders = Structure::BoxJenkins.operator_orders(29);
-        let good = theta(&orders, "f1=-1.9,f2=.92,b0=.04,b1=-.04,d1=-.8").unwrap();
-        assert_eq!(good, [0.04, -0.04, -0.8, -1.9, 0.92]);
-        for bad in ["f1=-1.9", "a1=3", "f1=1,f1=2", "f1=abc"] {
-            assert!(theta(&orders, bad).is_err(), "{bad}");
+    fn a_start_names_each_coefficient_once() {
+        assert_eq!(start("f1=-1.9,b0=.04").unwrap()["f1"], -1.9);
+        for bad in ["f1=1,f1=2", "f1=abc", "f1"] {
+            assert!(start(bad).is_err(), "{bad}");
         }
     }
 }

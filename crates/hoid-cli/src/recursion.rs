@@ -4,7 +4,7 @@ use std::path::Path;
 
 use hoid::ident::{Choice, IdentError, OrderRanges};
 use hoid::io::{is_fit_file, read_fit};
-use hoid::model::{Record, SampleTime, Structure};
+use hoid::model::{Record, SampleTime, Structure, theta_of};
 use hoid::track::{Method, StartAt, TrackOptions, TrackPlan, ranges_of};
 
 use crate::{
@@ -109,7 +109,10 @@ impl Plan {
                     "--start belongs to one model; give --nk and --orders as single numbers".to_owned(),
                 ));
             }
-            Some(text) => StartAt::Theta(orders::theta(&largest, text)?),
+            Some(text) => {
+                let theta = theta_of(&largest.parameter_names(), &orders::start(text)?);
+                StartAt::Theta(theta.map_err(|reason| CliError::Usage(format!("--start {reason}")))?)
+            }
         };
         let options = TrackOptions {
             start,
@@ -203,7 +206,10 @@ fn ranges(
     sample_time: SampleTime,
 ) -> Result<OrderRanges, CliError> {
     let usage = |error: IdentError| CliError::Usage(error.to_string());
-    let named = orders::named_orders(args.orders.as_deref(), args.nk.as_ref(), sample_time)?;
+    let mut named = orders::named_orders(args.orders.as_deref(), args.nk.as_ref())?;
+    if let Some(nk) = &args.nk {
+        named.insert("nk".to_owned(), nk.samples(sample_time));
+    }
     let start = args.start.as_deref().filter(|text| text.trim() != "nothing");
     let names: Vec<String> = orders::parse_pairs(start.unwrap_or_default())
         .map_err(|e| CliError::Usage(format!("--start: {e}")))?

@@ -12,9 +12,9 @@ use std::{collections::BTreeMap, ops::RangeInclusive, path::Path};
 use hoid_ident::{NamedOrders, order_selection::Criterion};
 use hoid_io::{FitFile, is_fit_file, parse_fit, read_fit};
 use hoid_model::{
-    ContinuousTransferFunction, FittedOperator, MAX_DELAY, MAX_ORDER, NamedChoice, SampleTime, Structure,
+    ContinuousTransferFunction, FittedOperator, MAX_DELAY, MAX_ORDER, NamedChoice, SampleTime, Structure, theta_of,
 };
-use hoid_track::{Method, StartAt, TrackOptions, TrackPlan, ranges_of, theta_of};
+use hoid_track::{Method, StartAt, TrackOptions, TrackPlan, ranges_of};
 use serde_json::{Map, Value};
 
 use crate::status::Failure;

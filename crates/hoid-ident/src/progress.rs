@@ -3,7 +3,13 @@
 //! A fit of forms or orders, one after the other, lasts seconds on many or long records. It says
 //! before each which one of how many it is; without anybody who watches that costs nothing.
 
-use std::{cell::RefCell, rc::Rc};
+use std::{
+    cell::RefCell,
+    sync::{
+        Arc,
+        atomic::{AtomicUsize, Ordering},
+    },
+};
 
 /// What is being done now.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -16,14 +22,14 @@ pub struct Step {
     pub total: usize,
 }
 
-type Watcher = Rc<dyn Fn(Step)>;
+type Watcher = Arc<dyn Fn(Step) + Send + Sync>;
 
 thread_local! {
     static WATCHER: RefCell<Option<Watcher>> = const { RefCell::new(None) };
 }
 
 /// Does the work and tells the watcher each of its steps on this thread.
-pub fn watched<T>(watcher: impl Fn(Step) + 'static, work: impl FnOnce() -> T) -> T {
+pub fn watched<T>(watcher: impl Fn(Step) + Send + Sync + 'static, work: impl FnOnce() -> T) -> T {
     /// Puts back who watched before, whatever happens.
     struct Before(Option<Watcher>);
     impl Drop for Before {
@@ -31,7 +37,7 @@ pub fn watched<T>(watcher: impl Fn(Step) + 'static, work: impl FnOnce() -> T) ->
             WATCHER.set(self.0.take());
         }
     }
-    let _before = Before(WATCHER.replace(Some(Rc::new(watcher))));
+    let _before = Before(WATCHER.replace(Some(Arc::new(watcher))));
     work()
 }
 
@@ -44,21 +50,35 @@ pub(crate) fn step(what: &'static str, done: usize, total: usize) {
     }
 }
 
+/// Counts what is done on many threads for who watches this one: each call is one more of `total`.
+pub fn counter(what: &'static str, total: usize) -> impl Fn() + Send + Sync {
+    let watcher = WATCHER.with_borrow(Clone::clone);
+    let done = AtomicUsize::new(0);
+    move || {
+        let done = done.fetch_add(1, Ordering::Relaxed) + 1;
+        if let Some(watcher) = &watcher {
+            watcher(Step { what, done, total });
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
+    use std::sync::Mutex;
+
     use super::*;
 
     #[test]
     fn the_innermost_watcher_is_told_and_the_outer_one_comes_back() {
-        let told = Rc::new(RefCell::new(Vec::new()));
+        let told = Arc::new(Mutex::new(Vec::new()));
         let (outer, inner) = (told.clone(), told.clone());
         step("nobody", 0, 1);
         watched(
-            move |step| outer.borrow_mut().push(("outer", step.done)),
+            move |step| outer.lock().unwrap().push(("outer", step.done)),
             || {
                 step("forms", 0, 2);
                 watched(
-                    move |step| inner.borrow_mut().push(("inner", step.done)),
+                    move |step| inner.lock().unwrap().push(("inner", step.done)),
                     || {
                         step("orders", 7, 9);
                     },
@@ -67,6 +87,26 @@ mod tests {
             },
         );
         step("nobody", 1, 1);
-        assert_eq!(*told.borrow(), [("outer", 0), ("inner", 7), ("outer", 1)]);
+        assert_eq!(*told.lock().unwrap(), [("outer", 0), ("inner", 7), ("outer", 1)]);
+    }
+
+    #[test]
+    fn what_other_threads_do_is_counted() {
+        let told = Arc::new(Mutex::new(Vec::new()));
+        let seen = told.clone();
+        watched(
+            move |step| seen.lock().unwrap().push(step.done),
+            || {
+                let one = counter("candidates", 3);
+                std::thread::scope(|all| {
+                    for _ in 0..3 {
+                        all.spawn(&one);
+                    }
+                });
+            },
+        );
+        let mut all = told.lock().unwrap().clone();
+        all.sort_unstable();
+        assert_eq!(all, [1, 2, 3]);
     }
 }

@@ -13,6 +13,7 @@ use crate::{
     iv::IvMethod,
     optimize::{SearchMethod, SearchOptions},
     settings::{Bounds, Kind, MethodSpec, Setting},
+    sigmoid::SigmoidChange,
 };
 
 /// What is known of each batch estimator.
@@ -22,7 +23,13 @@ pub fn estimators() -> Vec<MethodSpec> {
         help: method.help(),
         source: method.source(),
         structures: method.structures(),
-        settings: vec![orders(), nk(), instruments(), max_iterations(), tolerance()],
+        settings: vec![
+            orders(),
+            nk(),
+            instruments(),
+            max_iterations(SearchOptions::default()),
+            tolerance(SearchOptions::default()),
+        ],
     });
     let pem = MethodSpec {
         name: "pem",
@@ -42,7 +49,7 @@ pub fn estimators() -> Vec<MethodSpec> {
                 focus(),
                 stable(),
             ],
-            search(),
+            search(SearchOptions::default()),
         ]
         .concat(),
     };
@@ -53,7 +60,7 @@ pub fn estimators() -> Vec<MethodSpec> {
         structures: &[Structure::BoxJenkins],
         settings: [
             vec![delay(), remnant_order(), individual(), initial_state(), fix(), bound()],
-            search(),
+            search(SearchOptions::default()),
         ]
         .concat(),
     };
@@ -75,7 +82,7 @@ pub fn estimators() -> Vec<MethodSpec> {
                 run_to_run(),
                 initial_state(),
             ],
-            search(),
+            search(FamilyEstimator::default().search),
         ]
         .concat(),
     };
@@ -95,7 +102,7 @@ pub fn estimators() -> Vec<MethodSpec> {
                 fix(),
                 bound(),
             ],
-            search(),
+            search(SigmoidChange::default().search),
         ]
         .concat(),
     };
@@ -129,8 +136,9 @@ fn named<T: NamedChoice>() -> Vec<&'static str> {
     T::CHOICES.iter().map(|choice| choice.choice_name()).collect()
 }
 
-fn search() -> Vec<Setting> {
-    vec![search_method(), max_iterations(), tolerance()]
+/// How the search of an estimator steps and ends, by its own defaults.
+fn search(usual: SearchOptions) -> Vec<Setting> {
+    vec![search_method(), max_iterations(usual), tolerance(usual)]
 }
 
 fn orders() -> Setting {
@@ -303,8 +311,8 @@ fn search_method() -> Setting {
     )
 }
 
-fn max_iterations() -> Setting {
-    let usual = SearchOptions::default().max_iterations.to_string();
+fn max_iterations(usual: SearchOptions) -> Setting {
+    let usual = usual.max_iterations.to_string();
     setting(
         "max_iterations",
         Kind::Count,
@@ -313,8 +321,8 @@ fn max_iterations() -> Setting {
     )
 }
 
-fn tolerance() -> Setting {
-    let usual = format!("{:e}", SearchOptions::default().tolerance);
+fn tolerance(usual: SearchOptions) -> Setting {
+    let usual = format!("{:e}", usual.tolerance);
     let help = "Relative decrease of the loss below which the search has converged";
     setting("tolerance", Kind::Number, &usual, help).bounds(Bounds::PositiveFinite)
 }

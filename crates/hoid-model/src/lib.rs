@@ -109,5 +109,5 @@ pub use polynomial_model::PolynomialModel;
 pub use record::{Channel, Detrend, Record};
 pub use resampling::{Decimated, Decimation, Decimator};
 pub use sample_time::SampleTime;
-pub use structure::{MAX_DELAY, MAX_ORDER, Orders, Structure};
+pub use structure::{MAX_DELAY, MAX_ORDER, Orders, Structure, theta_of};
 pub use transfer_function::{ContinuousTransferFunction, DiscreteTransferFunction};

@@ -17,7 +17,7 @@
 //! # Ok::<(), hoid_model::UnknownName>(())
 //! ```
 
-use std::fmt;
+use std::{collections::BTreeMap, fmt};
 
 pub use hoid_core::stability::MAX_ORDER;
 
@@ -262,6 +262,33 @@ impl fmt::Display for Orders {
     }
 }
 
+/// Theta in the order of these names: every coefficient once.
+///
+/// # Errors
+/// What is wrong, as the end of a sentence that begins with the name of the option.
+pub fn theta_of(names: &[String], start: &BTreeMap<String, f64>) -> Result<Vec<f64>, String> {
+    if let Some(unknown) = start.keys().find(|name| !names.contains(name)) {
+        return Err(format!(
+            "names {unknown}, which the model does not have; it has {}",
+            names.join(", ")
+        ));
+    }
+    let missing: Vec<&str> = (names.iter())
+        .filter(|name| !start.contains_key(*name))
+        .map(String::as_str)
+        .collect();
+    if !missing.is_empty() {
+        return Err(format!(
+            "lacks {}; give all coefficients, or none for the program's own starts",
+            missing.join(", ")
+        ));
+    }
+    if let Some((name, value)) = start.iter().find(|(_, v)| !v.is_finite()) {
+        return Err(format!("has {name} = {value}, expected a finite number"));
+    }
+    Ok(names.iter().map(|name| start[name]).collect())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -328,5 +355,19 @@ mod tests {
         );
         assert!(Orders { nb: 0, ..bj }.check(Structure::BoxJenkins).is_err());
         assert!(Orders { nd: 1000, ..bj }.check(Structure::BoxJenkins).is_err());
+    }
+
+    #[test]
+    fn theta_is_complete_or_refused() {
+        let names: Vec<String> = ["b0", "f1"].map(str::to_owned).to_vec();
+        let of = |start: &[(&str, f64)]| theta_of(&names, &start.iter().map(|(n, v)| ((*n).to_owned(), *v)).collect());
+        assert_eq!(of(&[("f1", -1.9), ("b0", 0.04)]), Ok(vec![0.04, -1.9]));
+        for (start, reason) in [
+            (&[("f1", 1.0)][..], "lacks b0"),
+            (&[("a1", 1.0)], "names a1"),
+            (&[("b0", f64::NAN), ("f1", 1.0)], "b0 = NaN"),
+        ] {
+            assert!(of(start).unwrap_err().contains(reason), "{reason}");
+        }
     }
 }

@@ -124,9 +124,10 @@ impl From<AnalysisError> for Failure {
             AnalysisError::Io(error) => error.into(),
             AnalysisError::Model(error) => error.into(),
             AnalysisError::SameSamples { .. } => Self(DataError::new_err(text)),
-            AnalysisError::NoSuchChannel { .. } | AnalysisError::Prior { .. } | AnalysisError::NoRecordings => {
-                Self(OptionError::new_err(text))
-            }
+            AnalysisError::NoSuchChannel { .. }
+            | AnalysisError::Prior { .. }
+            | AnalysisError::Options { .. }
+            | AnalysisError::NoRecordings => Self(OptionError::new_err(text)),
         }
     }
 }

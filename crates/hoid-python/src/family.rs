@@ -10,7 +10,6 @@ use hoid_ident::{
         OperatorPrior, Parameter, ParameterPrior,
     },
 };
-use hoid_io::Step;
 use hoid_model::{FaultHandling, Form, ModelError, operator_family::Coordinate, uncertainty::Estimate};
 use numpy::{PyArray1, PyArray2};
 use pyo3::{prelude::*, types::PyDict};
@@ -19,7 +18,7 @@ use crate::{
     arrays::{self, Wanted, array, matrix},
     controlled_element::ControlledElement,
     errors::{Outcome, bad_option},
-    faults::faults_of,
+    faults::{UsedRecord, faults_of, used_records},
     figures::{self, Pair, VerdictParts, pair, verdict},
     fit::PyFit,
     interrupt, names,
@@ -38,9 +37,6 @@ pub struct PyOperatorFit {
     /// Channel of the excitation.
     channel: Option<String>,
 }
-
-/// Which of the given records a record is of, its parts, and what was done to it.
-type UsedRecord<'py> = (usize, Bound<'py, PyDict>, Vec<String>);
 
 /// Name, value, standard error of a parameter of another fit, and whether it is determined.
 type FoundRow = (String, Option<f64>, Option<f64>, bool);
@@ -110,7 +106,7 @@ pub fn identify_operator(
     run_to_run: Option<f64>,
     initial_state: &str,
     search_method: &str,
-    max_iterations: usize,
+    max_iterations: Option<usize>,
     tolerance: Option<f64>,
     faults: &str,
     decimate: &str,
@@ -136,13 +132,13 @@ pub fn identify_operator(
         initial_state: names::initial_state(initial_state)?.unwrap_or_default(),
         search: SearchOptions {
             method: names::search_method(search_method)?,
-            max_iterations,
+            max_iterations: max_iterations.unwrap_or(usual.search.max_iterations),
             tolerance: tolerance.unwrap_or(usual.search.tolerance),
         },
         ..usual
     };
     let asked = Identification {
-        operator: estimator,
+        estimator,
         excitation: Excitation::of_text(excitation.as_deref()),
         period_s: period,
         faults: names::choice::<FaultHandling>("faults", faults)?,
@@ -152,7 +148,9 @@ pub fn identify_operator(
         controlled_element: controlled_element.map(|e| e.transfer_function()).transpose()?,
     };
     let how = asked.clone();
-    let work = move |_: &interrupt::Standing| how.run(Recordings::of_records(records));
+    let work = move |standing: &std::sync::Arc<interrupt::Standing>| {
+        interrupt::told(standing, || how.run(Recordings::of_records(records)))
+    };
     let Identified {
         fit, data, described, ..
     } = interrupt::run(py, 1, progress.as_ref(), false, work)?;
@@ -435,19 +433,7 @@ impl PyOperatorFit {
     /// The records as they were fitted: which of those given each is a part of, the record, and what was done
     /// to it.
     fn records<'py>(&self, py: Python<'py>) -> PyResult<Vec<UsedRecord<'py>>> {
-        let data = &self.data;
-        let all = data.origins.iter().zip(&data.records).zip(&data.accounts);
-        all.map(|((origin, record), account)| {
-            let steps: Vec<String> = account.steps.iter().map(ToString::to_string).collect();
-            let leads = account.steps.iter().map(|step| match step {
-                Step::Rate { input_lead_s, .. } => *input_lead_s,
-                _ => 0.0,
-            });
-            let parts = arrays::parts(py, record.clone())?;
-            parts.set_item("input_lead", leads.sum::<f64>())?;
-            Ok((*origin, parts, steps))
-        })
-        .collect()
+        used_records(py, &self.data)
     }
 
     /// The faults of the records: which of those given, and the fault.
@@ -460,7 +446,6 @@ impl PyOperatorFit {
     fn fit(&self, record: usize) -> PyFit {
         PyFit::new(
             self.found.operator(record).polynomial_fit.clone(),
-            None,
             None,
             self.data.len(),
         )

@@ -2,8 +2,9 @@
 
 use std::path::PathBuf;
 
+use hoid_analysis::{Identified, PolynomialFit, Recordings};
 use hoid_ident::{Candidate, Choice, Fit, GreyBoxFit, MarginEstimates, Series, grey_box::OrderCandidate};
-use hoid_model::{Finding, Record, margins::MANUAL_CONTROL_RANGE_RAD_S};
+use hoid_model::{Record, Verdict, margins::MANUAL_CONTROL_RANGE_RAD_S};
 use hoid_report::{ModelSection, Report, known_operator, write_report};
 use numpy::{PyArray1, PyArray2, PyReadonlyArray1};
 use pyo3::{
@@ -15,6 +16,7 @@ use crate::{
     arrays::{self, Wanted, array, matrix},
     controlled_element::ControlledElement,
     errors::Outcome,
+    faults::{UsedRecord, faults_of, used_records},
     figures::{self, Pair, VerdictParts, pair},
     names,
 };
@@ -27,24 +29,46 @@ pub struct PyFit {
     grey_box: Option<GreyBoxFit>,
     /// Number of records that the model was fitted to.
     records: usize,
-    /// What a second fit says of it.
-    opinions: Vec<Finding>,
+    /// What it is worth and what it is of, where it is a result by itself.
+    identified: Option<(Verdict, Recordings)>,
 }
 
 impl PyFit {
-    pub fn new(fit: Fit, choice: Option<Choice>, grey_box: Option<GreyBoxFit>, records: usize) -> Self {
+    pub fn new(fit: Fit, choice: Option<Choice>, records: usize) -> Self {
         Self {
             fit,
             choice,
-            grey_box,
+            grey_box: None,
             records,
-            opinions: Vec::new(),
+            identified: None,
         }
     }
 
-    /// With what a second fit says of it.
-    pub fn with_opinions(self, opinions: Vec<Finding>) -> Self {
-        Self { opinions, ..self }
+    /// Polynomials that were identified.
+    pub fn of_polynomials(found: Identified<PolynomialFit>) -> Self {
+        let PolynomialFit { fit, choice } = found.fit;
+        let records = found.data.len();
+        Self {
+            identified: Some((found.verdict, found.data)),
+            ..Self::new(fit, choice, records)
+        }
+    }
+
+    /// An operator and its remnant that were identified.
+    pub fn of_grey_box(found: Identified<GreyBoxFit>) -> Self {
+        let records = found.data.len();
+        Self {
+            identified: Some((found.verdict, found.data)),
+            ..Self::new(found.fit.polynomial_fit(0).clone(), None, records)
+        }
+        .with_grey_box(found.fit)
+    }
+
+    fn with_grey_box(self, fit: GreyBoxFit) -> Self {
+        Self {
+            grey_box: Some(fit),
+            ..self
+        }
     }
 
     fn margins_with(&self, element: &ControlledElement) -> Outcome<MarginEstimates> {
@@ -184,14 +208,25 @@ impl PyFit {
             .collect()
     }
 
-    /// The level of u in a record of the fit, by its number, as it was read.
-    fn level(&self, record: &Bound<'_, PyAny>, number: usize) -> Outcome<Option<Pair>> {
-        let record = arrays::record(record, Wanted::Only(&[]))?;
-        let fit = self
-            .grey_box
-            .as_ref()
-            .map_or(&self.fit, |found| found.polynomial_fit(number));
-        Ok(fit.level(&record).map(pair))
+    /// The level of u in each record of the fit as it was read, where it was estimated.
+    #[getter]
+    fn levels(&self) -> Vec<Option<Pair>> {
+        let accounts = self.identified.iter().flat_map(|(_, data)| &data.accounts);
+        accounts.map(|account| account.level.map(pair)).collect()
+    }
+
+    /// The records as they were fitted: which of those given each is a part of, the record, and what was done
+    /// to it.
+    fn records<'py>(&self, py: Python<'py>) -> PyResult<Vec<UsedRecord<'py>>> {
+        let data = self.identified.as_ref().map(|(_, data)| used_records(py, data));
+        data.unwrap_or_else(|| Ok(Vec::new()))
+    }
+
+    /// The faults of the records: which of those given, and the fault.
+    #[getter]
+    fn faults<'py>(&self, py: Python<'py>) -> PyResult<Vec<(usize, Bound<'py, PyDict>)>> {
+        let data = self.identified.as_ref().map(|(_, data)| faults_of(py, data));
+        data.unwrap_or_else(|| Ok(Vec::new()))
     }
 
     fn remnant<'py>(&self, py: Python<'py>, discretisation: &str) -> Outcome<Option<Bound<'py, PyDict>>> {
@@ -209,13 +244,14 @@ impl PyFit {
         Ok(figures::quality(py, &quality)?)
     }
 
+    /// What it is worth; of a part of another result, by these records alone.
     fn verdict(&self, py: Python<'_>, records: Vec<Bound<'_, PyAny>>) -> Outcome<VerdictParts> {
+        if let Some((verdict, _)) = &self.identified {
+            return Ok(figures::verdict(verdict));
+        }
         let records = arrays::records(&records, Wanted::Only(&[]))?;
-        let found = py.detach(|| match &self.grey_box {
-            Some(grey_box) => grey_box.verdict(&records),
-            None => self.fit.verdict(&records, self.choice.as_ref()),
-        })?;
-        Ok(figures::verdict(&found.and(self.opinions.clone())))
+        let found = py.detach(|| self.fit.verdict(&records, self.choice.as_ref()))?;
+        Ok(figures::verdict(&found))
     }
 
     fn predict<'py>(&self, py: Python<'py>, record: &Bound<'py, PyAny>, horizon: usize) -> Outcome<SeriesParts<'py>> {

@@ -1,15 +1,15 @@
 //! `pyhoid.identify`: from records and options to a fit.
 
-use std::collections::BTreeMap;
+use std::{collections::BTreeMap, sync::Arc};
 
-use hoid_ident::{
-    Choice, Estimator, Fit, GreyBox, GreyBoxFit, IdentError, InitialState, InstrumentalVariable, Instruments, Loss,
-    SearchOptions, SigmoidChange, SigmoidFit, estimators,
-    judgement::second_opinion::{of_grey_box, of_polynomials, of_sigmoid},
-    order_selection::{default_operator_ranges, fit_or_choose},
-    settings::MethodSpec,
+use hoid_analysis::{
+    AnalysisError, BatchEstimator, Identification, Identified, PolynomialFit, Polynomials, Recordings,
 };
-use hoid_model::{Finding, Record};
+use hoid_ident::{
+    Estimator, GreyBox, GreyBoxFit, InitialState, Instruments, Loss, SearchOptions, SigmoidChange, SigmoidFit,
+    estimators, settings::MethodSpec,
+};
+use hoid_model::{FaultHandling, ModelError, Record};
 use pyo3::prelude::*;
 
 use crate::{
@@ -27,14 +27,17 @@ const LONG: usize = 50_000;
 
 /// What a fit gave.
 enum Found {
-    Model(Box<(Fit, Option<Choice>, Option<GreyBoxFit>)>, Vec<Finding>),
-    Change(Box<SigmoidFit>, Option<Finding>),
+    Polynomials(Box<Identified<PolynomialFit>>),
+    GreyBox(Box<Identified<GreyBoxFit>>),
+    Change(Box<Identified<SigmoidFit>>),
 }
+
+type Work = Box<dyn FnOnce(&Arc<Standing>) -> Result<Found, AnalysisError> + Send>;
 
 /// Fits a model to records. The package has brought all options into plain form.
 #[pyfunction]
 #[pyo3(signature = (records, structure, *, orders, method, instruments, form, neuromuscular, prior, remnant_order, delay, individual, criterion, initial_state, start, fix,
-    bound, coefficient_prior, robust, focus, stable, search_method, max_iterations, tolerance, second_opinion, level, progress))]
+    bound, coefficient_prior, robust, focus, stable, search_method, max_iterations, tolerance, faults, decimate, progress))]
 #[allow(clippy::too_many_arguments)]
 pub fn identify<'py>(
     py: Python<'py>,
@@ -59,99 +62,88 @@ pub fn identify<'py>(
     focus: &str,
     stable: bool,
     search_method: &str,
-    max_iterations: usize,
-    tolerance: f64,
-    second_opinion: bool,
-    level: bool,
+    max_iterations: Option<usize>,
+    tolerance: Option<f64>,
+    faults: &str,
+    decimate: &str,
     progress: Option<Bound<'py, PyAny>>,
 ) -> Outcome<Bound<'py, PyAny>> {
     let kind = names::kind(structure)?;
-    let by_instruments = names::fit_method(method)?;
-    let mut channels: Vec<&str> = Vec::new();
-    if by_instruments.is_some() {
-        channels.push(instruments.as_deref().unwrap_or("f_t"));
-    }
-    let records = arrays::records(&records, Wanted::Only(&channels))?;
-    let search = SearchOptions {
-        method: names::search_method(search_method)?,
-        max_iterations,
-        tolerance,
+    let records = arrays::records(&records, Wanted::All)?;
+    let step = names::search_method(search_method)?;
+    let search = |usual: SearchOptions| SearchOptions {
+        method: step,
+        max_iterations: max_iterations.unwrap_or(usual.max_iterations),
+        tolerance: tolerance.unwrap_or(usual.tolerance),
     };
     let initial_state = names::initial_state(initial_state)?;
     let constraints = names::constraints(fix, bound)?;
-    let count = records.len();
+    let faults = names::choice::<FaultHandling>("faults", faults)?;
+    let rate = decimate
+        .parse()
+        .map_err(|error: ModelError| bad_option(error.to_string()))?;
     let samples: usize = records.iter().map(Record::len).sum();
 
-    type Work = Box<dyn FnOnce(&Standing) -> Result<Found, IdentError> + Send>;
+    /// How it is done, for a thread of its own.
+    fn work<E: BatchEstimator + Send + 'static>(
+        how: Identification<E>,
+        records: Vec<Record>,
+        found: impl FnOnce(Box<Identified<E::Fit>>) -> Found + Send + 'static,
+    ) -> Work {
+        Box::new(move |standing| {
+            let run = || how.run(Recordings::of_records(records));
+            Ok(found(Box::new(interrupt::told(standing, run)?)))
+        })
+    }
+
     let (work, models): (Work, usize) = match kind {
         Kind::Polynomial(structure) => {
-            let usual = default_operator_ranges(structure, records[0].sample_time());
-            let ranges = usual.with(&names::named_orders(&orders)?)?;
-            let criterion = names::criterion(criterion)?;
-            let combinations = ranges.combinations()?;
-            let mut estimator = Estimator {
-                initial_state,
-                search,
-                constraints,
-                priors: names::priors(coefficient_prior)?,
-                loss: robust.map_or(Loss::Quadratic, |threshold| Loss::Huber { threshold }),
-                focus: names::focus(focus)?,
-                stable,
-                ..Estimator::new(structure, combinations[0])
+            let usual = Polynomials::new(structure);
+            let estimator = Polynomials {
+                template: Estimator {
+                    initial_state,
+                    search: search(usual.template.search),
+                    constraints,
+                    priors: names::priors(coefficient_prior)?,
+                    loss: robust.map_or(Loss::Quadratic, |threshold| Loss::Huber { threshold }),
+                    focus: names::focus(focus)?,
+                    stable,
+                    ..usual.template
+                },
+                orders: names::named_orders(&orders)?,
+                criterion: names::criterion(criterion)?,
+                start,
+                method: names::fit_method(method)?,
+                instruments: instruments.map(|text| match text.as_str() {
+                    "simulated" => Instruments::Simulated,
+                    _ => Instruments::External(text),
+                }),
+                ..usual
             };
-            estimator.start = match &start {
-                Some(_) if combinations.len() > 1 => {
-                    return Err(bad_option(
-                        "start belongs to one model, but a range of orders or delays is searched; \
-                         give nk and the orders as single numbers",
-                    ));
-                }
-                Some(start) => Some(names::theta(&combinations[0].parameter_names(), start)?),
-                None => None,
+            let models = estimator.ranges(records[0].sample_time())?.combinations()?.len();
+            let how = Identification {
+                faults,
+                rate,
+                ..Identification::of(estimator)
             };
-            let work: Work = Box::new(move |standing| {
-                let (mut fit, choice) = fit_or_choose(&estimator, &ranges, criterion, &records, &|| standing.inc())?;
-                if let Some(method) = by_instruments {
-                    let instruments = match instruments.as_deref() {
-                        Some("simulated") => Instruments::Simulated,
-                        Some(channel) => Instruments::External(channel.to_owned()),
-                        None => Instruments::usual(&records),
-                    };
-                    fit = InstrumentalVariable {
-                        instruments,
-                        max_iterations,
-                        ..InstrumentalVariable::new(method, fit.orders())
-                    }
-                    .fit(&records)?;
-                }
-                let by_squares = by_instruments.is_none() && estimator.loss == Loss::Quadratic;
-                let opinions = (second_opinion && by_squares).then(|| of_polynomials(&estimator, &fit, &records, None));
-                Ok(Found::Model(
-                    Box::new((fit, choice, None)),
-                    opinions.unwrap_or_default(),
-                ))
-            });
-            (work, combinations.len())
+            (work(how, records, Found::Polynomials), models)
         }
         Kind::GreyBox => {
-            let (low, high) = remnant_order.unwrap_or((1, 4));
-            let mut estimator = GreyBox {
+            let usual = GreyBox::new(names::range("remnant_order", remnant_order.unwrap_or((1, 4)))?);
+            let estimator = GreyBox {
+                delay_range_s: delay.unwrap_or(usual.delay_range_s),
                 constraints,
                 individual,
                 initial_state: initial_state.unwrap_or_default(),
-                search,
-                ..GreyBox::new(names::range("remnant_order", (low, high))?)
+                search: search(usual.search),
+                ..usual
             };
-            if let Some(delay) = delay {
-                estimator.delay_range_s = delay;
-            }
-            let work: Work = Box::new(move |_| {
-                let found = estimator.fit(&records)?;
-                let opinions = second_opinion.then(|| of_grey_box(&estimator, &found, &records, None));
-                let model = Box::new((found.polynomial_fit(0).clone(), None, Some(found)));
-                Ok(Found::Model(model, opinions.unwrap_or_default()))
-            });
-            (work, 10)
+            let how = Identification {
+                faults,
+                rate,
+                ..Identification::of(estimator)
+            };
+            (work(how, records, Found::GreyBox), 10)
         }
         Kind::TimeVarying => {
             if initial_state.is_some_and(|rule| rule != InitialState::Estimate) {
@@ -166,41 +158,36 @@ pub fn identify<'py>(
                 Some((name, (low, high))) if orders.len() == 1 && name == "nd" && low == high => *low,
                 Some(_) => return Err(bad_option("the time-varying fit takes only nd, a single number")),
             };
-            let mut estimator = SigmoidChange {
+            let estimator = SigmoidChange {
                 form: match form.as_deref() {
                     None | Some("auto") => usual.form,
                     Some(name) => names::choice("form", name)?,
                 },
                 neuromuscular,
-                level,
                 prior: prior.map_or(Ok(usual.prior.clone()), PriorOfUser::prior)?,
                 nd,
+                delay_range_s: delay.unwrap_or(usual.delay_range_s),
                 constraints,
-                search,
+                search: search(usual.search),
                 ..usual
             };
-            if let Some(delay) = delay {
-                estimator.delay_range_s = delay;
-            }
-            let work: Work = Box::new(move |_| {
-                let found = estimator.fit(&records)?;
-                let opinion = second_opinion.then(|| of_sigmoid(&estimator, &found, &records));
-                Ok(Found::Change(Box::new(found), opinion.flatten()))
-            });
-            (work, 10)
+            let how = Identification {
+                faults,
+                rate,
+                ..Identification::of(estimator)
+            };
+            (work(how, records, Found::Change), 10)
         }
     };
     let found = if samples * models < LONG && progress.is_none() {
-        py.detach(|| work(&Standing::default())).map_err(Failure::from)?
+        py.detach(|| work(&Arc::default())).map_err(Failure::from)?
     } else {
         interrupt::run(py, models as u64, progress.as_ref(), false, work)?
     };
     Ok(match found {
-        Found::Model(found, opinions) => {
-            let (fit, choice, grey_box) = *found;
-            Bound::new(py, PyFit::new(fit, choice, grey_box, count).with_opinions(opinions))?.into_any()
-        }
-        Found::Change(fit, opinion) => Bound::new(py, PyTimeVaryingFit::new(*fit, opinion))?.into_any(),
+        Found::Polynomials(found) => Bound::new(py, PyFit::of_polynomials(*found))?.into_any(),
+        Found::GreyBox(found) => Bound::new(py, PyFit::of_grey_box(*found))?.into_any(),
+        Found::Change(found) => Bound::new(py, PyTimeVaryingFit::new(*found))?.into_any(),
     })
 }
 

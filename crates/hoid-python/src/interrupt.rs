@@ -11,6 +11,7 @@ use std::{
     time::Duration,
 };
 
+use hoid_ident::progress;
 use pyo3::prelude::*;
 
 use crate::errors::{Failure, Outcome, bad_option};
@@ -32,16 +33,22 @@ impl Standing {
         !self.stopped.load(Ordering::Relaxed)
     }
 
+    /// One more is done.
+    pub fn inc(&self) {
+        self.done.fetch_add(1, Ordering::Relaxed);
+    }
+
     /// This much of the whole work is done.
     pub fn set(&self, done: u64, total: u64) {
         self.total.store(total, Ordering::Relaxed);
         self.done.store(done, Ordering::Relaxed);
     }
+}
 
-    /// One more is done.
-    pub fn inc(&self) {
-        self.done.fetch_add(1, Ordering::Relaxed);
-    }
+/// Does work that says how far it is, and tells the waiting thread.
+pub fn told<T>(standing: &Arc<Standing>, work: impl FnOnce() -> T) -> T {
+    let standing = Arc::clone(standing);
+    progress::watched(move |step| standing.set(step.done as u64, step.total as u64), work)
 }
 
 /// Runs the work without the interpreter and returns its result.
@@ -54,7 +61,7 @@ pub fn run<T: Send + 'static, E: Send + 'static + Into<Failure>>(
     total: u64,
     progress: Option<&Bound<'_, PyAny>>,
     patient: bool,
-    work: impl FnOnce(&Standing) -> Result<T, E> + Send + 'static,
+    work: impl FnOnce(&Arc<Standing>) -> Result<T, E> + Send + 'static,
 ) -> Outcome<T> {
     let standing = Arc::new(Standing::default());
     standing.set(0, total);

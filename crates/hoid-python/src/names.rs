@@ -8,9 +8,8 @@ use hoid_ident::{
 use hoid_io::QualityIssueKind;
 use hoid_model::{
     Detrend, NamedChoice, Structure, discretise, remnant::RemnantDiscretisation, remnant_gain::NoiseDefinition,
-    scenario::Realisation,
+    scenario::Realisation, theta_of,
 };
-use hoid_track::theta_of;
 
 use crate::errors::{Outcome, bad_option};
 

@@ -1,13 +1,15 @@
 //! The fit of an operator whose gains change once.
 
+use hoid_analysis::{Identified, Recordings};
 use hoid_ident::{ChangedOperator, GainsAt, SigmoidFit, validation::whiteness};
-use hoid_model::Finding;
+use hoid_model::Verdict;
 use numpy::{PyArray1, PyArray2};
 use pyo3::{prelude::*, types::PyDict};
 
 use crate::{
     arrays::{self, Wanted, array, matrix},
     errors::Outcome,
+    faults::{UsedRecord, faults_of, used_records},
     figures::{self, Pair, VerdictParts, error_or_nan, pair},
 };
 
@@ -15,13 +17,17 @@ use crate::{
 #[pyclass(name = "TimeVaryingFit", module = "pyhoid._pyhoid", frozen)]
 pub struct PyTimeVaryingFit {
     fit: SigmoidFit,
-    /// What a second fit says of it.
-    opinion: Option<Finding>,
+    found: Verdict,
+    data: Recordings,
 }
 
 impl PyTimeVaryingFit {
-    pub fn new(fit: SigmoidFit, opinion: Option<Finding>) -> Self {
-        Self { fit, opinion }
+    pub fn new(found: Identified<SigmoidFit>) -> Self {
+        Self {
+            fit: found.fit,
+            found: found.verdict,
+            data: found.data,
+        }
     }
 }
 
@@ -94,10 +100,26 @@ impl PyTimeVaryingFit {
         Ok(all)
     }
 
-    /// The level of u in a record, where it was estimated.
-    fn level(&self, record: &Bound<'_, PyAny>) -> Outcome<Option<Pair>> {
-        let record = arrays::record(record, Wanted::Only(&[]))?;
-        Ok(self.fit.level(&record).map(pair))
+    /// The level of u in each record, where it was estimated.
+    #[getter]
+    fn levels(&self) -> Vec<Option<Pair>> {
+        self.data
+            .accounts
+            .iter()
+            .map(|account| account.level.map(pair))
+            .collect()
+    }
+
+    /// The records as they were fitted: which of those given each is a part of, the record, and what was done
+    /// to it.
+    fn records<'py>(&self, py: Python<'py>) -> PyResult<Vec<UsedRecord<'py>>> {
+        used_records(py, &self.data)
+    }
+
+    /// The faults of the records: which of those given, and the fault.
+    #[getter]
+    fn faults<'py>(&self, py: Python<'py>) -> PyResult<Vec<(usize, Bound<'py, PyDict>)>> {
+        faults_of(py, &self.data)
     }
 
     #[getter]
@@ -148,10 +170,9 @@ impl PyTimeVaryingFit {
         Ok((found.first, array(py, found.values)))
     }
 
-    fn verdict(&self, py: Python<'_>, records: Vec<Bound<'_, PyAny>>) -> Outcome<VerdictParts> {
-        let records = arrays::records(&records, Wanted::Only(&[]))?;
-        let found = py.detach(|| self.fit.verdict(&records))?.and(self.opinion.clone());
-        Ok(figures::verdict(&found))
+    #[getter]
+    fn verdict(&self) -> VerdictParts {
+        figures::verdict(&self.found)
     }
 
     /// Whiteness of the residuals of a record.

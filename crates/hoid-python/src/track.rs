@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use hoid_analysis::Recordings;
 use hoid_ident::{Choice, IdentError};
 use hoid_io::{ColumnValues, OutputColumn, OutputTable};
 use hoid_report::{BatchLine, TraceSection, TrackReport, default_batch_fits, write_report};
@@ -196,14 +197,14 @@ impl PyTrace {
     #[getter]
     fn start(&self) -> Option<PyFit> {
         let fit = self.trace.start()?.clone();
-        Some(PyFit::new(fit, self.choice.clone(), None, 1))
+        Some(PyFit::new(fit, self.choice.clone(), 1))
     }
 
     /// What the trace is worth, on the record that it was made of.
     fn verdict(&self, py: Python<'_>, record: &Bound<'_, PyAny>) -> Outcome<figures::VerdictParts> {
         let record = arrays::record(record, Wanted::Only(&[]))?;
         let found = py.detach(|| self.trace.verdict(&record, self.choice.as_ref()))?;
-        Ok(figures::verdict(&found))
+        Ok(figures::verdict(&found.behind(Recordings::channel_findings(&record))))
     }
 
     /// Why most of the rows without a crossover have none, and how many there are; None without a

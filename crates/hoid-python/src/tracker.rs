@@ -376,7 +376,7 @@ impl PyTracker {
         let Live::Tracking(tracker) = &self.live else {
             return None;
         };
-        Some(PyFit::new(tracker.start()?.clone(), self.choice.clone(), None, 1))
+        Some(PyFit::new(tracker.start()?.clone(), self.choice.clone(), 1))
     }
 
     /// The orders, once there is a tracker, and all that changes as numbers.

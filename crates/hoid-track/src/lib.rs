@@ -110,7 +110,7 @@ pub use options::TrackOptions;
 pub use outcome::{Counts, Outcome};
 pub use over_record::{track, track_from};
 pub use person_prior::PersonPrior;
-pub use plan::{TrackPlan, ranges_of, theta_of};
+pub use plan::{TrackPlan, ranges_of};
 pub use recursion::Sample;
 pub use response::Response;
 pub use seal::{opened, sealed};

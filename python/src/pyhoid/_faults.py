@@ -1,33 +1,40 @@
-"""Faults of recorded data, mended before a fit."""
+"""What was found in the records of a fit, and the records as they were fitted."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
+
 from . import _pyhoid
 from .record import Record
-from .verdict import Verdict
 
-_LEVELS = ("trustworthy", "doubtful", "not determined")
-
-
-def mended(
-    records: Sequence[Record], handling: str
-) -> tuple[tuple[Record, ...], list[dict[str, Any]], Verdict]:
-    """Records without their faults, what was found, and what that says of a fit."""
-    segments, found, says = _pyhoid.repair(records, handling)
-    spoilt = {place for place, _ in found}
-    # A record without faults stays the object that was given.
-    kept = [Record._of(parts) if place in spoilt else records[place] for place, parts in segments]
-    faults = [{"record": place, **fault} for place, fault in found]
-    return tuple(kept), faults, Verdict(*says)
+__all__ = ["faults_of", "used"]
 
 
-def joined(one: Verdict, other: Verdict) -> Verdict:
-    """Both verdicts in one: the graver level, and all that speaks for it.
+def used(
+    native: _pyhoid.Fit | _pyhoid.OperatorFit | _pyhoid.TimeVaryingFit, given: Sequence[Record]
+) -> tuple[Record, ...]:
+    """The records as they were fitted, from those that were given and what was done to them."""
+    several = []
+    for origin, parts, steps in native.records():
+        of = given[origin]
+        record = Record._of({**parts, "input_lead": of.input_lead + parts["input_lead"]})
+        record.steps = [*of.steps, *steps]
+        # A record that is as it was stays the object that was given.
+        several.append(of if not steps and _same(of, record) else record)
+    return tuple(several)
 
-    What is wrong with a record stands before what follows from it, in the fit.
-    """
-    level = max(one.level, other.level, key=_LEVELS.index)
-    return Verdict(level, [*one.reasons, *other.reasons], [*one.notes, *other.notes])
+
+def _same(one: Record, other: Record) -> bool:
+    return one.names == other.names and all(
+        np.array_equal(one[name], other[name], equal_nan=True) for name in one.names
+    )
+
+
+def faults_of(
+    native: _pyhoid.Fit | _pyhoid.OperatorFit | _pyhoid.TimeVaryingFit,
+) -> list[dict[str, Any]]:
+    """Faults of the records that were looked for, each with the place of its record."""
+    return [{"record": place, **fault} for place, fault in native.faults]

@@ -143,15 +143,16 @@ class Fit:
     ) -> None:
         self._native = native
         self._call = call
-        self.records: tuple[Record, ...] = tuple(records)
+        #: Those of a part of another result are the records that it is of.
+        self.records: tuple[Record, ...] = _faults.used(native, records) or tuple(records)
         self.settings: dict[str, Any] = dict(settings or {})
         self._quality: dict[str, float] | None = None
         self._verdict: Verdict | None = None
         #: Faults of the records that were looked for: kind, channel, from, to, size, action.
-        self.faults: list[dict[str, Any]] = []
-        self._of_faults = Verdict("trustworthy", [], [])
-        #: Records with their level, where it was estimated.
-        self._as_read: tuple[Record, ...] = ()
+        self.faults: list[dict[str, Any]] = _faults.faults_of(native)
+        found = native.levels
+        #: Empty where no level was estimated.
+        self._levels = found if any(pair is not None for pair in found) else []
 
     def __getstate__(self) -> dict[str, Any]:
         if self.records:
@@ -261,11 +262,10 @@ class Fit:
     def levels(self) -> list[Estimate | None]:
         """The level of u of each record: the constant that is no response to e, in the unit of u.
 
-        Estimated of recorded data; empty for simulated runs and with ``faults="keep"``. None where
+        Estimated of recorded data; empty for simulated runs and with ``faults="keep"``, and where
         the model has no static gain.
         """
-        pairs = [self._native.level(record, k) for k, record in enumerate(self._as_read)]
-        return [None if pair is None else Estimate(*pair) for pair in pairs]
+        return [None if pair is None else Estimate(*pair) for pair in self._levels]
 
     @property
     def remnant(self) -> Remnant | None:
@@ -305,8 +305,7 @@ class Fit:
         if not self.records:
             raise DataError("the fit has no records to be judged on; a fit by identify has them")
         if self._verdict is None:
-            own = Verdict(*self._native.verdict(list(self.records)))
-            self._verdict = _faults.joined(self._of_faults, own)
+            self._verdict = Verdict(*self._native.verdict(list(self.records)))
         return self._verdict
 
     @property

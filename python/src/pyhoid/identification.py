@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Literal, overload
 
-from . import _faults, _options, _pyhoid
-from ._decimation import decimated
+from . import _options, _pyhoid
 from ._options import Order, Progress
 from ._pickling import Call
 from .errors import OptionError
@@ -151,7 +150,7 @@ if TYPE_CHECKING:
         focus: Focus
         stable: bool
         search_method: SearchMethod
-        max_iterations: int
+        max_iterations: int | None
         tolerance: float | None
         faults: Faults
         decimate: int | str
@@ -214,7 +213,7 @@ def identify(
     focus: Focus = "prediction",
     stable: bool = False,
     search_method: SearchMethod = "auto",
-    max_iterations: int = 100,
+    max_iterations: int | None = None,
     tolerance: float | None = None,
     faults: Faults = "bridge",
     decimate: int | str = "auto",
@@ -296,10 +295,11 @@ def identify(
     stable : bool
         Accept only models that are stable from e to u.
     search_method : {"auto", "gn", "lm", "grad"}
-    max_iterations : int
-    tolerance : float
+    max_iterations : int, optional
+        Largest number of steps from each start; default 100, for ``"time-varying"`` 200.
+    tolerance : float, optional
         Relative decrease of the loss below which the search has converged; default 1e-9 for
-        ``"operator"``, 1e-12 for others.
+        ``"operator"``, 1e-10 for ``"time-varying"``, 1e-12 for others.
     faults : {"bridge", "cut", "report", "keep"}
         What is done about faults of the records (spikes, dropouts, frozen and idle stretches):
         bridge what lasts up to 0.1 s and cut at what is longer, cut all, report only, or look for
@@ -381,14 +381,7 @@ def identify(
         return _operator(_options.as_records(records), settings, progress)
     prior = None if prior is ... else prior
     settings["prior"] = prior
-    several, of_faults, says = _faults.mended(_options.as_records(records), faults)
-    several = decimated(several, decimate, counts_samples=name not in _MODELS)
-    # A constant of u: out of the data of a constant model, an unknown of one that changes.
-    as_read = several
-    level = faults != "keep" and _pyhoid.may_have_level(as_read)
-    without = _pyhoid.without_level(as_read, name) if level else None
-    if without is not None:
-        several = tuple(Record._of(parts) for parts in without)
+    several = tuple(_options.as_records(records))
     found = _pyhoid.identify(
         several,
         name,
@@ -418,25 +411,16 @@ def identify(
         focus=focus,
         stable=stable,
         search_method=search_method,
-        max_iterations=int(max_iterations),
-        tolerance=1e-12 if tolerance is None else float(tolerance),
-        second_opinion=faults != "keep",
-        level=level,
+        max_iterations=None if max_iterations is None else int(max_iterations),
+        tolerance=None if tolerance is None else float(tolerance),
+        faults=faults,
+        decimate=str(decimate),
         progress=_options.reporter(progress, "candidates"),
     )
-    # The records are mended already: what is looked for in them again is not taken out. Their level is
-    # still in them: out of records without it a rest of rounding would be taken, and change the digits.
-    again = settings | {"faults": "keep" if faults == "keep" else "report", "decimate": "off"}
-    call = Call("identify", as_read, again)
+    call = Call("identify", several, settings)
     if isinstance(found, _pyhoid.TimeVaryingFit):
-        change = TimeVaryingFit(found, several, settings, call)
-        change.faults, change._of_faults = of_faults, says
-        return change
-    fit = Fit(found, several, settings, call)
-    fit.faults, fit._of_faults = of_faults, says
-    if without is not None:
-        fit._as_read = as_read
-    return fit
+        return TimeVaryingFit(found, several, settings, call)
+    return Fit(found, several, settings, call)
 
 
 def _operator(

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from . import _pyhoid, _text
 from ._arrays import FloatArray
 from ._decimation import said
+from ._faults import faults_of, used
 from ._pickling import Call, recalled, state_of
 from .estimates import Estimate, channel_units, estimates, unit_of
 from .fit import Fit
@@ -114,9 +115,7 @@ class OperatorFit:
         self._native = native
         self._call = call
         self.settings: dict[str, Any] = dict(settings or {})
-        self.records: tuple[Record, ...] = tuple(
-            _used(records[origin], parts, steps) for origin, parts, steps in native.records()
-        )
+        self.records: tuple[Record, ...] = used(native, records)
         self.form, self.neuromuscular = native.form
         self.operators: tuple[OperatorParameters, ...] = tuple(
             OperatorParameters(
@@ -131,9 +130,7 @@ class OperatorFit:
         )
         self.parameters = self.operators[0]
         self.verdict = Verdict(*native.verdict)
-        self.faults: list[dict[str, Any]] = [
-            {"record": place, **fault} for place, fault in native.faults
-        ]
+        self.faults: list[dict[str, Any]] = faults_of(native)
         self.forms: list[dict[str, Any]] = native.forms
         self.lines = native.lines
         if self.lines is not None:
@@ -362,14 +359,6 @@ class OperatorFit:
         parts.extend(operator._repr_html_() for operator in self.operators)
         parts.append(f"<p>{escape(self._closing())}</p>".replace("\n", "<br>"))
         return "".join(parts)
-
-
-def _used(given: Record, parts: Mapping[str, Any], steps: Sequence[str]) -> Record:
-    """A record as it was fitted, from the one that was given and what was done to it."""
-    lead = given.input_lead + parts["input_lead"]
-    record = Record._of({**parts, "input_lead": lead})
-    record.steps = [*given.steps, *steps]
-    return record
 
 
 def _loop(

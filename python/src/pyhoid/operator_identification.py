@@ -36,7 +36,7 @@ if TYPE_CHECKING:
         run_to_run: float | None
         initial_state: InitialState
         search_method: SearchMethod
-        max_iterations: int
+        max_iterations: int | None
         tolerance: float | None
         faults: Faults
         decimate: int | str
@@ -123,7 +123,7 @@ def operator_of(
         run_to_run=run_to_run,
         initial_state=settings["initial_state"],
         search_method=settings["search_method"],
-        max_iterations=int(settings["max_iterations"]),
+        max_iterations=None if settings["max_iterations"] is None else int(settings["max_iterations"]),
         tolerance=tolerance,
         faults=settings["faults"],
         decimate=str(settings["decimate"]),

@@ -31,6 +31,8 @@ _ANSWERS = (
     "change",
     "initial",
     "last",
+    "verdict",
+    "levels",
 )
 
 
@@ -54,11 +56,10 @@ class TimeVaryingFit:
     ) -> None:
         self._native = native
         self._call = call
-        self.records: tuple[Record, ...] = tuple(records)
+        self.records: tuple[Record, ...] = _faults.used(native, records)
         self.settings: dict[str, Any] = dict(settings or {})
         #: Faults of the records that were looked for: kind, channel, from, to, size, action.
-        self.faults: list[dict[str, Any]] = []
-        self._of_faults = Verdict("trustworthy", [], [])
+        self.faults: list[dict[str, Any]] = _faults.faults_of(native)
 
     def __getstate__(self) -> dict[str, Any]:
         return state_of(self, _ANSWERS)
@@ -118,8 +119,7 @@ class TimeVaryingFit:
     @property
     def verdict(self) -> Verdict:
         """What the fit is worth on its records: `level`, `reasons` and `notes`."""
-        own = Verdict(*self._native.verdict(list(self.records)))
-        return _faults.joined(self._of_faults, own)
+        return Verdict(*self._native.verdict)
 
     @property
     def change(self) -> dict[str, Any]:
@@ -132,8 +132,7 @@ class TimeVaryingFit:
 
         None where it was not estimated: of simulated runs and with ``faults="keep"``.
         """
-        pairs = [self._native.level(record) for record in self.records]
-        return [None if pair is None else Estimate(*pair) for pair in pairs]
+        return [None if pair is None else Estimate(*pair) for pair in self._native.levels]
 
     @property
     def initial(self) -> Operator | None:

@@ -6,6 +6,7 @@ use clap::Args;
 use hoid::ident::{
     Focus, InitialState, IvMethod, SearchMethod, estimator_setting, estimators,
     order_selection::Criterion,
+    settings::Setting,
     settings::{Kind, MethodSpec},
 };
 use hoid::io::{readable_endings, writable_endings};
@@ -93,10 +94,10 @@ pub struct IdentifyArgs {
     pub stable: bool,
     #[arg(long, help = about("search_method"), value_name = "METHOD", default_value = "auto", value_parser = choice_of(&SearchMethod::ALL))]
     pub search_method: SearchMethod,
-    #[arg(long, help = about("max_iterations"), value_name = "N", default_value_t = 100)]
-    pub max_iterations: usize,
-    #[arg(long, help = about("tolerance"), value_name = "X", default_value = "1e-12")]
-    pub tolerance: f64,
+    #[arg(long, help = about("max_iterations"), value_name = "N")]
+    pub max_iterations: Option<usize>,
+    #[arg(long, help = about("tolerance"), value_name = "X")]
+    pub tolerance: Option<f64>,
     /// Discretisation that is inverted to get T_n and K_n from the noise model
     #[arg(long, value_name = "NAME", default_value = "zoh", value_parser = choice_of(&RemnantDiscretisation::ALL))]
     pub remnant_discretisation: RemnantDiscretisation,
@@ -181,12 +182,32 @@ fn about(name: &str) -> String {
         text.push_str(&format!(" [for {}]", of.join(", ")));
     }
     // Where clap knows the default it prints it itself.
-    let known =
-        matches!(setting.kind, Kind::Choice(_) | Kind::Flag) || ["max_iterations", "tolerance", "form"].contains(&name);
+    let known = matches!(setting.kind, Kind::Choice(_) | Kind::Flag) || name == "form";
     if !known && !setting.default.is_empty() {
-        text.push_str(&format!(" [default: {}]", setting.default));
+        text.push_str(&format!(" [default: {}]", defaults(name, &all)));
     }
     text
+}
+
+/// The default of an option, by the estimators where they differ.
+fn defaults(name: &str, all: &[MethodSpec]) -> String {
+    let mut values: Vec<(String, Vec<&str>)> = Vec::new();
+    for spec in all {
+        let own = spec.settings.iter().filter(|setting| setting.name == name);
+        for Setting { default, .. } in own {
+            match values.iter_mut().find(|(known, _)| known == default) {
+                Some((_, of)) => of.push(spec.name),
+                None => values.push((default.clone(), vec![spec.name])),
+            }
+        }
+    }
+    match values.as_slice() {
+        [(only, _)] => only.clone(),
+        several => {
+            let of = |(value, names): &(String, Vec<&str>)| format!("{value} for {}", names.join(", "));
+            several.iter().map(of).collect::<Vec<_>>().join("; ")
+        }
+    }
 }
 
 /// The estimators that have an option.

@@ -109,13 +109,6 @@ pub struct FaultArgs {
     pub faults: FaultHandling,
 }
 
-impl FaultArgs {
-    /// Whether faults are looked for.
-    pub fn looks(self) -> bool {
-        self.faults != FaultHandling::Keep
-    }
-}
-
 /// `NAME=VALUE`; the name may hold `=` no more than a column may.
 fn pair(text: &str) -> Result<(String, &str), String> {
     let (name, value) = text

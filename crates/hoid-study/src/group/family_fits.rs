@@ -27,7 +27,7 @@ pub(super) fn identification(
 ) -> Result<Identification, String> {
     let facts = &rows.condition;
     Ok(Identification {
-        operator: manifest.analysis.family()?,
+        estimator: manifest.analysis.family()?,
         excitation: (facts.excitation.clone()).map_or(Excitation::Nothing, Excitation::Named),
         period_s: facts.period_s,
         faults: manifest.read.faults.handling(),

@@ -1,33 +1,19 @@
-//! From the options of `hoid identify` to a fit.
+//! From the options of `hoid identify` to an estimator.
 
+use std::ops::RangeInclusive;
+
+use hoid::analysis::{BatchEstimator, Excitation, Identification, Polynomials, prior_of_text};
 use hoid::ident::{
-    Choice, Estimator, Fit, Focus, GreyBox, GreyBoxFit, InstrumentalVariable, Instruments, Loss, SearchMethod,
-    SearchOptions, estimators,
-    order_selection::{OrderRanges, fit_or_choose},
+    Estimator, Focus, GreyBox, InitialState, Instruments, Loss, SearchMethod, SearchOptions, SigmoidChange, estimators,
+    family::{FamilyEstimator, HIGHEST_NOISE_ORDER},
 };
-use hoid::model::{Record, Structure};
+use hoid::model::{Detrend, Structure, operator_family::Coordinate};
 
 use crate::{
     args::{IdentifyArgs, ModelKind, estimators_with, flag},
     error::CliError,
-    orders, output,
+    orders,
 };
-
-/// A fit, how it was chosen, and the options that were special to it.
-pub struct Estimated {
-    pub fit: Fit,
-    pub choice: Option<Choice>,
-    pub grey_box: Option<GreyBoxFit>,
-    /// What fitted it by the prediction error, with the loss of squares.
-    pub estimator: Option<FittedBy>,
-    pub settings: Vec<(String, String)>,
-}
-
-/// What fitted a model by the prediction error.
-pub enum FittedBy {
-    Polynomials(Estimator),
-    GreyBox(GreyBox),
-}
 
 /// What is to be fitted, the options checked against each other.
 pub fn kind(args: &IdentifyArgs) -> Result<ModelKind, CliError> {
@@ -167,90 +153,97 @@ fn belongs_to(name: &str, of: &[&str]) -> String {
     format!("{}{instead}", flags.join(", "))
 }
 
-/// Fits what was asked for.
-pub fn fit(args: &IdentifyArgs, kind: ModelKind, records: &[Record]) -> Result<Estimated, CliError> {
-    match kind {
-        ModelKind::Polynomial(structure) => polynomial(args, structure, records),
-        ModelKind::Family | ModelKind::GreyBox | ModelKind::TimeVarying => grey_box(args, records),
+/// How it is identified.
+pub fn identification<E: BatchEstimator>(args: &IdentifyArgs, estimator: E) -> Identification<E> {
+    Identification {
+        estimator,
+        excitation: Excitation::of_text(args.excitation.as_deref()),
+        period_s: args.period,
+        faults: args.faults.faults,
+        rate: args.read.prepare.rate.decimate,
+        controlled_element: args.controlled_element.clone(),
     }
 }
 
-/// Method and limits of the search as typed.
-pub fn search(args: &IdentifyArgs) -> SearchOptions {
+/// Method and limits of the search: as typed, else as the estimator has them.
+fn search(args: &IdentifyArgs, usual: SearchOptions) -> SearchOptions {
     SearchOptions {
         method: args.search_method,
-        max_iterations: args.max_iterations,
-        tolerance: args.tolerance,
+        max_iterations: args.max_iterations.unwrap_or(usual.max_iterations),
+        tolerance: args.tolerance.unwrap_or(usual.tolerance),
     }
 }
 
-fn polynomial(args: &IdentifyArgs, structure: Structure, records: &[Record]) -> Result<Estimated, CliError> {
-    let ranges = orders::ranges(
-        structure,
-        args.orders.as_deref(),
-        args.nk.as_ref(),
-        records[0].sample_time(),
-    )?;
-    let mut settings = vec![
-        ("structure".to_owned(), structure.name().to_owned()),
-        ("orders".to_owned(), ranges.to_string()),
-        ("criterion".to_owned(), args.criterion.to_string()),
-        ("focus".to_owned(), args.focus.to_string()),
-        ("start".to_owned(), args.start.clone().unwrap_or("own".to_owned())),
-    ];
-    if let Some(prior) = &args.coefficient_prior {
-        settings.push(("prior of coefficients".to_owned(), prior.clone()));
-    }
-    if let Some(threshold) = args.robust {
-        let text = format!("Huber, {threshold} standard deviations");
-        settings.push(("robust loss".to_owned(), text));
-    }
-    if args.stable {
-        settings.push(("stable models only".to_owned(), "yes".to_owned()));
-    }
-    let (mut fit, choice, estimator) = prediction_error(args, structure, &ranges, records)?;
-    let by_squares = args.method.is_none() && args.robust.is_none();
-    let estimator = by_squares.then_some(FittedBy::Polynomials(estimator));
-    if let Some(method) = args.method {
-        let instruments = instruments(args, records);
-        settings.push(("method".to_owned(), format!("{method}, {instruments}")));
-        if choice.is_some() {
-            settings.push(("orders chosen by".to_owned(), "the prediction error method".to_owned()));
-        }
-        let estimator = InstrumentalVariable {
-            instruments,
-            max_iterations: args.max_iterations,
-            ..InstrumentalVariable::new(method, fit.orders())
-        };
-        fit = estimator.fit(records)?;
-    }
-    Ok(Estimated {
-        fit,
-        choice,
-        grey_box: None,
-        estimator,
-        settings,
+/// The operator of a person.
+pub fn operator(args: &IdentifyArgs) -> Result<FamilyEstimator, CliError> {
+    let usual = FamilyEstimator::default();
+    let (nc, nd) = noise_orders(args)?;
+    Ok(FamilyEstimator {
+        forms: args.form.map_or(usual.forms, |form| vec![form]),
+        neuromuscular: args.neuromuscular,
+        prior: args.prior.as_deref().map_or(Ok(usual.prior), prior_of_text)?,
+        delay_range_s: args.delay.unwrap_or(usual.delay_range_s),
+        nc,
+        nd,
+        individual: args
+            .individual
+            .iter()
+            .map(|name| coordinate(name))
+            .collect::<Result<_, _>>()?,
+        run_to_run: args.run_to_run.unwrap_or(usual.run_to_run),
+        // What was asked for in reading has been done.
+        detrend: if args.read.detrend == Detrend::None {
+            usual.detrend
+        } else {
+            Detrend::None
+        },
+        initial_state: args.initial_state.unwrap_or_default(),
+        search: search(args, usual.search),
+        ..usual
     })
 }
 
-fn instruments(args: &IdentifyArgs, records: &[Record]) -> Instruments {
-    match args.instruments.as_deref() {
-        Some("simulated") => Instruments::Simulated,
-        Some(channel) => Instruments::External(channel.to_owned()),
-        None => Instruments::usual(records),
+/// nc and nd from `--orders nc=..,nd=..`.
+fn noise_orders(args: &IdentifyArgs) -> Result<(RangeInclusive<usize>, RangeInclusive<usize>), CliError> {
+    let (mut nc, mut nd) = (0..=0, 0..=HIGHEST_NOISE_ORDER);
+    for (name, value) in orders::parse_pairs(args.orders.as_deref().unwrap_or_default()).map_err(CliError::Usage)? {
+        let range = orders::parse_range(&value).map_err(|e| CliError::Usage(format!("--orders {name}: {e}")))?;
+        match name.as_str() {
+            "nc" | "nd" if *range.end() > HIGHEST_NOISE_ORDER => {
+                return Err(CliError::Usage(format!(
+                    "--orders {name}: found {value}; expected orders of 0 to {HIGHEST_NOISE_ORDER}"
+                )));
+            }
+            "nc" => nc = range,
+            "nd" => nd = range,
+            _ => {
+                return Err(CliError::Usage(format!(
+                    "--orders {name}: the operator of the family has the noise orders nc and nd alone; its form says the others"
+                )));
+            }
+        }
     }
+    // An ARMA model is searched over few autoregressive orders.
+    if *nc.end() > 0 && args.orders.as_deref().is_none_or(|text| !text.contains("nd")) {
+        nd = 0..=8;
+    }
+    Ok((nc, nd))
 }
 
-fn prediction_error(
-    args: &IdentifyArgs,
-    structure: Structure,
-    ranges: &OrderRanges,
-    records: &[Record],
-) -> Result<(Fit, Option<Choice>, Estimator), CliError> {
-    let combinations = ranges.combinations()?;
-    let mut estimator = Estimator {
+fn coordinate(name: &str) -> Result<Coordinate, CliError> {
+    Coordinate::of_parameter(name).ok_or_else(|| {
+        CliError::Usage(format!(
+            "--individual: there is no parameter {name}; expected K, T_L, T_I, omega_nm, zeta_nm or tau_e"
+        ))
+    })
+}
+
+/// A polynomial structure.
+pub fn polynomials(args: &IdentifyArgs, structure: Structure) -> Result<Polynomials, CliError> {
+    let usual = Polynomials::new(structure);
+    let template = Estimator {
         initial_state: args.initial_state,
-        search: search(args),
+        search: search(args, usual.template.search),
         constraints: orders::constraints(args.fix.as_deref(), args.bound.as_deref())?,
         priors: orders::priors(args.coefficient_prior.as_deref())?,
         loss: args
@@ -258,65 +251,63 @@ fn prediction_error(
             .map_or(Loss::Quadratic, |threshold| Loss::Huber { threshold }),
         focus: args.focus,
         stable: args.stable,
-        ..Estimator::new(structure, combinations[0])
+        ..usual.template
     };
-    if let [orders] = combinations.as_slice() {
-        estimator.start = args
-            .start
-            .as_deref()
-            .map(|text| orders::theta(orders, text))
-            .transpose()?;
-        let fit = output::watched("fitting", || estimator.fit(records))?;
-        return Ok((fit, None, estimator));
-    }
-    if args.start.is_some() {
-        return Err(CliError::Usage(
-            "--start belongs to one model, but a range of orders or delays is searched; give --nk and --orders as single \
-             numbers"
-                .to_owned(),
-        ));
-    }
-    let bar = output::progress(combinations.len(), "candidates");
-    let found = fit_or_choose(&estimator, ranges, args.criterion, records, &|| bar.inc(1));
-    bar.finish_and_clear();
-    let (fit, choice) = found?;
-    Ok((fit, choice, estimator))
+    Ok(Polynomials {
+        template,
+        orders: orders::named_orders(args.orders.as_deref(), args.nk.as_ref())?,
+        delay_s: args.nk.as_ref().and_then(orders::DelayRange::seconds),
+        criterion: args.criterion,
+        start: args.start.as_deref().map(orders::start).transpose()?,
+        method: args.method,
+        instruments: args.instruments.as_deref().map(|text| match text {
+            "simulated" => Instruments::Simulated,
+            channel => Instruments::External(channel.to_owned()),
+        }),
+    })
 }
 
-fn grey_box(args: &IdentifyArgs, records: &[Record]) -> Result<Estimated, CliError> {
-    let m = args.remnant_order.clone().unwrap_or(1..=4);
-    let mut estimator = GreyBox {
+/// The operator of a gain and a lead with its remnant.
+pub fn remnant(args: &IdentifyArgs) -> Result<GreyBox, CliError> {
+    let usual = GreyBox::new(args.remnant_order.clone().unwrap_or(1..=4));
+    Ok(GreyBox {
+        delay_range_s: args.delay.unwrap_or(usual.delay_range_s),
         constraints: orders::constraints(args.fix.as_deref(), args.bound.as_deref())?,
         individual: args.individual.clone(),
         initial_state: args.initial_state.unwrap_or_default(),
-        search: search(args),
-        ..GreyBox::new(m.clone())
-    };
-    if let Some(delay) = args.delay {
-        estimator.delay_range_s = delay;
-    }
-    let (low, high) = estimator.delay_range_s;
-    let mut settings = vec![
-        ("structure".to_owned(), "grey-box".to_owned()),
-        (
-            "remnant order m".to_owned(),
-            if m.start() == m.end() {
-                m.start().to_string()
-            } else {
-                format!("{}..{}, by BIC", m.start(), m.end())
-            },
-        ),
-        ("delay in s".to_owned(), format!("{low}..{high}")),
-    ];
-    if !args.individual.is_empty() {
-        settings.push(("individual".to_owned(), args.individual.join(", ")));
-    }
-    let found = output::watched("fitting", || estimator.fit(records))?;
-    Ok(Estimated {
-        fit: found.polynomial_fit(0).clone(),
-        choice: None,
-        grey_box: Some(found),
-        estimator: Some(FittedBy::GreyBox(estimator)),
-        settings,
+        search: search(args, usual.search),
+        ..usual
     })
+}
+
+/// The operator whose gains change once.
+pub fn sigmoid(args: &IdentifyArgs) -> Result<SigmoidChange, CliError> {
+    if args.initial_state.is_some_and(|rule| rule != InitialState::Estimate) {
+        return Err(CliError::Usage(
+            "--initial-state: the time-varying fit estimates the initial states; give auto or estimate".to_owned(),
+        ));
+    }
+    let usual = SigmoidChange::default();
+    Ok(SigmoidChange {
+        form: args.form.unwrap_or(usual.form),
+        neuromuscular: args.neuromuscular,
+        prior: args.prior.as_deref().map_or(Ok(usual.prior.clone()), prior_of_text)?,
+        nd: noise_order(args)?,
+        delay_range_s: args.delay.unwrap_or(usual.delay_range_s),
+        constraints: orders::constraints(args.fix.as_deref(), args.bound.as_deref())?,
+        search: search(args, usual.search),
+        ..usual
+    })
+}
+
+/// nd from `--orders nd=N`; the other orders are those of the operator.
+fn noise_order(args: &IdentifyArgs) -> Result<usize, CliError> {
+    let wrong = || CliError::Usage("--orders: the time-varying fit takes nd=N alone, as --orders nd=2".to_owned());
+    match args.orders.as_deref() {
+        None => Ok(SigmoidChange::default().nd),
+        Some(text) => match orders::parse_pairs(text).map_err(CliError::Usage)?.as_slice() {
+            [(name, value)] if name == "nd" => value.parse().map_err(|_| wrong()),
+            _ => Err(wrong()),
+        },
+    }
 }

@@ -5,7 +5,6 @@ mod family;
 mod family_form;
 mod picture;
 mod run;
-mod settings;
 mod sigmoid;
 
 pub use run::run;

@@ -2,23 +2,18 @@
 
 use std::path::{Path, PathBuf};
 
-use hoid::analysis::{Setting, levels_into, may_have_level};
+use hoid::analysis::Recordings;
 use hoid::ident::{
-    Fit, MarginEstimates,
-    judgement::second_opinion,
-    level::without_level,
+    Choice, Fit, GreyBoxFit, MarginEstimates,
     validation::{GoodnessOfFit, nrmse_fit, vaf},
 };
-use hoid::model::{
-    ContinuousTransferFunction, Detrend, GainUnit, NotConvertible, Record, margins::MANUAL_CONTROL_RANGE_RAD_S,
-};
+use hoid::model::{ContinuousTransferFunction, GainUnit, NotConvertible, Record, margins::MANUAL_CONTROL_RANGE_RAD_S};
 use hoid::report::{Answer, ModelSection, Report, known_operator, write_report};
 
 use super::{
-    estimate::{self, Estimated, FittedBy},
+    estimate::{self, identification},
     family,
     picture::{description, for_page, of_polynomials},
-    settings::common_settings,
     sigmoid,
 };
 use crate::{
@@ -42,47 +37,45 @@ pub fn run(args: &IdentifyArgs) -> Result<(), CliError> {
     };
     let reading = reading::of(&args.read, Some(&args.mask), with_input)?;
     let read = reading.files(&args.records, reading::told)?;
-    if kind == ModelKind::Family {
-        return family::run(args, &reading, read);
-    }
     let (rate, counts) = (args.read.prepare.rate.decimate, kind.counts_samples());
-    let read = read.repaired(args.faults.faults)?;
     reading::say_kept(read.kept_rate(rate, counts));
-    let mut data = read.at_rate(rate, counts)?;
-    if kind == ModelKind::TimeVarying {
-        return sigmoid::run(args, data);
-    }
-    let as_read = may_have_level(&data, with_input, args.faults.faults).then(|| {
-        let without = without_level(&data.records);
-        std::mem::replace(&mut data.records, without)
-    });
-    let Estimated {
-        fit,
-        choice,
-        grey_box,
-        estimator,
-        settings: chosen,
-    } = estimate::fit(args, kind, &data.records)?;
     // Read before anything is written: a bad validation file leaves nothing behind.
-    let validation = match &args.validate {
-        Some(path) => {
-            let other = reading.file(path, reading::told)?.at_rate(rate, counts)?;
-            let mut other = other.records;
-            if as_read.is_some() {
-                other = without_level(&other);
-            }
-            Some((path.display().to_string(), fit.quality(&other)?))
+    let other = args.validate.as_deref();
+    let other = other.map(|path| reading.file(path, reading::told)).transpose()?;
+    match kind {
+        ModelKind::TimeVarying => sigmoid::run(args, read),
+        ModelKind::GreyBox => {
+            let identification = identification(args, estimate::remnant(args)?);
+            let found = output::watched("fitting", || identification.run(read))?;
+            show(args, &found, found.fit.polynomial_fit(0), None, Some(&found.fit), other)
         }
-        None => None,
-    };
-    let mut settings = chosen;
-    if let Some(as_read) = &as_read {
-        let of = |k: usize| grey_box.as_ref().map_or(&fit, |found| found.polynomial_fit(k));
-        levels_into(&mut data.accounts, as_read, |k, record| of(k).level(record));
-        settings.extend(reading::rows(vec![Setting::level()]));
+        ModelKind::Polynomial(structure) => {
+            let identification = identification(args, estimate::polynomials(args, structure)?);
+            let found = output::watched("fitting", || identification.run(read))?;
+            show(args, &found, &found.fit.fit, found.fit.choice.as_ref(), None, other)
+        }
+        ModelKind::Family => family::run(args, &reading, read),
     }
-    settings.extend(common_settings(args, &data));
-    let records = &data.records;
+}
+
+/// Writes and prints a fit of polynomials.
+fn show<F>(
+    args: &IdentifyArgs,
+    found: &hoid::analysis::Identified<F>,
+    fit: &Fit,
+    choice: Option<&Choice>,
+    grey_box: Option<&GreyBoxFit>,
+    other: Option<Recordings>,
+) -> Result<(), CliError> {
+    let (data, verdict) = (&found.data, &found.verdict);
+    let validation = other
+        .map(|other| {
+            let other = found.alike(other)?;
+            Ok::<_, CliError>((other.names[0].clone(), fit.quality(&other.records)?))
+        })
+        .transpose()?;
+    let settings = reading::rows(found.settings.clone());
+    let (records, with_input) = (&data.records, fit.model().structure().has_input());
     let operator = fit.operator();
     // Three poles or one are no gain with a lead, but may be another form.
     let family = match &operator {
@@ -93,39 +86,18 @@ pub fn run(args: &IdentifyArgs) -> Result<(), CliError> {
     let margins = args
         .controlled_element
         .as_ref()
-        .map(|element| loop_margins(&fit, element));
+        .map(|element| loop_margins(fit, element));
     let validations = records.iter().map(|r| fit.validate(r)).collect::<Result<Vec<_>, _>>()?;
-    let ahead = args.horizon.map(|k| prediction_ahead(&fit, records, k)).transpose()?;
-    let verdict = match &grey_box {
-        Some(found) => found.verdict(records)?,
-        None => fit.verdict(records, choice.as_ref())?,
-    };
-    let element = args.controlled_element.as_ref();
-    let opinions = match (&estimator, &grey_box) {
-        _ if !args.faults.looks() => Vec::new(),
-        (Some(FittedBy::Polynomials(e)), _) => second_opinion::of_polynomials(e, &fit, records, element),
-        (Some(FittedBy::GreyBox(e)), Some(found)) => second_opinion::of_grey_box(e, found, records, element),
-        _ => Vec::new(),
-    };
-    let level = match &estimator {
-        // Where the level is not estimated it may matter.
-        Some(FittedBy::Polynomials(e))
-            if args.faults.looks() && as_read.is_none() && args.read.detrend == Detrend::None =>
-        {
-            second_opinion::of_level(e, &fit, records)
-        }
-        _ => None,
-    };
-    let verdict = data.judged(verdict).and(opinions).and(level);
+    let ahead = args.horizon.map(|k| prediction_ahead(fit, records, k)).transpose()?;
     let identified = Identified {
-        verdict: &verdict,
+        verdict,
         files: &data.names,
         records,
         accounts: &data.accounts,
         quality: GoodnessOfFit::pooled(records.iter().zip(&validations)),
-        fit: &fit,
-        choice: choice.as_ref(),
-        grey_box: grey_box.as_ref(),
+        fit,
+        choice,
+        grey_box,
         operator: &operator,
         family: family.as_ref().map(family_operator::to_json),
         remnant: remnant.as_ref(),
@@ -136,11 +108,11 @@ pub fn run(args: &IdentifyArgs) -> Result<(), CliError> {
         settings: &settings,
     };
     let pictured = with_input && (args.report.is_some() || args.picture.figure.is_some());
-    let described = pictured.then(|| description(args, &data)).flatten();
+    let described = pictured.then(|| description(args, data)).flatten();
     if let Some(path) = &args.picture.figure {
         figure::write(
             path,
-            &of_polynomials(&fit, records, described.as_ref()),
+            &of_polynomials(fit, records, described.as_ref()),
             args.picture.width,
         )?;
     }
@@ -160,9 +132,9 @@ pub fn run(args: &IdentifyArgs) -> Result<(), CliError> {
             settings: facts,
             models: vec![ModelSection {
                 name: fit.title(),
-                fit: &fit,
+                fit,
                 records,
-                candidates: choice.as_ref(),
+                candidates: choice,
                 truth: known_operator(records),
                 margins,
             }],
@@ -172,7 +144,7 @@ pub fn run(args: &IdentifyArgs) -> Result<(), CliError> {
                 sentence: identified.sentence(),
                 parameters: Vec::new(),
             }),
-            pictures: for_page(&fit, records, described.as_ref()).into_iter().collect(),
+            pictures: for_page(fit, records, described.as_ref()).into_iter().collect(),
         };
         let page = write_report(directory, &report.to_html()?)?;
         output::notice("", format!("report: {}", page.display()));
@@ -182,7 +154,7 @@ pub fn run(args: &IdentifyArgs) -> Result<(), CliError> {
     } else {
         output::show(&page(&identified, family.as_ref(), args.show.verbose))?;
     }
-    CliError::of_verdict(&verdict)
+    CliError::of_verdict(verdict)
 }
 
 /// What is written takes the place of nothing that is read; `--prior` may name a file.

@@ -1,9 +1,8 @@
 //! `hoid identify --structure time-varying`: the operator whose gains change once.
 
-use hoid::analysis::{Account, Recordings, Setting, levels_into, may_have_level, prior_of_text};
+use hoid::analysis::{Account, Identified, Recordings};
 use hoid::ident::{
-    ChangedOperator, InitialState, SigmoidChange, SigmoidFit,
-    judgement::second_opinion,
+    ChangedOperator, SigmoidFit,
     validation::{LjungBox, whiteness},
 };
 use hoid::io::write_record;
@@ -11,69 +10,34 @@ use hoid::model::{Channel, Form, GainUnit, Record, Verdict};
 use hoid::report::numbers;
 use serde_json::{Map, Value, json};
 
-use super::{estimate::search, settings::common_settings};
+use super::estimate::{self, identification};
 use crate::{
     args::IdentifyArgs,
     commands::reading,
     error::CliError,
     json::{self, number},
-    orders, output, text,
+    output, text,
 };
 
-pub fn run(args: &IdentifyArgs, mut data: Recordings) -> Result<(), CliError> {
-    if args.initial_state.is_some_and(|rule| rule != InitialState::Estimate) {
-        return Err(CliError::Usage(
-            "--initial-state: the time-varying fit estimates the initial states; give auto or estimate".to_owned(),
-        ));
-    }
-    let usual = SigmoidChange::default();
-    let mut estimator = SigmoidChange {
-        form: args.form.unwrap_or(usual.form),
-        neuromuscular: args.neuromuscular,
-        level: may_have_level(&data, true, args.faults.faults),
-        prior: args.prior.as_deref().map_or(Ok(usual.prior.clone()), prior_of_text)?,
-        nd: noise_order(args)?,
-        constraints: orders::constraints(args.fix.as_deref(), args.bound.as_deref())?,
-        search: search(args),
-        ..usual
-    };
-    if let Some(delay) = args.delay {
-        estimator.delay_range_s = delay;
-    }
-    let fit = output::watched("fitting", || estimator.fit(&data.records))?;
-    let (low, high) = estimator.delay_range_s;
-    let mut settings = vec![
-        ("structure".to_owned(), "time-varying".to_owned()),
-        ("form".to_owned(), estimator.form.name().to_owned()),
-        (
-            "neuromuscular".to_owned(),
-            if estimator.neuromuscular { "yes" } else { "no" }.to_owned(),
-        ),
-        ("prior".to_owned(), estimator.prior.to_string()),
-        ("orders".to_owned(), format!("nd={}", estimator.nd)),
-        ("delay in s".to_owned(), format!("{low}..{high}")),
-    ];
-    if estimator.level {
-        levels_into(&mut data.accounts, &data.records, |_, record| fit.level(record));
-        settings.extend(reading::rows(vec![Setting::level()]));
-    }
-    settings.extend(common_settings(args, &data));
+pub fn run(args: &IdentifyArgs, read: Recordings) -> Result<(), CliError> {
+    let identification = identification(args, estimate::sigmoid(args)?);
+    let Identified {
+        fit,
+        verdict,
+        data,
+        settings,
+        ..
+    } = output::watched("fitting", || identification.run(read))?;
     let records = data.records.as_slice();
     if let Some(path) = &args.trace {
         write_record(path, &trace(&fit, &records[0])?)?;
         output::message(&format!("trace of {}: {}", args.records[0].display(), path.display()));
     }
-    let test = |record: &Record| Ok(whiteness(&fit.residuals(record)?.values, estimator.nd));
+    let test = |record: &Record| Ok(whiteness(&fit.residuals(record)?.values, fit.d().len()));
     let tests = records
         .iter()
         .map(test)
         .collect::<Result<Vec<Option<LjungBox>>, CliError>>()?;
-    let opinion = args
-        .faults
-        .looks()
-        .then(|| second_opinion::of_sigmoid(&estimator, &fit, records))
-        .flatten();
-    let verdict = data.judged(fit.verdict(records)?).and(opinion);
     let found = Found {
         fit: &fit,
         verdict: &verdict,
@@ -81,7 +45,7 @@ pub fn run(args: &IdentifyArgs, mut data: Recordings) -> Result<(), CliError> {
         records,
         accounts: &data.accounts,
         tests: &tests,
-        settings: &settings,
+        settings: &reading::rows(settings),
     };
     if args.show.json {
         json::print(&found.to_json())?;
@@ -89,18 +53,6 @@ pub fn run(args: &IdentifyArgs, mut data: Recordings) -> Result<(), CliError> {
         output::show(&found.page(args.show.verbose))?;
     }
     CliError::of_verdict(&verdict)
-}
-
-/// nd from `--orders nd=N`; the other orders are those of the operator.
-fn noise_order(args: &IdentifyArgs) -> Result<usize, CliError> {
-    let wrong = || CliError::Usage("--orders: the time-varying fit takes nd=N alone, as --orders nd=2".to_owned());
-    match args.orders.as_deref() {
-        None => Ok(SigmoidChange::default().nd),
-        Some(text) => match orders::parse_pairs(text).map_err(CliError::Usage)?.as_slice() {
-            [(name, value)] if name == "nd" => value.parse().map_err(|_| wrong()),
-            _ => Err(wrong()),
-        },
-    }
 }
 
 /// What changes over the time of a record, with standard errors where they are all known.

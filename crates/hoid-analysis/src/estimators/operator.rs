@@ -1,0 +1,100 @@
+//! The operator of a person, its form by evidence: beside the lines of a recorded excitation, with the loop
+//! in its verdict.
+
+use hoid_ident::{
+    SearchOptions,
+    family::{FamilyEstimator, FamilyFit},
+    judgement::second_opinion,
+};
+use hoid_model::{Detrend, FaultHandling, Form, Verdict};
+
+use super::{BatchEstimator, Fitted, delay, range};
+use crate::{
+    AnalysisError, description::of_lines, identification::Identification, level::levels_into, recordings::Recordings,
+    settings::Setting,
+};
+
+impl BatchEstimator for FamilyEstimator {
+    type Fit = FamilyFit;
+
+    fn search(&self) -> &SearchOptions {
+        &self.search
+    }
+
+    fn initial_state(&self) -> &'static str {
+        self.initial_state.name()
+    }
+
+    fn fit(with: &Identification<Self>, data: &mut Recordings) -> Result<Fitted<FamilyFit>, AnalysisError> {
+        let described = data.described(&with.excitation, with.period_s, with.faults);
+        let channel = match &described {
+            // What was found, or what was named: instruments need no lines.
+            Ok(Some(found)) => found.channel.clone(),
+            _ => with.excitation.named().map(str::to_owned),
+        };
+        let estimator = Self {
+            excitation: channel,
+            period_s: with.period_s,
+            ..with.estimator.clone()
+        };
+        let fit = estimator.fit_beside(&data.records, of_lines(&described, &with.excitation))?;
+        let element = with.controlled_element.as_ref();
+        let mut verdict = fit.verdict.clone();
+        if with.faults != FaultHandling::Keep {
+            verdict = verdict.and(second_opinion::of_family(&estimator, &fit, &data.records, element));
+        }
+        if let Some(element) = element {
+            verdict = verdict.and(fit.loop_finding(0, element));
+        }
+        let described = described.ok().flatten();
+        let mut settings = settings(&estimator);
+        if let Some(channel) = described.as_ref().and_then(|d| d.channel.clone()) {
+            settings.push(Setting::new("excitation", channel));
+        }
+        if estimator.detrend == Detrend::Mean {
+            levels_into(&mut data.accounts, &data.records, |k, record| {
+                fit.operator(k).polynomial_fit.level(record)
+            });
+        }
+        for record in &mut data.records {
+            *record = record.clone().detrended(estimator.detrend);
+        }
+        Ok(Fitted {
+            fit,
+            verdict,
+            described,
+            taken_out: estimator.detrend,
+            settings,
+        })
+    }
+
+    fn judged(fit: &mut FamilyFit, verdict: &Verdict) {
+        fit.verdict = verdict.clone();
+    }
+}
+
+fn settings(estimator: &FamilyEstimator) -> Vec<Setting> {
+    let names: Vec<&str> = estimator.forms.iter().map(|form: &Form| form.name()).collect();
+    let form = match names.as_slice() {
+        [only] => (*only).to_owned(),
+        all => format!("auto of {}", all.join(", ")),
+    };
+    let mut list = vec![
+        Setting::new("structure", "operator"),
+        Setting::new("form", form),
+        Setting::new("neuromuscular", if estimator.neuromuscular { "yes" } else { "no" }),
+        Setting::new("prior", estimator.prior.to_string()),
+        Setting::new(
+            "noise orders",
+            format!("nc={}, nd={}, by AIC", range(&estimator.nc), range(&estimator.nd)),
+        ),
+        delay(estimator.delay_range_s),
+        Setting::new("taken out of e and u", estimator.detrend.to_string()),
+        Setting::new("variation from run to run", estimator.run_to_run.to_string()),
+    ];
+    if !estimator.individual.is_empty() {
+        let names: Vec<&str> = estimator.individual.iter().map(|c| c.parameter()).collect();
+        list.push(Setting::new("individual", names.join(", ")));
+    }
+    list
+}

@@ -1,0 +1,194 @@
+//! A polynomial structure by the prediction error method or by instruments, its orders and its delay given
+//! or searched.
+
+use std::collections::BTreeMap;
+
+use hoid_ident::{
+    Choice, Estimator, Fit, InitialState, InstrumentalVariable, Instruments, IvMethod, Loss, NamedOrders,
+    SearchOptions,
+    judgement::second_opinion,
+    order_selection::{Criterion, OrderRanges, default_operator_ranges, fit_or_choose},
+    progress,
+};
+use hoid_model::{FaultHandling, Orders, SampleTime, Structure, theta_of};
+
+use super::{BatchEstimator, Fitted, constraints, named};
+use crate::{AnalysisError, identification::Identification, level::Level, recordings::Recordings, settings::Setting};
+
+/// A polynomial structure and how it is fitted.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Polynomials {
+    /// Structure, initial states, search, constraints, loss, focus. Its orders and its start are those below.
+    pub template: Estimator,
+    /// Orders that are given or searched in a range, by name; the others are the operator's.
+    pub orders: NamedOrders,
+    /// Shortest and longest dead time in s, in place of an order nk.
+    pub delay_s: Option<(f64, f64)>,
+    /// What chooses between candidates.
+    pub criterion: Criterion,
+    /// Where the search starts: all coefficients, by name.
+    pub start: Option<BTreeMap<String, f64>>,
+    /// Instrumental variables in place of the prediction error method, at the orders that this one chose.
+    pub method: Option<IvMethod>,
+    /// What the instruments are made of; by default the forcing function where it is recorded.
+    pub instruments: Option<Instruments>,
+}
+
+/// A polynomial model, and the table that it was chosen from where something was searched.
+#[derive(Debug, Clone)]
+pub struct PolynomialFit {
+    /// The model.
+    pub fit: Fit,
+    /// The candidates.
+    pub choice: Option<Choice>,
+}
+
+impl Polynomials {
+    /// The operator's orders, by the prediction error method.
+    pub fn new(structure: Structure) -> Self {
+        Self {
+            template: Estimator::new(structure, Orders::default()),
+            orders: NamedOrders::new(),
+            delay_s: None,
+            criterion: Criterion::Bic,
+            start: None,
+            method: None,
+            instruments: None,
+        }
+    }
+
+    /// What is searched at a sample time.
+    ///
+    /// # Errors
+    /// [`AnalysisError`] for orders that the structure does not have, or that are too many.
+    pub fn ranges(&self, sample_time: SampleTime) -> Result<OrderRanges, AnalysisError> {
+        let mut orders = self.orders.clone();
+        if let Some((low, high)) = self.delay_s {
+            orders.insert("nk".to_owned(), sample_time.nk(low)..=sample_time.nk(high));
+        }
+        let options = |error: hoid_ident::IdentError| AnalysisError::Options {
+            reason: error.to_string(),
+        };
+        let usual = default_operator_ranges(self.template.structure, sample_time);
+        let ranges = usual.with(&orders).map_err(options)?;
+        ranges.candidates().map_err(options)?;
+        Ok(ranges)
+    }
+
+    fn estimator(&self, combinations: &[Orders]) -> Result<Estimator, AnalysisError> {
+        let refuse = |reason: String| AnalysisError::Options { reason };
+        let start = match (&self.start, combinations) {
+            (None, _) => None,
+            (Some(start), [orders]) => {
+                Some(theta_of(&orders.parameter_names(), start).map_err(|reason| refuse(format!("--start {reason}")))?)
+            }
+            (Some(_), _) => {
+                return Err(refuse(
+                    "--start belongs to one model, but a range of orders or delays is searched; give --nk and --orders as \
+                     single numbers"
+                        .to_owned(),
+                ));
+            }
+        };
+        Ok(Estimator {
+            orders: combinations[0],
+            start,
+            ..self.template.clone()
+        })
+    }
+
+    fn settings(&self, ranges: &OrderRanges) -> Vec<Setting> {
+        let template = &self.template;
+        let start = self.start.as_ref();
+        let start = start.map_or("own".to_owned(), |start| {
+            named(start.iter().map(|(name, v)| (name, *v)))
+        });
+        let mut list = vec![
+            Setting::new("structure", template.structure.name()),
+            Setting::new("orders", ranges.to_string()),
+            Setting::new("criterion", self.criterion.to_string()),
+            Setting::new("focus", template.focus.to_string()),
+            Setting::new("start", start),
+        ];
+        if !template.priors.is_empty() {
+            let guess = template
+                .priors
+                .iter()
+                .map(|(name, p)| format!("{name}={}:{}", p.value, p.weight));
+            list.push(Setting::new(
+                "prior of coefficients",
+                guess.collect::<Vec<_>>().join(", "),
+            ));
+        }
+        if let Loss::Huber { threshold } = template.loss {
+            list.push(Setting::new(
+                "robust loss",
+                format!("Huber, {threshold} standard deviations"),
+            ));
+        }
+        if template.stable {
+            list.push(Setting::new("stable models only", "yes"));
+        }
+        list.extend(constraints(&template.constraints));
+        list
+    }
+}
+
+impl BatchEstimator for Polynomials {
+    type Fit = PolynomialFit;
+
+    fn counts_samples(&self) -> bool {
+        true
+    }
+
+    fn search(&self) -> &SearchOptions {
+        &self.template.search
+    }
+
+    fn initial_state(&self) -> &'static str {
+        self.template.initial_state.map_or("auto", InitialState::name)
+    }
+
+    fn fit(with: &Identification<Self>, data: &mut Recordings) -> Result<Fitted<PolynomialFit>, AnalysisError> {
+        let how = &with.estimator;
+        let level = Level::taken_out(data, how.template.structure.has_input(), with.faults);
+        let records = &data.records;
+        let ranges = how.ranges(records[0].sample_time())?;
+        let combinations = ranges.combinations()?;
+        let estimator = how.estimator(&combinations)?;
+        let mut settings = how.settings(&ranges);
+        let told = progress::counter("candidates", combinations.len());
+        let (mut fit, choice) = fit_or_choose(&estimator, &ranges, how.criterion, records, &told)?;
+        if let Some(method) = how.method {
+            let instruments = how.instruments.clone().unwrap_or_else(|| Instruments::usual(records));
+            settings.push(Setting::new("method", format!("{method}, {instruments}")));
+            if choice.is_some() {
+                settings.push(Setting::new("orders chosen by", "the prediction error method"));
+            }
+            let instrumental = InstrumentalVariable {
+                instruments,
+                max_iterations: estimator.search.max_iterations,
+                ..InstrumentalVariable::new(method, fit.orders())
+            };
+            fit = instrumental.fit(records)?;
+        }
+        let mut verdict = fit.verdict(records, choice.as_ref())?;
+        // What is asked again is the prediction error, and the loss of squares.
+        if with.faults != FaultHandling::Keep && how.method.is_none() && estimator.loss == Loss::Quadratic {
+            let element = with.controlled_element.as_ref();
+            verdict = verdict.and(second_opinion::of_polynomials(&estimator, &fit, records, element));
+            // Where the level is not estimated it may matter.
+            if level.is_kept() && !data.were_detrended() {
+                verdict = verdict.and(second_opinion::of_level(&estimator, &fit, records));
+            }
+        }
+        settings.extend(level.told(data, |_, record| fit.level(record)));
+        Ok(Fitted {
+            fit: PolynomialFit { fit, choice },
+            verdict,
+            described: None,
+            taken_out: level.detrend(),
+            settings,
+        })
+    }
+}
