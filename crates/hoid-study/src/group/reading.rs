@@ -4,11 +4,13 @@ use std::path::Path;
 
 use hoid_analysis::Account;
 use hoid_ident::faults::{Mended, mend};
-use hoid_io::{ColumnKind, ColumnSchema, OutputTable, Preparation, ReadOptions, ReadRecord, Repair, Step, TableSchema};
+use hoid_io::{
+    ColumnKind, ColumnSchema, OutputTable, Preparation, ReadOptions, ReadRecord, Repair, Step, TableSchema,
+    read_aligned,
+};
 use hoid_model::{Detrend, Fault, Record};
 
 use super::{
-    alignment::read_aligned,
     manifest::{Manifest, RunEntry},
     read_settings::Detrending,
 };
