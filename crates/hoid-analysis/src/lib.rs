@@ -11,6 +11,7 @@
 //!
 //! | step of [`Identification::run`] | rules |
 //! |---|---|
+//! | a file is looked at, before anything is chosen | `look` |
 //! | files are read (before it) | `files`, `reading`; kept with what was done to them in `recordings` |
 //! | runs that are given twice are refused | `copies` |
 //! | faults are looked for and mended, channels are judged | `repair`, `quality` |
@@ -39,6 +40,7 @@ mod error;
 mod files;
 mod identification;
 mod level;
+mod look;
 mod offset;
 mod prior;
 mod quality;
@@ -52,6 +54,7 @@ pub use description::Excitation;
 pub use error::AnalysisError;
 pub use identification::{Identification, Identified, Validated, identify};
 pub use level::{levels_into, may_have_level};
+pub use look::{Advice, Known, Lag, Look, OtherColumns, Periods, Role, Roles, Seen, typed};
 pub use offset::{late_samples, without_offsets};
 pub use prior::prior_of_text;
 pub use quality::findings_of_quality;

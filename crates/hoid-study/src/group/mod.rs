@@ -56,7 +56,7 @@ mod windows;
 
 pub use analysis_settings::AnalysisSettings;
 pub use condition_settings::ConditionSettings;
-pub use inspection::{Evidence, Known, commented, inspect};
+pub use inspection::{Evidence, commented, inspect};
 pub use manifest::{MANIFEST, Manifest, RunEntry};
 pub use pattern::{FileNameParts, Pattern};
 pub use person::{Person, PersonStatus};
