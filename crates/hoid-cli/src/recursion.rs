@@ -21,6 +21,7 @@ const PRIOR: &str = "prior";
 /// still be ranges.
 pub struct Plan {
     plan: TrackPlan,
+    delay: Option<DelayRange>,
     sample_time: SampleTime,
 }
 
@@ -120,7 +121,11 @@ impl Plan {
         };
         let plan =
             TrackPlan::new(options, ranges, args.criterion, sample_time).map_err(|e| CliError::Usage(e.to_string()))?;
-        Ok(Self { plan, sample_time })
+        Ok(Self {
+            plan,
+            delay: DelayRange::given(args.nk.as_ref(), args.delay),
+            sample_time,
+        })
     }
 
     /// True when no order is left to be searched.
@@ -165,6 +170,7 @@ impl Plan {
             setting("structure", options.structure.name().to_owned()),
             setting("orders", orders),
         ];
+        list.extend(self.delay.as_ref().and_then(DelayRange::setting));
         list.push(setting("memory", options.memory_in_words(ts)));
         for own in options.method.settings().list() {
             // What was given; the memory stands above with the defaults of all parameters.
@@ -203,7 +209,8 @@ fn ranges(
     sample_time: SampleTime,
 ) -> Result<OrderRanges, CliError> {
     let usage = |error: IdentError| CliError::Usage(error.to_string());
-    let named = orders::named_orders(args.orders.as_deref(), args.nk.as_ref(), sample_time)?;
+    let delay = DelayRange::given(args.nk.as_ref(), args.delay);
+    let named = orders::named_orders(args.orders.as_deref(), delay.as_ref(), sample_time)?;
     let start = args.start.as_deref().filter(|text| text.trim() != "nothing");
     let names: Vec<String> = orders::parse_pairs(start.unwrap_or_default())
         .map_err(|e| CliError::Usage(format!("--start: {e}")))?

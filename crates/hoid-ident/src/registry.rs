@@ -22,7 +22,7 @@ pub fn estimators() -> Vec<MethodSpec> {
         help: method.help(),
         source: method.source(),
         structures: method.structures(),
-        settings: vec![orders(), nk(), instruments(), max_iterations(), tolerance()],
+        settings: vec![orders(), nk(), delay(), instruments(), max_iterations(), tolerance()],
     });
     let pem = MethodSpec {
         name: "pem",
@@ -33,6 +33,7 @@ pub fn estimators() -> Vec<MethodSpec> {
             vec![
                 orders(),
                 nk(),
+                delay(),
                 initial_state(),
                 start(),
                 fix(),
@@ -222,7 +223,7 @@ fn delay() -> Setting {
         "delay",
         Kind::Span,
         "0.05..0.6; of the family 0.02..0.8",
-        "Shortest and longest delay tau_e",
+        "Delay tau_e, or the shortest and the longest; of polynomials nk = tau_e/Ts + 1",
     )
     .unit("s")
 }

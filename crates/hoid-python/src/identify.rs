@@ -86,7 +86,8 @@ pub fn identify<'py>(
     let (work, models): (Work, usize) = match kind {
         Kind::Polynomial(structure) => {
             let usual = default_operator_ranges(structure, records[0].sample_time());
-            let ranges = usual.with(&names::named_orders(&orders)?)?;
+            let orders = names::with_delay(&orders, delay, records[0].sample_time())?;
+            let ranges = usual.with(&orders)?;
             let criterion = names::criterion(criterion)?;
             let combinations = ranges.combinations()?;
             let mut estimator = Estimator {

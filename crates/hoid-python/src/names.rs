@@ -7,8 +7,8 @@ use hoid_ident::{
 };
 use hoid_io::QualityIssueKind;
 use hoid_model::{
-    Detrend, NamedChoice, Structure, discretise, remnant::RemnantDiscretisation, remnant_gain::NoiseDefinition,
-    scenario::Realisation,
+    Detrend, NamedChoice, SampleTime, Structure, discretise, remnant::RemnantDiscretisation,
+    remnant_gain::NoiseDefinition, scenario::Realisation,
 };
 use hoid_track::theta_of;
 
@@ -152,8 +152,29 @@ pub fn range(option: &str, ends: (usize, usize)) -> Outcome<RangeInclusive<usize
     Ok(ends.0..=ends.1)
 }
 
+/// Orders by name, with a delay in s in the place of nk.
+pub fn with_delay(
+    orders: &BTreeMap<String, (usize, usize)>,
+    delay_s: Option<(f64, f64)>,
+    sample_time: SampleTime,
+) -> Outcome<NamedOrders> {
+    let mut all = named_orders(orders)?;
+    if let Some((low, high)) = delay_s {
+        if all.contains_key("nk") {
+            return Err(bad_option(
+                "nk and delay are one thing in samples and in s; give one of them",
+            ));
+        }
+        if low < 0.0 {
+            return Err(bad_option(format!("delay is {low} to {high} s, expected 0 s or more")));
+        }
+        all.insert("nk".to_owned(), sample_time.nk(low)..=sample_time.nk(high));
+    }
+    Ok(all)
+}
+
 /// Orders by name, each a range.
-pub fn named_orders(orders: &BTreeMap<String, (usize, usize)>) -> Outcome<NamedOrders> {
+fn named_orders(orders: &BTreeMap<String, (usize, usize)>) -> Outcome<NamedOrders> {
     let one = |(name, ends): (&String, &(usize, usize))| Ok((name.clone(), range(name, *ends)?));
     orders.iter().map(one).collect()
 }

@@ -30,7 +30,10 @@ impl Look {
     /// they make no record.
     pub fn advice(&self) -> Option<Advice> {
         let seen = self.seen.as_ref().ok().filter(|_| self.roles.are_certain())?;
-        let other = |role: &Role, usual: &str| Some(role.column.clone()).filter(|column| column != usual);
+        // Both where one is not the usual: a command is easier to read with both.
+        let (input, output) = (&self.roles.input, &self.roles.output);
+        let usual = input.column == "e" && output.column == "u";
+        let named = |role: &Role| (!usual).then(|| role.column.clone());
         let (begin_s, end_s) = (seen.record.time_s(0), seen.record.time_s(seen.record.len()));
         let periods = seen.periods.as_ref().ok();
         let span = periods.map(|found| found.span_s);
@@ -39,8 +42,8 @@ impl Look {
             _ => self.known.offset_samples,
         };
         Some(Advice {
-            input: other(&self.roles.input, "e"),
-            output: other(&self.roles.output, "u"),
+            input: named(input),
+            output: named(output),
             sampling_hz: self.known.sampling_hz,
             from_s: span.map_or(self.known.from_s, |span| Some(span.0).filter(|t| *t != begin_s)),
             to_s: span.map_or(self.known.to_s, |span| Some(span.1).filter(|t| *t != end_s)),

@@ -61,9 +61,12 @@ pub(super) fn search(record: &Record, known: &Known) -> Result<Periods, String> 
     }
     let found = candidates.iter().find_map(|channel| in_channel(record, channel, known));
     found.ok_or_else(|| {
+        if candidates.is_empty() {
+            return "there is no column besides error and control".to_owned();
+        }
         format!(
             "no column among {} has its power in lines over whole periods; name one by --excitation and its span by --from and --to",
-            if candidates.is_empty() { "none besides e and u".to_owned() } else { candidates.join(", ") }
+            candidates.join(", ")
         )
     })
 }

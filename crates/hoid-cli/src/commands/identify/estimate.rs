@@ -10,7 +10,8 @@ use hoid::model::{Record, Structure};
 use crate::{
     args::{IdentifyArgs, ModelKind, estimators_with, flag},
     error::CliError,
-    orders, output,
+    orders::{self, DelayRange},
+    output,
 };
 
 /// A fit, how it was chosen, and the options that were special to it.
@@ -159,7 +160,6 @@ fn belongs_to(name: &str, of: &[&str]) -> String {
         _ => format!("--method {name}"),
     };
     let instead = match name {
-        "delay" => "; else give --nk",
         "nk" => "; else give --delay in s",
         _ => "",
     };
@@ -185,10 +185,11 @@ pub fn search(args: &IdentifyArgs) -> SearchOptions {
 }
 
 fn polynomial(args: &IdentifyArgs, structure: Structure, records: &[Record]) -> Result<Estimated, CliError> {
+    let delay = DelayRange::given(args.nk.as_ref(), args.delay);
     let ranges = orders::ranges(
         structure,
         args.orders.as_deref(),
-        args.nk.as_ref(),
+        delay.as_ref(),
         records[0].sample_time(),
     )?;
     let mut settings = vec![
@@ -198,6 +199,7 @@ fn polynomial(args: &IdentifyArgs, structure: Structure, records: &[Record]) -> 
         ("focus".to_owned(), args.focus.to_string()),
         ("start".to_owned(), args.start.clone().unwrap_or("own".to_owned())),
     ];
+    settings.extend(delay.as_ref().and_then(DelayRange::setting));
     if let Some(prior) = &args.coefficient_prior {
         settings.push(("prior of coefficients".to_owned(), prior.clone()));
     }
