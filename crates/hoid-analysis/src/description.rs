@@ -4,6 +4,7 @@ use hoid_ident::{
     IdentError,
     frequency::{Description, DescriptionOptions, describe_runs},
 };
+use hoid_io::Step;
 use hoid_model::{Detrend, FaultHandling};
 
 use crate::{
@@ -45,8 +46,8 @@ impl Excitation {
 }
 
 impl Recordings {
-    /// The describing function of the recordings as they are used, without the offset of u, which is a phase
-    /// of it: moved rows would leave less than whole periods. `None` where no excitation is wanted.
+    /// The describing function of the recordings as they are used. Where an offset has cost rows, so that less
+    /// than whole periods are left, they are read without it: it is a phase of what is periodic. `None` where no excitation is wanted.
     ///
     /// # Errors
     /// [`AnalysisError`], where there are no lines, or the files cannot be read again.
@@ -67,9 +68,12 @@ impl Recordings {
             detrend: Detrend::None,
             ..DescriptionOptions::default()
         };
+        let steps = || self.accounts.iter().flat_map(|account| &account.steps);
+        let is_cut = |step: &Step| matches!(step, Step::Offset { cut_samples, .. } if *cut_samples != (0, 0));
         let moved = self
             .source
             .as_ref()
+            .filter(|_| steps().any(is_cut))
             .map(|source| (source, without_offsets(&source.reading)));
         let Some((source, (reading, offsets))) = moved.filter(|(_, (_, offsets))| !offsets.is_empty()) else {
             return Ok(Some(describe_runs(&self.records, &options(0.0))?));

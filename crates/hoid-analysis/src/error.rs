@@ -1,9 +1,13 @@
 //! Why an analysis gives no result.
 
+use std::path::Path;
+
 use hoid_ident::IdentError;
-use hoid_io::IoError;
+use hoid_io::{IoError, ReadOptions};
 use hoid_model::ModelError;
 use thiserror::Error;
+
+use crate::look::{OtherColumns, other_columns};
 
 /// Why an analysis gives no result.
 #[derive(Debug, Error)]
@@ -18,6 +22,9 @@ pub enum AnalysisError {
         /// The other.
         second: String,
     },
+    /// A file without the columns that were asked for, in which they are found under other names.
+    #[error(transparent)]
+    OtherColumns(#[from] OtherColumns),
     /// An offset of a channel that is not there.
     #[error("--offset: there is no channel {name:?}; the record has {known}, and e and u stand for input and output")]
     NoSuchChannel {
@@ -50,4 +57,14 @@ pub enum AnalysisError {
     /// A record cannot be made.
     #[error(transparent)]
     Model(#[from] ModelError),
+}
+
+impl AnalysisError {
+    /// Why a file is not read, with what to ask for where it has other columns than were asked for.
+    pub fn of_reading(error: IoError, path: &Path, options: &ReadOptions) -> Self {
+        match other_columns(&error, path, options) {
+            Some(others) => others.into(),
+            None => error.into(),
+        }
+    }
 }

@@ -2,10 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
-use hoid_io::{IoError, ReadRecord, read_prepared, read_segments};
+use hoid_io::{ReadRecord, read_prepared, read_segments};
 use hoid_model::Record;
 
 use crate::{
+    AnalysisError,
     reading::{Reading, Source},
     recordings::{Account, Recordings},
 };
@@ -14,11 +15,15 @@ impl Reading {
     /// Reads the files; each file that was read is told, with what a user should know of it.
     ///
     /// # Errors
-    /// Those of reading.
-    pub fn files(&self, paths: &[PathBuf], mut told: impl FnMut(&Path, &ReadRecord)) -> Result<Recordings, IoError> {
+    /// Those of reading; [`AnalysisError::OtherColumns`] for a file in which error and control have other names.
+    pub fn files(
+        &self,
+        paths: &[PathBuf],
+        mut told: impl FnMut(&Path, &ReadRecord),
+    ) -> Result<Recordings, AnalysisError> {
         let mut all = Recordings::default();
         for path in paths {
-            for read in read_segments(path, &self.options, &self.preparation, &self.mask, self.shortest_s)? {
+            for read in self.segments(path)? {
                 told(path, &read);
                 let (record, account) = with_account(read);
                 // The label of a segment ends in its span.
@@ -34,12 +39,22 @@ impl Reading {
         Ok(all)
     }
 
+    /// Reads one file: the record in it, or the records between what is left out.
+    ///
+    /// # Errors
+    /// As [`Reading::files`].
+    pub fn segments(&self, path: &Path) -> Result<Vec<ReadRecord>, AnalysisError> {
+        read_segments(path, &self.options, &self.preparation, &self.mask, self.shortest_s)
+            .map_err(|error| AnalysisError::of_reading(error, path, &self.options))
+    }
+
     /// Reads one file, of which nothing is left out.
     ///
     /// # Errors
-    /// Those of reading.
-    pub fn file(&self, path: &Path, told: impl FnOnce(&Path, &ReadRecord)) -> Result<Recordings, IoError> {
-        let read = read_prepared(path, &self.options, &self.preparation)?;
+    /// As [`Reading::files`].
+    pub fn file(&self, path: &Path, told: impl FnOnce(&Path, &ReadRecord)) -> Result<Recordings, AnalysisError> {
+        let read = read_prepared(path, &self.options, &self.preparation);
+        let read = read.map_err(|error| AnalysisError::of_reading(error, path, &self.options))?;
         told(path, &read);
         let (record, account) = with_account(read);
         let mut one = Recordings::default();

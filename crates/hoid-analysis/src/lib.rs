@@ -11,6 +11,7 @@
 //!
 //! | step of [`Identification::run`] | rules |
 //! |---|---|
+//! | a file is looked at, before anything is chosen | `look` |
 //! | files are read (before it) | `files`, `reading`; kept with what was done to them in `recordings` |
 //! | runs that are given twice are refused | `copies` |
 //! | faults are looked for and mended, channels are judged | `repair`, `quality` |
@@ -40,6 +41,7 @@ mod estimators;
 mod files;
 mod identification;
 mod level;
+mod look;
 mod offset;
 mod prior;
 mod quality;
@@ -53,6 +55,7 @@ pub use description::Excitation;
 pub use error::AnalysisError;
 pub use estimators::{BatchEstimator, Fitted, PolynomialFit, Polynomials};
 pub use identification::{Identification, Identified, identify};
+pub use look::{Advice, Known, Lag, Look, OtherColumns, Periods, Role, Roles, Seen, typed};
 pub use offset::{late_samples, without_offsets};
 pub use prior::prior_of_text;
 pub use quality::findings_of_quality;

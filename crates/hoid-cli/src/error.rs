@@ -18,6 +18,9 @@ pub enum CliError {
     /// What was typed contradicts itself or cannot be read.
     #[error("{0}")]
     Usage(String),
+    /// A file with other columns than were asked for, and the command that names them.
+    #[error("{0}")]
+    OtherColumns(String),
     /// A stream that cannot be read, understood or written.
     #[error("{0}")]
     Stream(String),
@@ -60,6 +63,11 @@ impl From<AnalysisError> for CliError {
             AnalysisError::Ident(error) => Self::Ident(error),
             AnalysisError::Io(error) => Self::Io(error),
             AnalysisError::Model(error) => Self::Model(error),
+            AnalysisError::OtherColumns(others) => {
+                let typed = std::env::args_os().skip(1);
+                let command = others.command(typed.map(|word| word.to_string_lossy().into_owned()));
+                Self::OtherColumns(format!("{}: {command}", others.found()))
+            }
             AnalysisError::SameSamples { .. }
             | AnalysisError::NoSuchChannel { .. }
             | AnalysisError::Prior { .. }

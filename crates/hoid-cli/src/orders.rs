@@ -1,6 +1,6 @@
 //! Orders, ranges and named numbers as they are typed.
 
-use std::{collections::BTreeMap, ops::RangeInclusive};
+use std::{collections::BTreeMap, fmt, ops::RangeInclusive};
 
 use hoid::ident::{Constraint, NamedOrders, Prior};
 use hoid::model::{MAX_DELAY, MAX_ORDER, SampleTime};
@@ -35,7 +35,29 @@ pub enum DelayRange {
     Seconds(f64, f64),
 }
 
+impl fmt::Display for DelayRange {
+    /// As it was given.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Samples(range) if range.start() == range.end() => write!(f, "{} samples", range.start()),
+            Self::Samples(range) => write!(f, "{}..{} samples", range.start(), range.end()),
+            Self::Seconds(low, high) if low == high => write!(f, "{low} s"),
+            Self::Seconds(low, high) => write!(f, "{low}..{high} s"),
+        }
+    }
+}
+
 impl DelayRange {
+    /// The delay that was typed, by --nk or by --delay: of those one is given.
+    pub fn given(nk: Option<&Self>, delay_s: Option<(f64, f64)>) -> Option<Self> {
+        nk.cloned().or(delay_s.map(|(low, high)| Self::Seconds(low, high)))
+    }
+
+    /// The line of printed settings, where it was given in s.
+    pub fn setting(&self) -> Option<(String, String)> {
+        matches!(self, Self::Seconds(..)).then(|| ("delay".to_owned(), self.to_string()))
+    }
+
     /// nk of both ends: tau_e = (nk - 1) Ts.
     pub fn samples(&self, sample_time: SampleTime) -> RangeInclusive<usize> {
         match self {
@@ -61,17 +83,26 @@ pub fn parse_delay(text: &str) -> Result<DelayRange, String> {
             .map_err(|e| format!("{e}, or seconds as 0.28s"));
     }
     let wrong = || format!("{text:?} is no delay; write samples (29, 20..40) or seconds (0.28s, 0.1s..0.4s)");
-    let number = |part: &str| {
+    let seconds = |part: &str| {
         let part = part.trim();
-        let value = part.strip_suffix('s').unwrap_or(part).trim_end().parse::<f64>().ok();
-        value.filter(|s| s.is_finite() && *s >= 0.0).ok_or_else(wrong)
+        part.strip_suffix('s').unwrap_or(part).trim_end().to_owned()
     };
     let (low, high) = text.split_once("..").unwrap_or((text, text));
-    let (low, high) = (number(low)?, number(high)?);
-    if low > high {
-        return Err(format!("the range {text} is empty; write the smaller number first"));
+    parse_seconds(&format!("{}..{}", seconds(low), seconds(high)))
+        .map(|(low, high)| DelayRange::Seconds(low, high))
+        .map_err(|_| wrong())
+}
+
+/// A delay in s: `0.28`, or `LO..HI`.
+pub fn parse_seconds(text: &str) -> Result<(f64, f64), String> {
+    let number = |part: &str| part.trim().parse::<f64>().ok().filter(|s| s.is_finite() && *s >= 0.0);
+    let (low, high) = text.split_once("..").unwrap_or((text, text));
+    match number(low).zip(number(high)) {
+        Some((low, high)) if low <= high => Ok((low, high)),
+        _ => Err(format!(
+            "{text:?} is no delay in s; write one of 0 s or more, as .28, or LO..HI with LO <= HI, as 0.1..0.4"
+        )),
     }
-    Ok(DelayRange::Seconds(low, high))
 }
 
 /// Most samples ahead of a prediction that is judged.

@@ -21,6 +21,7 @@ const PRIOR: &str = "prior";
 /// still be ranges.
 pub struct Plan {
     plan: TrackPlan,
+    delay: Option<DelayRange>,
     sample_time: SampleTime,
 }
 
@@ -123,7 +124,11 @@ impl Plan {
         };
         let plan =
             TrackPlan::new(options, ranges, args.criterion, sample_time).map_err(|e| CliError::Usage(e.to_string()))?;
-        Ok(Self { plan, sample_time })
+        Ok(Self {
+            plan,
+            delay: DelayRange::given(args.nk.as_ref(), args.delay),
+            sample_time,
+        })
     }
 
     /// True when no order is left to be searched.
@@ -168,6 +173,7 @@ impl Plan {
             setting("structure", options.structure.name().to_owned()),
             setting("orders", orders),
         ];
+        list.extend(self.delay.as_ref().and_then(DelayRange::setting));
         list.push(setting("memory", options.memory_in_words(ts)));
         for own in options.method.settings().list() {
             // What was given; the memory stands above with the defaults of all parameters.
@@ -206,9 +212,10 @@ fn ranges(
     sample_time: SampleTime,
 ) -> Result<OrderRanges, CliError> {
     let usage = |error: IdentError| CliError::Usage(error.to_string());
-    let mut named = orders::named_orders(args.orders.as_deref(), args.nk.as_ref())?;
-    if let Some(nk) = &args.nk {
-        named.insert("nk".to_owned(), nk.samples(sample_time));
+    let delay = DelayRange::given(args.nk.as_ref(), args.delay);
+    let mut named = orders::named_orders(args.orders.as_deref(), delay.as_ref())?;
+    if let Some(delay) = &delay {
+        named.insert("nk".to_owned(), delay.samples(sample_time));
     }
     let start = args.start.as_deref().filter(|text| text.trim() != "nothing");
     let names: Vec<String> = orders::parse_pairs(start.unwrap_or_default())

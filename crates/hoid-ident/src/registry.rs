@@ -26,6 +26,7 @@ pub fn estimators() -> Vec<MethodSpec> {
         settings: vec![
             orders(),
             nk(),
+            delay(),
             instruments(),
             max_iterations(SearchOptions::default()),
             tolerance(SearchOptions::default()),
@@ -40,6 +41,7 @@ pub fn estimators() -> Vec<MethodSpec> {
             vec![
                 orders(),
                 nk(),
+                delay(),
                 initial_state(),
                 start(),
                 fix(),
@@ -230,7 +232,7 @@ fn delay() -> Setting {
         "delay",
         Kind::Span,
         "0.05..0.6; of the family 0.02..0.8",
-        "Shortest and longest delay tau_e",
+        "Delay tau_e, or the shortest and the longest; of polynomials nk = tau_e/Ts + 1",
     )
     .unit("s")
 }

@@ -60,6 +60,12 @@ impl ColumnExpression {
         terms
     }
 
+    /// Whether it has a meaning among these columns.
+    #[must_use]
+    pub fn is_among(&self, names: &[&str]) -> bool {
+        self.resolve(names, "").is_ok()
+    }
+
     /// The columns that are meant, among `names`.
     pub(crate) fn resolve(&self, names: &[&str], file: &str) -> Result<Signal, IoError> {
         let find = |name: &str| {

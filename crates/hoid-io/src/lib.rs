@@ -26,6 +26,7 @@
 //! | module | what it holds |
 //! |---|---|
 //! | `record_file` | [`read_record`], [`read_prepared`], [`write_record`] |
+//! | `alignment` | [`read_aligned`]: channels that were recorded late, beside the others within a span that keeps its length |
 //! | `table_file` | [`write_table`], [`read_table`]: tables of results; [`TableWriter`]: the same in bounded memory |
 //! | `survey` | [`survey()`]: what is inside of a file |
 //! | `segments` | [`read_segments`]: the records between faults of the recording |
@@ -48,6 +49,7 @@
 //! | `output_place`, `directory_lock` | [`check_output`]: no result in the place of an input; [`DirectoryLock`] |
 //! | `error` | [`IoError`] |
 
+mod alignment;
 mod arrays;
 mod atomic;
 mod column_expression;
@@ -81,6 +83,7 @@ mod time_grid;
 mod usual_names;
 mod wording;
 
+pub use alignment::read_aligned;
 pub use atomic::{file_names, make_directory, read_bytes, read_text, write_atomically};
 pub use column_expression::ColumnExpression;
 pub use data_quality::{Place, QualityIssue, QualityIssueKind, quality_of_record};

@@ -11,13 +11,14 @@ use std::path::Path;
 use hoid_model::Record;
 
 use crate::IoError;
+use crate::alignment::read_aligned;
 use crate::atomic::write_atomically;
-use crate::formats::{bytes_of, format_to_write, write_record_as_csv};
+use crate::formats::{format_to_write, write_record_as_csv};
 use crate::output_table::{ColumnKind, ColumnSchema, TableSchema, Values};
 use crate::preparation::Preparation;
 use crate::read_options::ReadOptions;
 use crate::record_columns::{channels, comments};
-use crate::record_from_table::{ReadRecord, record_of};
+use crate::record_from_table::ReadRecord;
 use crate::table_writer::write_values;
 
 /// Reads a record with the defaults of the command line: columns e, u and t, and each other column
@@ -39,19 +40,12 @@ pub fn read_record(path: &Path, options: &ReadOptions) -> Result<ReadRecord, IoE
 }
 
 /// Reads a record and prepares it: the units, the alignment and the rate that the estimator is to
-/// see.
+/// see. A span keeps its length under offsets where the file reaches beyond it.
 ///
 /// # Errors
 /// [`IoError`], naming the place in the file or the step of the preparation.
 pub fn read_prepared(path: &Path, options: &ReadOptions, preparation: &Preparation) -> Result<ReadRecord, IoError> {
-    let file = path.display().to_string();
-    let (format, mut bytes) = bytes_of(path)?;
-    let table = format.table(&mut bytes, &file, options)?;
-    let label = path.file_stem().map(|stem| stem.to_string_lossy().into_owned());
-    let mut read = record_of(table, options, preparation.drop_repeated)?;
-    let (record, steps) = preparation.apply(read.record.labelled(label.unwrap_or_default()))?;
-    read.steps.extend(steps);
-    Ok(ReadRecord { record, ..read })
+    read_aligned(path, options, preparation, 0.0)
 }
 
 /// Writes a record: t, then `f_t` where there is one, input, output, and the other channels in

@@ -5,7 +5,7 @@ use hoid_model::{Channel, Record};
 use crate::IoError;
 use crate::column_expression::{ColumnExpression, Signal};
 use crate::data_quality::{QualityIssue, issues_of_signals};
-use crate::preparation::Step;
+use crate::preparation::{Preparation, Step};
 use crate::read_options::ReadOptions;
 use crate::repair;
 use crate::table::Table;
@@ -70,6 +70,15 @@ pub(crate) fn record_of(
     let input = input.zip(options.input.as_ref());
     let read = reader.record(grid, time, input, (output, &options.output))?;
     Ok(ReadRecord { quality_issues, ..read })
+}
+
+impl ReadRecord {
+    /// The record prepared, and what was done to it behind what was done in reading.
+    pub(crate) fn prepared(mut self, preparation: &Preparation) -> Result<Self, IoError> {
+        let (record, steps) = preparation.apply(self.record)?;
+        self.steps.extend(steps);
+        Ok(Self { record, ..self })
+    }
 }
 
 impl TableReader<'_> {

@@ -10,6 +10,7 @@ use std::ops::Range;
 use std::path::Path;
 
 use crate::IoError;
+use crate::alignment::read_as_recorded;
 use crate::data_quality::{QualityIssue, QualityIssueKind, issues_of_record};
 use crate::formats::bytes_of;
 use crate::preparation::{Preparation, Step};
@@ -85,7 +86,8 @@ pub fn read_segments(
             span_s: (Some(from), to),
             ..options.clone()
         };
-        let read = read_prepared(path, &span, preparation)?;
+        // What is masked stands beside it: nothing beyond it is taken for an offset.
+        let read = read_as_recorded(path, &span, preparation.drop_repeated)?.prepared(preparation)?;
         let to_s = to.unwrap_or(last);
         let mut steps = vec![Step::Mask {
             what: mask.iter().map(|kind| kind.name()).collect(),

@@ -123,6 +123,11 @@ impl From<AnalysisError> for Failure {
             AnalysisError::Ident(error) => error.into(),
             AnalysisError::Io(error) => error.into(),
             AnalysisError::Model(error) => error.into(),
+            AnalysisError::OtherColumns(others) => Self(FormatError::new_err(format!(
+                "{}: {}",
+                others.found(),
+                others.as_keys()
+            ))),
             AnalysisError::SameSamples { .. } => Self(DataError::new_err(text)),
             AnalysisError::NoSuchChannel { .. }
             | AnalysisError::Prior { .. }

@@ -2,7 +2,8 @@
 
 use std::{collections::BTreeMap, path::PathBuf, str::FromStr};
 
-use hoid_io::{ColumnValues, IoError, NewRate, Preparation, ReadOptions, Repair, Step, read_segments, write_record};
+use hoid_analysis::Reading;
+use hoid_io::{ColumnValues, IoError, NewRate, Preparation, ReadOptions, Repair, Step, write_record};
 use hoid_model::{Decimation, SampleTime};
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::{prelude::*, types::PyDict};
@@ -69,7 +70,13 @@ pub fn read<'py>(
         .iter()
         .map(|name| names::quality_issue_kind(name))
         .collect::<Outcome<Vec<_>>>()?;
-    let found = py.detach(|| read_segments(&path, &options, &preparation, &mask, shortest))?;
+    let reading = Reading {
+        options,
+        preparation,
+        mask,
+        shortest_s: shortest,
+    };
+    let found = py.detach(|| reading.segments(&path))?;
     found
         .into_iter()
         .map(|read| {

@@ -111,6 +111,7 @@ pub fn identify<'py>(
                     ..usual.template
                 },
                 orders: names::named_orders(&orders)?,
+                delay_s: delay,
                 criterion: names::criterion(criterion)?,
                 start,
                 method: names::fit_method(method)?,

@@ -7,8 +7,8 @@ use hoid_ident::{
 };
 use hoid_io::QualityIssueKind;
 use hoid_model::{
-    Detrend, NamedChoice, Structure, discretise, remnant::RemnantDiscretisation, remnant_gain::NoiseDefinition,
-    scenario::Realisation, theta_of,
+    Detrend, NamedChoice, SampleTime, Structure, discretise, remnant::RemnantDiscretisation,
+    remnant_gain::NoiseDefinition, scenario::Realisation, theta_of,
 };
 
 use crate::errors::{Outcome, bad_option};
@@ -149,6 +149,27 @@ pub fn range(option: &str, ends: (usize, usize)) -> Outcome<RangeInclusive<usize
         )));
     }
     Ok(ends.0..=ends.1)
+}
+
+/// Orders by name, with a delay in s in the place of nk.
+pub fn with_delay(
+    orders: &BTreeMap<String, (usize, usize)>,
+    delay_s: Option<(f64, f64)>,
+    sample_time: SampleTime,
+) -> Outcome<NamedOrders> {
+    let mut all = named_orders(orders)?;
+    if let Some((low, high)) = delay_s {
+        if all.contains_key("nk") {
+            return Err(bad_option(
+                "nk and delay are one thing in samples and in s; give one of them",
+            ));
+        }
+        if low < 0.0 {
+            return Err(bad_option(format!("delay is {low} to {high} s, expected 0 s or more")));
+        }
+        all.insert("nk".to_owned(), sample_time.nk(low)..=sample_time.nk(high));
+    }
+    Ok(all)
 }
 
 /// Orders by name, each a range.

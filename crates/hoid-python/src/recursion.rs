@@ -47,7 +47,7 @@ pub fn plan(options: &Bound<'_, PyDict>, sample_time: SampleTime) -> Outcome<Tra
     let ranges = ranges_of(
         &method,
         structure,
-        &names::named_orders(&orders)?,
+        &names::with_delay(&orders, get(options, "delay")?, sample_time)?,
         &start_names,
         sample_time,
     )?;

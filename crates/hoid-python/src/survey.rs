@@ -2,15 +2,40 @@
 
 use std::path::PathBuf;
 
-use hoid_io::{ColumnSurvey, FileSurvey, QualityIssue, SamplingSurvey, ValueSurvey, survey};
+use hoid_analysis::{Advice, Known, Look, Role};
+use hoid_io::{ColumnSurvey, QualityIssue, SamplingSurvey, ValueSurvey};
 use pyo3::{prelude::*, types::PyDict};
 
 use crate::errors::Outcome;
 
 #[pyfunction]
-#[pyo3(signature = (path))]
-pub fn info<'py>(py: Python<'py>, path: PathBuf) -> Outcome<Bound<'py, PyDict>> {
-    let found: FileSurvey = py.detach(|| survey(&path))?;
+#[pyo3(signature = (path, *, input, output, excitation, controlled_element, sampling_frequency))]
+pub fn info<'py>(
+    py: Python<'py>,
+    path: PathBuf,
+    input: Option<String>,
+    output: Option<String>,
+    excitation: Option<String>,
+    controlled_element: Option<String>,
+    sampling_frequency: Option<f64>,
+) -> Outcome<Bound<'py, PyDict>> {
+    let controlled_element = match controlled_element {
+        Some(text) => {
+            let element = text.parse()?;
+            Some((text, element))
+        }
+        None => None,
+    };
+    let known = Known {
+        input,
+        output,
+        excitation,
+        controlled_element,
+        sampling_hz: sampling_frequency,
+        ..Known::default()
+    };
+    let look = py.detach(|| Look::at(&path, &known))?;
+    let found = &look.survey;
     let all = PyDict::new(py);
     all.set_item("format", found.format)?;
     all.set_item("samplings", each(&found.samplings, |s| sampling(py, s))?)?;
@@ -19,7 +44,86 @@ pub fn info<'py>(py: Python<'py>, path: PathBuf) -> Outcome<Bound<'py, PyDict>> 
         "trouble",
         each(&found.quality_issues, |issue| quality_issue(py, issue))?,
     )?;
-    all.set_item("notes", found.notes)?;
+    all.set_item("notes", &found.notes)?;
+    all.set_item("look", looked(py, &look)?)?;
+    Ok(all)
+}
+
+/// What the file looks like, and how it is to be read.
+fn looked<'py>(py: Python<'py>, look: &Look) -> PyResult<Bound<'py, PyDict>> {
+    let role = |role: &Role| -> PyResult<Bound<'py, PyDict>> {
+        let all = PyDict::new(py);
+        all.set_item("column", &role.column)?;
+        all.set_item("why", &role.why)?;
+        all.set_item("certain", role.certain)?;
+        Ok(all)
+    };
+    let all = PyDict::new(py);
+    all.set_item("input", role(&look.roles.input)?)?;
+    all.set_item("output", role(&look.roles.output)?)?;
+    let units = PyDict::new(py);
+    for (column, unit) in look.units() {
+        units.set_item(column, unit)?;
+    }
+    all.set_item("units", units)?;
+    let seen = look.seen.as_ref().ok();
+    let excitation = seen.map(|seen| -> PyResult<_> {
+        let all = PyDict::new(py);
+        match &seen.periods {
+            Ok(found) => {
+                all.set_item("column", &found.channel)?;
+                all.set_item("why", &found.words)?;
+                all.set_item("period_s", found.period_s)?;
+                all.set_item("from_s", found.span_s.0)?;
+                all.set_item("to_s", found.span_s.1)?;
+                all.set_item("lines_rad_s", found.excitation.omega_rad_s())?;
+            }
+            Err(reason) => {
+                all.set_item("column", None::<String>)?;
+                all.set_item("why", reason)?;
+            }
+        }
+        Ok(all)
+    });
+    all.set_item("excitation", excitation.transpose()?)?;
+    let lateness = seen.and_then(|seen| seen.lag.as_ref()).map(|lag| -> PyResult<_> {
+        let all = PyDict::new(py);
+        let lag = lag.as_ref();
+        all.set_item("samples", lag.ok().map(|lag| lag.samples))?;
+        all.set_item("seconds", lag.ok().map(|lag| lag.seconds))?;
+        all.set_item("why", lag.map_or_else(String::as_str, |lag| lag.words.as_str()))?;
+        Ok(all)
+    });
+    all.set_item("lateness", lateness.transpose()?)?;
+    all.set_item("no_record", look.seen.as_ref().err().map(ToString::to_string))?;
+    let advice = look.advice().map(|advice| keywords(py, &advice));
+    all.set_item("read", advice.transpose()?)?;
+    Ok(all)
+}
+
+/// Advice as keywords of `pyhoid.read`.
+fn keywords<'py>(py: Python<'py>, advice: &Advice) -> PyResult<Bound<'py, PyDict>> {
+    let all = PyDict::new(py);
+    for (name, column) in [("input", &advice.input), ("output", &advice.output)] {
+        if let Some(column) = column {
+            all.set_item(name, column)?;
+        }
+    }
+    let numbers = [
+        ("sampling_frequency", advice.sampling_hz),
+        ("start", advice.from_s),
+        ("stop", advice.to_s),
+    ];
+    for (name, number) in numbers {
+        if let Some(number) = number {
+            all.set_item(name, number)?;
+        }
+    }
+    if let Some(samples) = advice.late_samples {
+        let offset = PyDict::new(py);
+        offset.set_item("u", samples)?;
+        all.set_item("offset", offset)?;
+    }
     Ok(all)
 }
 

@@ -111,6 +111,15 @@ def span(name: str, value: Any) -> tuple[float, float] | None:
     return low, high
 
 
+def delay(value: Any) -> tuple[float, float] | None:
+    """A delay in s, or the shortest and the longest.
+
+    >>> delay(0.28), delay((0.1, 0.4))
+    ((0.28, 0.28), (0.1, 0.4))
+    """
+    return span("delay", (value, value) if isinstance(value, (int, float)) else value)
+
+
 def text(name: str, value: Any) -> str | None:
     """A value as the command line writes it; None where it says nothing.
 

@@ -497,7 +497,15 @@ def identify_operator(
     progress: _Progress,
 ) -> OperatorFit: ...
 def even_times(times: npt.NDArray[np.float64]) -> tuple[float | None, int]: ...
-def info(path: _Path) -> dict[str, Any]: ...
+def info(
+    path: _Path,
+    *,
+    input: str | None,
+    output: str | None,
+    excitation: str | None,
+    controlled_element: str | None,
+    sampling_frequency: float | None,
+) -> dict[str, Any]: ...
 def margins(
     *,
     condition: str | None,

@@ -26,6 +26,7 @@ KEYWORDS = (
     "method",
     "structure",
     *("na", "nb", "nc", "nd", "nf", "nk"),
+    "delay",
     "criterion",
     "start",
     "largest",
@@ -70,6 +71,7 @@ def plain(arguments: Mapping[str, Any], settings: Mapping[str, Any]) -> dict[str
         "method": given["method"],
         "structure": given["structure"],
         "orders": orders,
+        "delay": _options.delay(given["delay"]),
         "criterion": given["criterion"],
         "start": None
         if start is None or isinstance(start, str)

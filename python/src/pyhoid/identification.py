@@ -60,7 +60,6 @@ _OF_OPERATOR = (
 )
 #: What to give in place of a keyword.
 _INSTEAD = {
-    "delay": "; else give nk",
     "nk": "; else give delay in s",
     "orders": "; a grey box has remnant_order",
 }
@@ -134,7 +133,7 @@ if TYPE_CHECKING:
         neuromuscular: bool
         prior: Any
         remnant_order: Order | None
-        delay: tuple[float, float] | None
+        delay: float | tuple[float, float] | None
         individual: Sequence[str]
         excitation: str | None
         period: float | None
@@ -201,7 +200,7 @@ def identify(
     controlled_element: str | tuple[Sequence[float], Sequence[float]] | None = None,
     run_to_run: float | None = None,
     remnant_order: Order | None = None,
-    delay: tuple[float, float] | None = None,
+    delay: float | tuple[float, float] | None = None,
     individual: Sequence[str] = (),
     criterion: Criterion = "bic",
     initial_state: InitialState = "auto",
@@ -273,8 +272,9 @@ def identify(
         errors of fewer than five records. Default 0.06.
     remnant_order : int or (int, int), optional
         Order m of the remnant of an operator with a gain and a lead; it makes the fit that one.
-    delay : (float, float), optional
-        Shortest and longest tau_e in s, for operators; default 0.02 to 0.8 for ``"operator"``.
+    delay : float or (float, float), optional
+        Delay tau_e in s, or the shortest and the longest; of polynomials in place of `nk`. Default
+        0.02 to 0.8 for ``"operator"``.
     individual : sequence of str
         Parameters with a value of their own for each record, for operators that do not change.
     criterion : {"bic", "aic", "aicc", "fpe", "mdl", "yic", "loss"}
@@ -394,7 +394,7 @@ def identify(
         remnant_order=None
         if remnant_order is None
         else _options.order("remnant_order", remnant_order),
-        delay=_options.span("delay", delay),
+        delay=_options.delay(delay),
         individual=list(individual),
         criterion=criterion,
         initial_state=initial_state,

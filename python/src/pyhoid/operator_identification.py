@@ -30,7 +30,7 @@ if TYPE_CHECKING:
         period: float | None
         controlled_element: str | tuple[Sequence[float], Sequence[float]] | None
         individual: Sequence[str]
-        delay: tuple[float, float] | None
+        delay: float | tuple[float, float] | None
         nc: Order | None
         nd: Order | None
         run_to_run: float | None
@@ -117,7 +117,7 @@ def operator_of(
         period=period,
         controlled_element=None if element is None else _options.controlled_element(element),
         individual=list(settings["individual"]),
-        delay=_options.span("delay", settings["delay"]),
+        delay=_options.delay(settings["delay"]),
         nc=_options.order("nc", 0 if nc is None else nc),
         nd=None if nd is None else _options.order("nd", nd),
         run_to_run=run_to_run,

@@ -242,15 +242,36 @@ def write(path: str | PathLike[str], record: Record) -> None:
     _pyhoid.write(path, record)
 
 
-def info(path: str | PathLike[str]) -> dict[str, Any]:
-    """Describe a file, as ``hoid info --json`` does.
+def info(
+    path: str | PathLike[str],
+    *,
+    input: str | None = None,
+    output: str | None = None,
+    excitation: str | None = None,
+    controlled_element: str | None = None,
+    sampling_frequency: float | None = None,
+) -> dict[str, Any]:
+    """Describe a file and what it looks like, as ``hoid info --json`` does.
+
+    Parameters
+    ----------
+    path : path
+    input, output, excitation : str, optional
+        Columns that are known, which are not looked for; ``excitation="none"`` looks for none.
+    controlled_element : str, optional
+        As ``"90/(s(s+6))"``: with it and a column y it is found by how many samples the control was
+        recorded late.
+    sampling_frequency : float, optional
+        Hz; without it the column ``t`` (s) gives the sampling.
 
     Returns
     -------
     dict
         ``format``; ``columns`` with unit, type, rows and the range of their values; ``samplings``
         with frequency, gaps and jitter; ``trouble`` with what is wrong with the sampling, where,
-        how much, and the remedy; ``notes``.
+        how much, and the remedy; ``notes``; ``look`` with the columns of error and control, the
+        excitation and its longest span of whole periods, by how much the control is late, and in
+        ``read`` the keywords by which `read` takes the file so (None where that is not certain).
 
     Raises
     ------
@@ -258,8 +279,16 @@ def info(path: str | PathLike[str]) -> dict[str, Any]:
 
     Examples
     --------
-    >>> [column["name"] for column in pyhoid.info("run1.csv")["columns"]]
+    >>> look = pyhoid.info("run1.csv")["look"]
+    >>> record = pyhoid.read("run1.csv", **look["read"])
     """
     with readable(path) as file:
-        found = _pyhoid.info(file)
+        found = _pyhoid.info(
+            file,
+            input=input,
+            output=output,
+            excitation=excitation,
+            controlled_element=controlled_element,
+            sampling_frequency=sampling_frequency,
+        )
     return found

@@ -71,6 +71,7 @@ class Tracker(_pyhoid.Tracker):
         nd: Order | None = None,
         nf: Order | None = None,
         nk: Order | None = None,
+        delay: float | tuple[float, float] | None = None,
         criterion: Criterion = "bic",
         start: Mapping[str, float] | str | None = None,
         largest: float = 1e6,

@@ -36,6 +36,7 @@ def track(
     nd: Order | None = None,
     nf: Order | None = None,
     nk: Order | None = None,
+    delay: float | tuple[float, float] | None = None,
     criterion: Criterion = "bic",
     start: Mapping[str, float] | str | None = None,
     largest: float = 1e6,
@@ -66,6 +67,8 @@ def track(
         Default ``"arx"`` for ``"rls"``, otherwise ``"bj"``.
     na, nb, nc, nd, nf, nk : int or (int, int) or range, optional
         Orders; pairs are searched on the start span.
+    delay : float or (float, float), optional
+        Delay tau_e in s in place of `nk`, or the shortest and the longest that are searched.
     criterion : str
         The criterion that chooses between candidates.
     start : mapping of str to float, or "nothing", optional

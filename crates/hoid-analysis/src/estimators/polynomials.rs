@@ -64,6 +64,16 @@ impl Polynomials {
     pub fn ranges(&self, sample_time: SampleTime) -> Result<OrderRanges, AnalysisError> {
         let mut orders = self.orders.clone();
         if let Some((low, high)) = self.delay_s {
+            if orders.contains_key("nk") {
+                return Err(AnalysisError::Options {
+                    reason: "nk and delay are one thing in samples and in s; give one of them".to_owned(),
+                });
+            }
+            if !(0.0 <= low && low <= high && high.is_finite()) {
+                return Err(AnalysisError::Options {
+                    reason: format!("delay is {low} to {high} s, expected 0 s or more, the shorter one first"),
+                });
+            }
             orders.insert("nk".to_owned(), sample_time.nk(low)..=sample_time.nk(high));
         }
         let options = |error: hoid_ident::IdentError| AnalysisError::Options {
@@ -110,6 +120,14 @@ impl Polynomials {
             Setting::new("focus", template.focus.to_string()),
             Setting::new("start", start),
         ];
+        if let Some((low, high)) = self.delay_s {
+            let words = if low == high {
+                format!("{low} s")
+            } else {
+                format!("{low}..{high} s")
+            };
+            list.push(Setting::new("delay", words));
+        }
         if !template.priors.is_empty() {
             let guess = template
                 .priors

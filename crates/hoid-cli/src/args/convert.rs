@@ -6,12 +6,15 @@ use clap::{Args, ValueEnum};
 use hoid::io::readable_endings;
 use hoid::model::{ContinuousTransferFunction, discretise};
 
+use super::look::LookArgs;
 use crate::orders::parse_numbers;
 
 #[derive(Debug, Args)]
 pub struct InfoArgs {
     #[arg(value_name = "FILE", help = format!("File of any format that is read: {}", readable_endings()))]
     pub file: PathBuf,
+    #[command(flatten)]
+    pub look: LookArgs,
     /// Print one JSON object instead of tables
     #[arg(long)]
     pub json: bool,

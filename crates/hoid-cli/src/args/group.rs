@@ -3,11 +3,11 @@
 use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
-use hoid::model::{ContinuousTransferFunction, Form, scenario::Condition};
+use hoid::model::{Form, scenario::Condition};
 use hoid::sim::people::{Plant, RemnantKind};
 use hoid::study::group::SamplingDefect;
 
-use super::{choices::choice_of, figure::FigureArgs, parse::parse_span, show::ShowArgs};
+use super::{choices::choice_of, figure::FigureArgs, look::LookArgs, parse::parse_span, show::ShowArgs};
 
 #[derive(Debug, Args)]
 #[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
@@ -56,28 +56,8 @@ pub struct GroupInitArgs {
     /// for anything
     #[arg(long, value_name = "PATTERN", default_value = "{subject}_{condition}_{run}.csv")]
     pub pattern: String,
-    /// Column of the input (tracking error), or a difference such as r-y [default: by its name]
-    #[arg(long, value_name = "COLUMN", allow_hyphen_values = true)]
-    pub input: Option<String>,
-    /// Column of the output (control) [default: by its name]
-    #[arg(long, value_name = "COLUMN", allow_hyphen_values = true)]
-    pub output: Option<String>,
-    /// Column of the excitation, or none [default: the one whose power stands in lines]
-    #[arg(long, value_name = "COLUMN|none")]
-    pub excitation: Option<String>,
-    /// Controlled element of all conditions in s, as 90/(s(s+6)) or 90/1,6,0; with it, and a column y,
-    /// it is found by how many samples the control was recorded late
-    #[arg(long, value_name = "ELEMENT", value_parser = parse_element, allow_hyphen_values = true)]
-    pub controlled_element: Option<(String, ContinuousTransferFunction)>,
-    /// Sampling frequency in Hz; replaces the column t
-    #[arg(long, value_name = "HZ")]
-    pub fs: Option<f64>,
-    /// Begin of the span that counts, s [default: whole periods of the excitation]
-    #[arg(long, value_name = "S", allow_hyphen_values = true)]
-    pub from: Option<f64>,
-    /// End of the span that counts, s
-    #[arg(long, value_name = "S", allow_hyphen_values = true)]
-    pub to: Option<f64>,
+    #[command(flatten)]
+    pub look: LookArgs,
     /// Samples by which the control is recorded later than the error that it answers
     /// [default: by the controlled element, else 0]
     #[arg(long, value_name = "N", allow_hyphen_values = true)]
@@ -166,14 +146,6 @@ pub struct PeopleOptions {
     /// With --people: sample time in s [default: 1/60]
     #[arg(long, value_name = "S", requires = "people")]
     pub sample_time: Option<f64>,
-}
-
-/// The element as it was typed, for the manifest, and as it is meant.
-fn parse_element(text: &str) -> Result<(String, ContinuousTransferFunction), String> {
-    let element = text
-        .parse::<ContinuousTransferFunction>()
-        .map_err(|error| error.to_string())?;
-    Ok((text.to_owned(), element))
 }
 
 fn parse_trouble(text: &str) -> Result<SamplingDefect, String> {

@@ -36,7 +36,10 @@ const HELP: [Help; 17] = [
     },
     Help {
         command: "info",
-        examples: &["hoid info run.csv", "hoid info run.mat --json"],
+        examples: &[
+            "hoid info run.csv --controlled-element '1/(s(s+1))'",
+            "hoid info run.mat --json",
+        ],
         shown: &[],
     },
     Help {

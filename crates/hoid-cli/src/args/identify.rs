@@ -15,11 +15,10 @@ use hoid::model::{ContinuousTransferFunction, Form, Structure, remnant::RemnantD
 use super::{
     choices::{by_name, choice_of},
     figure::FigureArgs,
-    parse::parse_span,
     reading::{FaultArgs, MaskArgs, ReadArgs},
     show::ShowArgs,
 };
-use crate::orders::{DelayRange, parse_delay, parse_horizon, parse_range};
+use crate::orders::{DelayRange, parse_delay, parse_horizon, parse_range, parse_seconds};
 
 #[derive(Debug, Args)]
 pub struct IdentifyArgs {
@@ -60,7 +59,7 @@ pub struct IdentifyArgs {
     pub run_to_run: Option<f64>,
     #[arg(long, help = about("remnant_order"), value_name = "M|LO..HI", value_parser = parse_range)]
     pub remnant_order: Option<RangeInclusive<usize>>,
-    #[arg(long, help = about("delay"), value_name = "LO..HI", value_parser = parse_span)]
+    #[arg(long, help = about("delay"), value_name = "S|LO..HI", value_parser = parse_seconds, conflicts_with = "nk")]
     pub delay: Option<(f64, f64)>,
     #[arg(long, help = about("individual"), value_name = "NAMES", value_delimiter = ',')]
     pub individual: Vec<String>,

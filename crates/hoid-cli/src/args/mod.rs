@@ -8,6 +8,7 @@
 //! | `describe` | `hoid describe` |
 //! | `recursion`, `settings`, `udp` | `hoid track`, `hoid stream`; the options of the methods, from the registry |
 //! | `reading` | all commands that read records |
+//! | `look` | what `hoid info` and `hoid group init` look for in files |
 //! | `convert` | `hoid convert`, `hoid info` |
 //! | `fmu` | `hoid fmu` |
 //! | `figure` | figures as files |
@@ -27,6 +28,7 @@ mod group;
 mod help;
 mod identify;
 mod lab;
+mod look;
 mod parse;
 mod reading;
 mod recursion;

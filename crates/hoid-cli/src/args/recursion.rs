@@ -15,7 +15,7 @@ use super::{
     ReadArgs, choices::choice_of, figure::FigureArgs, parse_span, reading::DecimateArgs, settings::SettingArgs,
     show::ShowArgs, udp::UdpPlaces,
 };
-use crate::orders::{DelayRange, parse_delay};
+use crate::orders::{DelayRange, parse_delay, parse_seconds};
 
 /// What is tracked, and how.
 #[derive(Debug, Args)]
@@ -36,6 +36,9 @@ pub struct RecursionArgs {
     /// follows the delay]
     #[arg(long, value_name = "N|Ss|LO..HI", value_parser = parse_delay)]
     pub nk: Option<DelayRange>,
+    /// Dead time tau_e in s in place of --nk: .28, or a range (0.1..0.4) to search on the start span
+    #[arg(long, value_name = "S|LO..HI", value_parser = parse_seconds, conflicts_with = "nk")]
+    pub delay: Option<(f64, f64)>,
     /// What decides between candidates when something is searched
     #[arg(long, value_name = "NAME", default_value = "bic", value_parser = choice_of(&Criterion::ALL))]
     pub criterion: Criterion,

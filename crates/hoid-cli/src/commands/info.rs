@@ -1,9 +1,10 @@
 //! `hoid info`: what is inside of a file, before anything is identified.
 
-use std::path::Path;
+use std::collections::BTreeMap;
 
+use hoid::analysis::{Look, Role};
 use hoid::ident::faults::mend;
-use hoid::io::{ColumnSurvey, FileSurvey, ReadOptions, SamplingSurvey, ValueSurvey, read_record, survey};
+use hoid::io::{ColumnSurvey, FileSurvey, SamplingSurvey, ValueSurvey};
 use hoid::model::{Fault, FaultHandling};
 use hoid::report::numbers;
 use serde_json::{Value, json};
@@ -11,33 +12,105 @@ use serde_json::{Value, json};
 use crate::{args::InfoArgs, error::CliError, json, output, text};
 
 pub fn run(args: &InfoArgs) -> Result<(), CliError> {
-    let found = survey(&args.file)?;
+    let look = Look::at(&args.file, &args.look.known())?;
     let file = args.file.display().to_string();
-    let faults = faults_of(&args.file);
+    let faults = faults_of(&look);
     if args.json {
-        let mut object = object(&found);
+        let mut object = object(&look.survey);
         object["faults"] = faults.iter().map(|fault| json::fault(&file, fault)).collect();
+        object["look"] = looked(&look, &file);
         json::print(&object)?;
     } else {
-        let mut text = words(&file, &found);
+        let mut text = words(&file, &look.survey);
         if !faults.is_empty() {
             text.push_str("\nFaults of e and u:\n");
         }
         for fault in &faults {
             text.push_str(&format!("  {fault}\n"));
         }
+        text.push_str(&looks_like(&look, &file));
         output::show(&text)?;
     }
     Ok(())
 }
 
-/// The faults of e and u, where the file has columns of these names that make a record.
-fn faults_of(file: &Path) -> Vec<Fault> {
-    let found = read_record(file, &ReadOptions::default()).map(|read| mend(&read.record, FaultHandling::Report));
-    found
-        .ok()
-        .and_then(Result::ok)
-        .map_or_else(Vec::new, |mended| mended.faults)
+/// The faults of error and control, where the file has them and they make a record.
+fn faults_of(look: &Look) -> Vec<Fault> {
+    let seen = look.seen.as_ref().ok();
+    let mended = seen.and_then(|seen| mend(&seen.record, FaultHandling::Report).ok());
+    mended.map_or_else(Vec::new, |mended| mended.faults)
+}
+
+/// What the file looks like, and the command to type next.
+fn looks_like(look: &Look, file: &str) -> String {
+    let role = |role: &Role| format!("{} ({})", role.column, role.why);
+    let mut rows = vec![("input", role(&look.roles.input)), ("output", role(&look.roles.output))];
+    // The table above has the others.
+    let beside = |path: &str| look.survey.columns.iter().any(|c| c.path == path && !c.unit.is_empty());
+    let units: Vec<String> = look
+        .units()
+        .iter()
+        .filter(|(column, _)| !beside(column))
+        .map(|(column, unit)| format!("{column} in {unit}"))
+        .collect();
+    if !units.is_empty() {
+        rows.push(("units", units.join(", ")));
+    }
+    match &look.seen {
+        Ok(seen) => {
+            let periods = seen.periods.as_ref();
+            rows.push((
+                "excitation",
+                periods.map_or_else(String::clone, |found| found.words.clone()),
+            ));
+            let lag = seen.lag.as_ref().map(|lag| lag.as_ref());
+            rows.extend(lag.map(|lag| ("lateness", lag.map_or_else(String::clone, |lag| lag.words.clone()))));
+        }
+        Err(reason) => rows.push(("no record", reason.to_string())),
+    }
+    let mut text = "\nWhat it looks like:\n".to_owned();
+    for (name, words) in rows {
+        text.push_str(&format!("  {name:10}  {words}\n"));
+    }
+    text.push_str(&match look.advice() {
+        Some(advice) => format!("Next: {}\n", advice.command("identify", file)),
+        None => {
+            "Next: hoid identify with the columns of error and control: --input COLUMN --output COLUMN\n".to_owned()
+        }
+    });
+    text
+}
+
+/// The same for programs.
+fn looked(look: &Look, file: &str) -> Value {
+    let role = |role: &Role| json!({"column": role.column, "why": role.why, "certain": role.certain});
+    let seen = look.seen.as_ref().ok();
+    let excitation = match seen.map(|seen| &seen.periods) {
+        Some(Ok(found)) => json!({
+            "column": found.channel,
+            "why": found.words,
+            "period_s": json::number(found.period_s),
+            "from_s": json::number(found.span_s.0),
+            "to_s": json::number(found.span_s.1),
+            "lines_rad_s": found.excitation.omega_rad_s(),
+        }),
+        Some(Err(reason)) => json!({"column": null, "why": reason}),
+        None => Value::Null,
+    };
+    let lateness = match seen.and_then(|seen| seen.lag.as_ref()) {
+        Some(Ok(lag)) => json!({"samples": lag.samples, "seconds": json::number(lag.seconds), "why": lag.words}),
+        Some(Err(reason)) => json!({"samples": null, "seconds": null, "why": reason}),
+        None => Value::Null,
+    };
+    json!({
+        "input": role(&look.roles.input),
+        "output": role(&look.roles.output),
+        "units": look.units().into_iter().collect::<BTreeMap<_, _>>(),
+        "excitation": excitation,
+        "lateness": lateness,
+        "no_record": look.seen.as_ref().err().map(ToString::to_string),
+        "next": look.advice().map(|advice| advice.command("identify", file)),
+    })
 }
 
 fn words(file: &str, found: &FileSurvey) -> String {

@@ -8,7 +8,6 @@
 //! | [`Pattern`] | subject, condition and run from names of files |
 //! | [`run_group`] | the analysis in a directory, part by part |
 //! | `reading` | runs from files, and what was done to them |
-//! | `alignment` | channels that were recorded late, put beside the others within a span |
 //! | `analysis` | what is done with the runs of a person in a condition (`block`) and with one run, in which `windows`, with which orders (`run_orders`), and the rows of it (`run_rows`) |
 //! | `family_fits`, [`Person`] | the operator of a person in a condition, and its row in the table of people |
 //! | [`GroupSummary`] | what failed, the people, and the verdict on the whole group |
@@ -26,7 +25,6 @@
 //! person in a condition, which comes first: a group that was stopped goes on, and of a run nothing stays in memory but its
 //! estimates and responses; traces are averaged for one person in one condition after the other.
 
-mod alignment;
 mod analysis;
 mod analysis_settings;
 mod averages;
@@ -58,7 +56,7 @@ mod windows;
 
 pub use analysis_settings::AnalysisSettings;
 pub use condition_settings::ConditionSettings;
-pub use inspection::{Evidence, Known, commented, inspect};
+pub use inspection::{Evidence, commented, inspect};
 pub use manifest::{MANIFEST, Manifest, RunEntry};
 pub use pattern::{FileNameParts, Pattern};
 pub use person::{Person, PersonStatus};

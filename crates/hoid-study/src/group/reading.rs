@@ -2,13 +2,15 @@
 
 use std::path::Path;
 
-use hoid_analysis::Account;
+use hoid_analysis::{Account, AnalysisError};
 use hoid_ident::faults::{Mended, mend};
-use hoid_io::{ColumnKind, ColumnSchema, OutputTable, Preparation, ReadOptions, ReadRecord, Repair, Step, TableSchema};
+use hoid_io::{
+    ColumnKind, ColumnSchema, OutputTable, Preparation, ReadOptions, ReadRecord, Repair, Step, TableSchema,
+    read_aligned,
+};
 use hoid_model::{Detrend, Fault, Record};
 
 use super::{
-    alignment::read_aligned,
     manifest::{Manifest, RunEntry},
     read_settings::Detrending,
 };
@@ -52,7 +54,8 @@ fn read_file(manifest: &Manifest, condition: &str, path: &Path, pairing: Pairing
             .get(condition)
             .map_or(0.0, |facts| facts.offset_samples),
     };
-    let read = read_aligned(path, &options, &preparation, late_samples).map_err(text)?;
+    let read = read_aligned(path, &options, &preparation, late_samples)
+        .map_err(|error| AnalysisError::of_reading(error, path, &options).to_string())?;
     let recorded = Recorded {
         record: read.record.clone(),
         account: Account {

@@ -5,14 +5,15 @@ mod form;
 
 use std::path::{Path, PathBuf};
 
+use hoid::analysis::Known;
 use hoid::model::{SampleTime, VerdictLevel};
 use hoid::report::{group_figures, write_group_pages};
 use hoid::sim::people::{Population, Range};
 use hoid::study::{
     RunOptions,
     group::{
-        GroupSummary, Known, MANIFEST, Manifest, Pattern, PeopleExperiment, VirtualExperiment, commented, inspect,
-        run_group, simulate_group, simulate_people,
+        GroupSummary, MANIFEST, Manifest, Pattern, PeopleExperiment, VirtualExperiment, commented, inspect, run_group,
+        simulate_group, simulate_people,
     },
 };
 
@@ -110,14 +111,8 @@ fn write_manifest(args: &GroupInitArgs) -> Result<(), CliError> {
     }
     let (mut manifest, others) = Manifest::of_directory(&args.directory, &pattern)?;
     let known = Known {
-        input: args.input.clone(),
-        output: args.output.clone(),
-        excitation: args.excitation.clone(),
-        controlled_element: args.controlled_element.clone(),
-        sampling_hz: args.fs,
-        from_s: args.from,
-        to_s: args.to,
         offset_samples: args.offset,
+        ..args.look.known()
     };
     let evidence = inspect(&mut manifest, &args.directory, &known)?;
     if args.out.is_some() {

@@ -12,7 +12,7 @@ use hoid::model::{Detrend, Structure, operator_family::Coordinate};
 use crate::{
     args::{IdentifyArgs, ModelKind, estimators_with, flag},
     error::CliError,
-    orders,
+    orders::{self, DelayRange},
 };
 
 /// What is to be fitted, the options checked against each other.
@@ -145,7 +145,6 @@ fn belongs_to(name: &str, of: &[&str]) -> String {
         _ => format!("--method {name}"),
     };
     let instead = match name {
-        "delay" => "; else give --nk",
         "nk" => "; else give --delay in s",
         _ => "",
     };
@@ -241,6 +240,7 @@ fn coordinate(name: &str) -> Result<Coordinate, CliError> {
 /// A polynomial structure.
 pub fn polynomials(args: &IdentifyArgs, structure: Structure) -> Result<Polynomials, CliError> {
     let usual = Polynomials::new(structure);
+    let delay = DelayRange::given(args.nk.as_ref(), args.delay);
     let template = Estimator {
         initial_state: args.initial_state,
         search: search(args, usual.template.search),
@@ -255,8 +255,8 @@ pub fn polynomials(args: &IdentifyArgs, structure: Structure) -> Result<Polynomi
     };
     Ok(Polynomials {
         template,
-        orders: orders::named_orders(args.orders.as_deref(), args.nk.as_ref())?,
-        delay_s: args.nk.as_ref().and_then(orders::DelayRange::seconds),
+        orders: orders::named_orders(args.orders.as_deref(), delay.as_ref())?,
+        delay_s: delay.as_ref().and_then(DelayRange::seconds),
         criterion: args.criterion,
         start: args.start.as_deref().map(orders::start).transpose()?,
         method: args.method,

@@ -1,29 +1,20 @@
-//! A look at the files of a group before they are analysed: which columns are error and control,
-//! what excites the loop and in which span of whole periods, by how much the control was recorded
-//! late, and what a first fit says of form and noise model. What is found stands in the manifest
-//! with the evidence beside it, to be looked through by a person; what was asked for is not looked
+//! A look at the files of a group before they are analysed ([`Look`]): what is found in them stands in the
+//! manifest with the evidence beside it, to be looked through by a person; what was asked for is not looked
 //! for.
 //!
-//! | file | what it finds |
+//! | file | what it holds |
 //! |---|---|
-//! | `evidence` | what is known already, and what was found |
-//! | `columns` | error and control by the names that people give them |
-//! | `periods` | the excitation, its period and lines, and the longest span of whole periods |
-//! | `lag` | by how many samples the control was recorded later than the output of the controlled element |
+//! | `evidence` | what was found |
 //! | `first_fit` | form and order of the noise model of the first run |
 
-mod columns;
 mod evidence;
 mod first_fit;
-mod lag;
-mod periods;
 
 use std::path::Path;
 
-use hoid_io::{ReadOptions, read_record, survey};
-use hoid_model::Record;
+use hoid_analysis::{Known, Look, Seen};
 
-pub use evidence::{Evidence, Known};
+pub use evidence::Evidence;
 
 use super::{condition_settings::ConditionSettings, manifest::Manifest};
 use crate::StudyError;
@@ -35,21 +26,18 @@ use crate::StudyError;
 /// the evidence.
 pub fn inspect(manifest: &mut Manifest, directory: &Path, known: &Known) -> Result<Vec<Evidence>, StudyError> {
     let mut evidence = Vec::new();
-    let first = directory.join(&manifest.runs[0].file);
-    let surveyed = survey(&first)?;
-    let names: Vec<&str> = surveyed.columns.iter().map(|column| column.path.as_str()).collect();
+    let first = Look::at(&directory.join(&manifest.runs[0].file), known)?;
     let shown = manifest.runs[0].file.display().to_string();
-    let chosen = columns::choose(&names, known.input.as_deref(), known.output.as_deref());
+    let names: Vec<&str> = first.survey.columns.iter().map(|column| column.path.as_str()).collect();
     evidence.push(Evidence::new(
         "[read]",
         "",
         format!("the columns of {shown} are {}", names.join(", ")),
     ));
-    let units: Vec<String> = surveyed
-        .columns
+    let units: Vec<String> = first
+        .units()
         .iter()
-        .filter(|column| !column.unit.is_empty())
-        .map(|column| format!("{} {}", column.path, column.unit))
+        .map(|(column, unit)| format!("{column} {unit}"))
         .collect();
     evidence.push(Evidence::new(
         "[read]",
@@ -60,11 +48,20 @@ pub fn inspect(manifest: &mut Manifest, directory: &Path, known: &Known) -> Resu
             format!("units in the file: {}", units.join(", "))
         },
     ));
-    evidence.push(Evidence::new("[read]", "input", chosen.input.1));
-    evidence.push(Evidence::new("[read]", "output", chosen.output.1));
-    (manifest.read.input, manifest.read.output) = (chosen.input.0, chosen.output.0);
+    let (input, output) = (first.roles.input.clone(), first.roles.output.clone());
+    evidence.push(Evidence::new("[read]", "input", input.why));
+    evidence.push(Evidence::new("[read]", "output", output.why));
+    // All files are read by the columns of the first.
+    let of_all = Known {
+        input: Some(input.column.clone()),
+        output: Some(output.column.clone()),
+        ..known.clone()
+    };
+    (manifest.read.input, manifest.read.output) = (input.column, output.column);
     manifest.read.sampling_hz = known.sampling_hz;
     (manifest.read.from_s, manifest.read.to_s) = (known.from_s, known.to_s);
+    let mut of_first = first.seen.as_ref().ok().map(|seen| seen.record.clone());
+    let mut first = Some(first);
 
     let mut conditions: Vec<String> = Vec::new();
     for run in &manifest.runs {
@@ -77,15 +74,19 @@ pub fn inspect(manifest: &mut Manifest, directory: &Path, known: &Known) -> Resu
         let Some(run) = manifest.runs.iter().find(|run| run.condition == *condition) else {
             continue;
         };
-        let record = match whole_record(manifest, &directory.join(&run.file)) {
-            Ok(record) => record,
+        // The first run is the first of its condition.
+        let look = first
+            .take()
+            .map_or_else(|| Look::at(&directory.join(&run.file), &of_all), Ok);
+        let seen = match look.and_then(|look| look.seen) {
+            Ok(seen) => seen,
             Err(reason) => {
                 evidence.push(Evidence::new("", "", format!("not looked at: {reason}")));
                 continue;
             }
         };
         let table = format!("[conditions.{}]", key_of(condition));
-        let settings = look_at(&record, condition, &table, known, &mut evidence, &mut spans);
+        let settings = look_at(&seen, condition, &table, known, &mut evidence, &mut spans);
         // A run without the name of a condition has no table of its own.
         if !condition.is_empty() && settings != ConditionSettings::default() {
             manifest.conditions.insert(condition.clone(), settings);
@@ -102,8 +103,16 @@ pub fn inspect(manifest: &mut Manifest, directory: &Path, known: &Known) -> Resu
             "the longest span of whole periods of the excitation",
         ));
     }
-    let run = directory.join(&manifest.runs[0].file);
-    if let Ok(record) = spanned(manifest, &run) {
+    let (from_s, to_s) = (manifest.read.from_s, manifest.read.to_s);
+    if (from_s, to_s) != (None, None) {
+        of_first = of_first.and_then(|record| {
+            let end_s = record.time_s(record.len());
+            record
+                .span(from_s.unwrap_or(record.time_s(0)), to_s.unwrap_or(end_s))
+                .ok()
+        });
+    }
+    if let Some(record) = of_first {
         let found = first_fit::evidence(&record);
         if let Some(nd) = found.nd {
             manifest.analysis.nd = nd;
@@ -115,7 +124,7 @@ pub fn inspect(manifest: &mut Manifest, directory: &Path, known: &Known) -> Resu
 
 /// What the first run of a condition says of it.
 fn look_at(
-    record: &Record,
+    seen: &Seen,
     condition: &str,
     table: &str,
     known: &Known,
@@ -126,8 +135,7 @@ fn look_at(
     if let Some((text, _)) = &known.controlled_element {
         settings.controlled_element = Some(text.clone());
     }
-    let found = periods::search(record, known);
-    match &found {
+    match &seen.periods {
         Ok(found) => {
             settings.excitation = Some(found.channel.clone());
             settings.period_s = Some(found.period_s);
@@ -142,33 +150,11 @@ fn look_at(
     }
     if let Some(samples) = known.offset_samples {
         settings.offset_samples = samples;
-    } else if let (Ok(found), Some((_, element))) = (&found, &known.controlled_element)
-        && let Some(lag) = lag::of_control(record, found, element)
-    {
+    } else if let Some(Ok(lag)) = &seen.lag {
         settings.offset_samples = lag.samples;
-        evidence.push(Evidence::new(table, "offset_samples", lag.words));
+        evidence.push(Evidence::new(table, "offset_samples", lag.words.clone()));
     }
     settings
-}
-
-/// A file as the manifest reads it, without its span.
-fn whole_record(manifest: &Manifest, file: &Path) -> Result<Record, StudyError> {
-    read_span(manifest, file, (None, None))
-}
-
-fn spanned(manifest: &Manifest, file: &Path) -> Result<Record, StudyError> {
-    read_span(manifest, file, (manifest.read.from_s, manifest.read.to_s))
-}
-
-fn read_span(manifest: &Manifest, file: &Path, span_s: (Option<f64>, Option<f64>)) -> Result<Record, StudyError> {
-    let options = ReadOptions {
-        input: Some(manifest.read.input.parse()?),
-        output: manifest.read.output.parse()?,
-        sampling_hz: manifest.read.sampling_hz,
-        span_s,
-        ..ReadOptions::default()
-    };
-    Ok(read_record(file, &options)?.record)
 }
 
 /// A name as TOML writes it in the head of a table.

@@ -9,7 +9,7 @@
 use hoid_ident::frequency::{Excitation, LineSearch, USUAL_EXCITATIONS};
 use hoid_model::Record;
 
-use super::evidence::Known;
+use super::known::Known;
 
 /// Longest part of a record at either end that a span may leave out, s, and its share of the record.
 const MOST_CUT_S: f64 = 20.0;
@@ -22,17 +22,23 @@ const LEAKS_ALIKE: f64 = 3.0;
 const ROUNDING: f64 = 1e-9;
 
 /// The excitation of a run.
+#[derive(Debug, Clone)]
 pub struct Periods {
+    /// Its channel.
     pub channel: String,
+    /// Its period, s.
     pub period_s: f64,
+    /// The longest span of whole periods, s.
     pub span_s: (f64, f64),
+    /// Its lines.
     pub excitation: Excitation,
+    /// All of this in words.
     pub words: String,
 }
 
 /// The excitation in the channel that was named, else in the first of the usual ones that has lines,
 /// else in any other.
-pub fn search(record: &Record, known: &Known) -> Result<Periods, String> {
+pub(super) fn search(record: &Record, known: &Known) -> Result<Periods, String> {
     let channels: Vec<&str> = record.channels().map(|channel| channel.name.as_str()).collect();
     let candidates: Vec<&str> = match known.excitation.as_deref() {
         Some("none") => return Err("as asked for".to_owned()),
@@ -55,9 +61,12 @@ pub fn search(record: &Record, known: &Known) -> Result<Periods, String> {
     }
     let found = candidates.iter().find_map(|channel| in_channel(record, channel, known));
     found.ok_or_else(|| {
+        if candidates.is_empty() {
+            return "there is no column besides error and control".to_owned();
+        }
         format!(
             "no column among {} has its power in lines over whole periods; name one by --excitation and its span by --from and --to",
-            if candidates.is_empty() { "none besides e and u".to_owned() } else { candidates.join(", ") }
+            candidates.join(", ")
         )
     })
 }

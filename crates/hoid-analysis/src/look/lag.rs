@@ -24,9 +24,14 @@ const UNEXPLAINED: f64 = 0.02;
 /// Samples that a recorder may be late: a person takes longer.
 const SAMPLES: [i32; 8] = [-2, -1, 0, 1, 2, 3, 4, 5];
 
-/// What was found.
+/// By how much the control was recorded late.
+#[derive(Debug, Clone, PartialEq)]
 pub struct Lag {
+    /// In samples.
     pub samples: f64,
+    /// In s.
+    pub seconds: f64,
+    /// How it was found.
     pub words: String,
 }
 
@@ -39,10 +44,45 @@ const CASES: [(&str, f64, f64); 5] = [
     ("the excitation taken from the output", 0.0, -1.0),
 ];
 
-/// The lag of the control by the controlled element; `None` where no column holds its output, or
-/// nothing explains it.
-pub fn of_control(record: &Record, found: &Periods, element: &ContinuousTransferFunction) -> Option<Lag> {
-    let name = OUTPUTS.into_iter().find(|name| record.channel(name).is_some())?;
+/// The lag of the control by the controlled element, or why it is not known: no column holds the output of
+/// the element, or nothing explains it.
+pub(super) fn of_control(
+    record: &Record,
+    found: &Periods,
+    element: &ContinuousTransferFunction,
+) -> Result<Lag, String> {
+    let Some(name) = OUTPUTS.into_iter().find(|name| record.channel(name).is_some()) else {
+        return Err(format!(
+            "no column holds the output of the controlled element; it would be called {}",
+            OUTPUTS.join(", ")
+        ));
+    };
+    let unknown = || format!("the lines of {name} and the control cannot be compared");
+    let (case, late, left) = best(record, found, element, name).ok_or_else(unknown)?;
+    if left >= UNEXPLAINED {
+        return Err(format!(
+            "{name} does not follow the controlled element: {:.0} % of its power at the lines is left; look for its sign, its units, and \
+             the column of the disturbance",
+            100.0 * left
+        ));
+    }
+    Ok(Lag {
+        samples: f64::from(late),
+        seconds: f64::from(late) * record.sample_time().s(),
+        words: format!(
+            "at the lines {name} follows the controlled element with {case}, the control {late} samples late; {:.2} % of its power is left",
+            100.0 * left
+        ),
+    })
+}
+
+/// Case and number of samples that explain most of the output, and the share of its power that is left.
+fn best(
+    record: &Record,
+    found: &Periods,
+    element: &ContinuousTransferFunction,
+    name: &str,
+) -> Option<(&'static str, i32, f64)> {
     let span = record.span(found.span_s.0, found.span_s.1).ok()?;
     let at_lines = |values: &[f64]| coefficients(values, found);
     let (y, u) = (at_lines(span.channel(name)?), at_lines(span.output()));
@@ -63,14 +103,7 @@ pub fn of_control(record: &Record, found: &Periods, element: &ContinuousTransfer
             let output: Vec<Complex64> = (0..omega.len()).map(|k| y[k] - d[k] * at_output).collect();
             Some((name, late, unexplained(&input, &output)?))
         });
-    let (case, late, left) = tried.min_by(|a, b| a.2.total_cmp(&b.2))?;
-    (left < UNEXPLAINED).then(|| Lag {
-        samples: f64::from(late),
-        words: format!(
-            "at the lines {name} follows the controlled element with {case}, the control {late} samples late; {:.2} % of its power is left",
-            100.0 * left
-        ),
-    })
+    tried.min_by(|a, b| a.2.total_cmp(&b.2))
 }
 
 /// Fourier coefficients at the lines.
@@ -157,6 +190,14 @@ mod tests {
     fn another_element_explains_nothing() {
         let (record, found) = integrated(1);
         let element: ContinuousTransferFunction = "1/(s^2+0.01s)".parse().unwrap();
-        assert!(of_control(&record, &found, &element).is_none());
+        let why = of_control(&record, &found, &element).unwrap_err();
+        assert!(why.contains("y does not follow"), "{why}");
+        let without = Record::new(
+            record.sample_time(),
+            record.input_channel().unwrap().clone(),
+            record.output_channel().clone(),
+        );
+        let why = of_control(&without.unwrap(), &found, &element).unwrap_err();
+        assert!(why.contains("no column holds"), "{why}");
     }
 }

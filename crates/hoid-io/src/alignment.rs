@@ -6,10 +6,16 @@
 //! afterwards: it keeps its length. Where it does not, or where the rate changes (whose filters cut
 //! more than the offsets do), rows are lost as in any other record.
 
-use std::{collections::BTreeMap, path::Path};
+use std::collections::BTreeMap;
+use std::path::Path;
 
-use hoid_io::{IoError, NewRate, Offset, Preparation, ReadOptions, ReadRecord, Step, read_prepared};
 use hoid_model::Record;
+
+use crate::IoError;
+use crate::formats::bytes_of;
+use crate::preparation::{NewRate, Offset, Preparation, Step};
+use crate::read_options::ReadOptions;
+use crate::record_from_table::{ReadRecord, record_of};
 
 /// Rows beyond the span for the interpolation of an offset between samples.
 const FOR_INTERPOLATION: f64 = 64.0;
@@ -17,18 +23,15 @@ const FOR_INTERPOLATION: f64 = 64.0;
 /// The record in a file, prepared, its output moved earlier by `late_samples` besides.
 ///
 /// # Errors
-/// Those of [`read_prepared`].
-pub(super) fn read_aligned(
+/// As [`read_prepared`](crate::read_prepared).
+pub fn read_aligned(
     path: &Path,
     options: &ReadOptions,
     preparation: &Preparation,
     late_samples: f64,
 ) -> Result<ReadRecord, IoError> {
-    let as_it_is = Preparation {
-        drop_repeated: preparation.drop_repeated,
-        ..Preparation::default()
-    };
-    let read = read_prepared(path, options, &as_it_is)?;
+    let drop_repeated = preparation.drop_repeated;
+    let read = read_as_recorded(path, options, drop_repeated)?;
     let late = Preparation {
         offset: BTreeMap::from([("u".to_owned(), Offset::Samples(late_samples))]),
         ..Preparation::default()
@@ -44,18 +47,30 @@ pub(super) fn read_aligned(
             ),
             ..options.clone()
         };
-        if let Ok(wide) = read_prepared(path, &wider, &as_it_is)
+        if let Ok(wide) = read_as_recorded(path, &wider, drop_repeated)
             && let Some((record, steps)) = moved_within(wide.record, &read.record, preparation, &late)
         {
             let steps = [read.steps, steps].concat();
             return Ok(ReadRecord { record, steps, ..read });
         }
     }
-    let (record, steps) = preparation.apply(read.record)?;
-    let (record, more) = late.apply(record)?;
+    let read = read.prepared(preparation)?;
+    if late_samples == 0.0 {
+        Ok(read)
+    } else {
+        read.prepared(&late)
+    }
+}
+
+/// The record as it stands in the file.
+pub(crate) fn read_as_recorded(path: &Path, options: &ReadOptions, drop_repeated: bool) -> Result<ReadRecord, IoError> {
+    let file = path.display().to_string();
+    let (format, mut bytes) = bytes_of(path)?;
+    let table = format.table(&mut bytes, &file, options)?;
+    let label = path.file_stem().map(|stem| stem.to_string_lossy().into_owned());
+    let read = record_of(table, options, drop_repeated)?;
     Ok(ReadRecord {
-        record,
-        steps: [read.steps, steps, more].concat(),
+        record: read.record.labelled(label.unwrap_or_default()),
         ..read
     })
 }
@@ -81,6 +96,7 @@ fn moved_within(
     late: &Preparation,
 ) -> Option<(Record, Vec<Step>)> {
     let first = Preparation {
+        units: preparation.units.clone(),
         scale: preparation.scale.clone(),
         offset: preparation.offset.clone(),
         ..Preparation::default()

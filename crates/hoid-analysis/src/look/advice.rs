@@ -1,0 +1,98 @@
+//! How a file is to be read, and the command to type: in words, since nothing is chosen silently.
+
+use hoid_ident::frequency::USUAL_EXCITATIONS;
+
+use super::{columns::Role, file::Look};
+
+/// How a file is to be read: what differs from the defaults.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Advice {
+    /// Column of the input, or a difference.
+    pub input: Option<String>,
+    /// Column of the output.
+    pub output: Option<String>,
+    /// Sampling frequency, Hz.
+    pub sampling_hz: Option<f64>,
+    /// Begin of the span of whole periods, s.
+    pub from_s: Option<f64>,
+    /// Its end, s.
+    pub to_s: Option<f64>,
+    /// Samples by which the output was recorded late.
+    pub late_samples: Option<f64>,
+    /// Column of the excitation.
+    pub excitation: Option<String>,
+    /// The controlled element.
+    pub controlled_element: Option<String>,
+}
+
+impl Look {
+    /// How the file is to be read; `None` where it is not certain which columns are error and control, or
+    /// they make no record.
+    pub fn advice(&self) -> Option<Advice> {
+        let seen = self.seen.as_ref().ok().filter(|_| self.roles.are_certain())?;
+        // Both where one is not the usual: a command is easier to read with both.
+        let (input, output) = (&self.roles.input, &self.roles.output);
+        let usual = input.column == "e" && output.column == "u";
+        let named = |role: &Role| (!usual).then(|| role.column.clone());
+        let (begin_s, end_s) = (seen.record.time_s(0), seen.record.time_s(seen.record.len()));
+        let periods = seen.periods.as_ref().ok();
+        let span = periods.map(|found| found.span_s);
+        let late = match &seen.lag {
+            Some(Ok(lag)) => Some(lag.samples),
+            _ => self.known.offset_samples,
+        };
+        Some(Advice {
+            input: named(input),
+            output: named(output),
+            sampling_hz: self.known.sampling_hz,
+            from_s: span.map_or(self.known.from_s, |span| Some(span.0).filter(|t| *t != begin_s)),
+            to_s: span.map_or(self.known.to_s, |span| Some(span.1).filter(|t| *t != end_s)),
+            late_samples: late.filter(|samples| *samples != 0.0),
+            excitation: periods
+                .map(|found| found.channel.clone())
+                .filter(|channel| !USUAL_EXCITATIONS.contains(&channel.as_str())),
+            controlled_element: self.known.controlled_element.as_ref().map(|(text, _)| text.clone()),
+        })
+    }
+}
+
+impl Advice {
+    /// As options of the command line.
+    pub fn arguments(&self) -> Vec<String> {
+        let number = |value: Option<f64>| value.map(|value| value.to_string());
+        let all = [
+            ("--input", self.input.clone()),
+            ("--output", self.output.clone()),
+            ("--fs", number(self.sampling_hz)),
+            ("--from", number(self.from_s)),
+            ("--to", number(self.to_s)),
+            ("--offset", self.late_samples.map(|samples| format!("u={samples}"))),
+            ("--excitation", self.excitation.clone()),
+            ("--controlled-element", self.controlled_element.clone()),
+        ];
+        all.into_iter()
+            .filter_map(|(name, value)| Some([name.to_owned(), value?]))
+            .flatten()
+            .collect()
+    }
+
+    /// The command that reads the file so, to be typed.
+    pub fn command(&self, verb: &str, file: &str) -> String {
+        let mut words = vec!["hoid".to_owned(), verb.to_owned(), file.to_owned()];
+        words.extend(self.arguments());
+        typed(&words)
+    }
+}
+
+/// Words as they are typed in a shell.
+pub fn typed(words: &[String]) -> String {
+    let plain = |word: &str| {
+        let is_plain = |c: char| c.is_alphanumeric() || "-_./=:,+%@".contains(c);
+        !word.is_empty() && word.chars().all(is_plain)
+    };
+    let each = words.iter().map(|word| match plain(word) {
+        true => word.clone(),
+        false => format!("'{}'", word.replace('\'', r"'\''")),
+    });
+    each.collect::<Vec<_>>().join(" ")
+}

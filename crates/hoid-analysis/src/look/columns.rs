@@ -1,0 +1,114 @@
+//! Error and control by the names that people give them.
+
+use hoid_io::{control_among, error_among};
+
+/// Names of what is followed.
+const TARGETS: [&str; 7] = ["r", "ref", "reference", "target", "track", "setpoint", "f_t"];
+/// Names of what is steered.
+const OUTPUTS: [&str; 7] = ["y", "output", "position", "state", "cursor", "response", "x"];
+
+/// A column in its role, and why.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Role {
+    /// The column, or a difference of two.
+    pub column: String,
+    /// Why it is this one.
+    pub why: String,
+    /// Whether no other column is as likely.
+    pub certain: bool,
+}
+
+/// Error and control among the columns of a file.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Roles {
+    /// The tracking error.
+    pub input: Role,
+    /// The control.
+    pub output: Role,
+}
+
+impl Role {
+    fn new(column: impl Into<String>, why: impl Into<String>, certain: bool) -> Self {
+        Self {
+            column: column.into(),
+            why: why.into(),
+            certain,
+        }
+    }
+}
+
+impl Roles {
+    /// Input and output among columns; what was asked for is taken as it is. Where nothing is known the
+    /// usual names are kept, to be replaced by hand.
+    pub fn of(columns: &[&str], input: Option<&str>, output: Option<&str>) -> Self {
+        let known = |names: &[&str]| -> Vec<&str> {
+            let all = names.iter();
+            all.flat_map(|name| {
+                columns
+                    .iter()
+                    .copied()
+                    .filter(|column| column.eq_ignore_ascii_case(name))
+            })
+            .collect()
+        };
+        let (targets, outputs) = (known(&TARGETS), known(&OUTPUTS));
+        let asked = |name: &str| Role::new(name, "as asked for", true);
+        let input = match (input, error_among(columns), targets.first().zip(outputs.first())) {
+            (Some(name), ..) => asked(name),
+            (_, Some(name), _) => Role::new(name, "the tracking error, by its name", true),
+            (_, _, Some((r, y))) => Role::new(
+                format!("{r}-{y}"),
+                format!("no column is called e: target {r} less output {y}"),
+                targets.len() == 1 && outputs.len() == 1,
+            ),
+            _ => Role::new(
+                "e",
+                "not found by its name: write the column, or a difference such as r-y",
+                false,
+            ),
+        };
+        let output = match (output, control_among(columns)) {
+            (Some(name), _) => asked(name),
+            (_, Some(name)) => Role::new(name, "the control, by its name", true),
+            _ => Role::new("u", "not found by its name: write the column", false),
+        };
+        Self { input, output }
+    }
+
+    /// Whether both are.
+    pub fn are_certain(&self) -> bool {
+        self.input.certain && self.output.certain
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_decide_and_what_was_asked_for_wins() {
+        let of = |columns: &[&str], input, output| {
+            let chosen = Roles::of(columns, input, output);
+            (chosen.input.column, chosen.output.column)
+        };
+        let pair = |e: &str, u: &str| (e.to_owned(), u.to_owned());
+        assert_eq!(of(&["t", "e", "u", "y"], None, None), pair("e", "u"));
+        assert_eq!(of(&["t", "r", "d", "u", "y"], None, None), pair("r-y", "u"));
+        assert_eq!(of(&["Time", "Error", "Stick"], None, None), pair("Error", "Stick"));
+        let words = ["Time (s)", "Target", "Stick [V]", "Tracking error"];
+        assert_eq!(of(&words, None, None), pair("Tracking error", "Stick [V]"));
+        assert_eq!(of(&["t", "e", "u"], Some("-e"), Some("w")), pair("-e", "w"));
+        let nothing = Roles::of(&["a", "b"], None, None);
+        assert!(nothing.input.why.contains("not found") && nothing.output.why.contains("not found"));
+        assert!(!nothing.are_certain() && !Roles::of(&[], None, None).are_certain());
+    }
+
+    #[test]
+    fn two_targets_or_no_control_are_not_certain() {
+        let certain = |columns: &[&str]| Roles::of(columns, None, None).are_certain();
+        assert!(certain(&["t", "r", "y", "u"]) && certain(&["t", "Tracking error", "Stick"]));
+        assert!(!certain(&["t", "r", "target", "y", "u"]) && !certain(&["t", "r", "y", "x", "u"]));
+        assert!(!certain(&["t", "r", "y", "w"]) && !certain(&["t", "y", "u"]));
+        assert!(Roles::of(&["t", "r", "x", "y", "u"], Some("r-y"), None).are_certain());
+    }
+}

@@ -1,0 +1,95 @@
+//! What a file holds, and what it looks like.
+
+use std::path::Path;
+
+use hoid_io::{ColumnSurvey, FileSurvey, IoError, ReadOptions, read_record, survey};
+use hoid_model::Record;
+
+use super::{
+    columns::Roles,
+    known::Known,
+    lag::{self, Lag},
+    periods::{self, Periods},
+};
+
+/// What a look at a file has found.
+#[derive(Debug)]
+pub struct Look {
+    /// Its columns, sampling and trouble.
+    pub survey: FileSurvey,
+    /// Error and control.
+    pub roles: Roles,
+    /// What these columns hold; why they make no record where they make none.
+    pub seen: Result<Seen, IoError>,
+    pub(super) known: Known,
+}
+
+/// What is found in the record of a file.
+#[derive(Debug)]
+pub struct Seen {
+    /// The record, as it was recorded.
+    pub record: Record,
+    /// The excitation and its span of whole periods, or why there is none.
+    pub periods: Result<Periods, String>,
+    /// By how much the control was recorded late, or why that is not known; `None` where no controlled
+    /// element is known, or the lag is.
+    pub lag: Option<Result<Lag, String>>,
+}
+
+impl Look {
+    /// Looks at a file.
+    ///
+    /// # Errors
+    /// Those of [`survey`], where the file cannot be read at all.
+    pub fn at(path: &Path, known: &Known) -> Result<Self, IoError> {
+        let found = survey(path)?;
+        let roles = Roles::of(&names(&found), known.input.as_deref(), known.output.as_deref());
+        Ok(Self {
+            seen: seen(path, &roles, known),
+            survey: found,
+            roles,
+            known: known.clone(),
+        })
+    }
+
+    /// The columns that say their unit, and it: beside the name, or in it as in `Stick [V]`.
+    pub fn units(&self) -> Vec<(&str, &str)> {
+        let all = self.survey.columns.iter();
+        all.filter_map(|column| Some((column.path.as_str(), unit_of(column)?)))
+            .collect()
+    }
+}
+
+/// The names of the columns.
+pub(super) fn names(found: &FileSurvey) -> Vec<&str> {
+    found.columns.iter().map(|column| column.path.as_str()).collect()
+}
+
+/// The unit of a column, beside its name or at its end in brackets.
+fn unit_of(column: &ColumnSurvey) -> Option<&str> {
+    let beside = Some(column.unit.as_str()).filter(|unit| !unit.is_empty());
+    beside.or_else(|| {
+        [('(', ')'), ('[', ']')].into_iter().find_map(|(open, close)| {
+            let (name, unit) = column.path.trim().strip_suffix(close)?.rsplit_once(open)?;
+            let is_unit = !name.trim().is_empty() && unit.chars().any(|c| c.is_alphabetic() || c == '%' || c == '°');
+            is_unit.then(|| unit.trim())
+        })
+    })
+}
+
+fn seen(path: &Path, roles: &Roles, known: &Known) -> Result<Seen, IoError> {
+    let options = ReadOptions {
+        input: Some(roles.input.column.parse()?),
+        output: roles.output.column.parse()?,
+        sampling_hz: known.sampling_hz,
+        ..ReadOptions::default()
+    };
+    let record = read_record(path, &options)?.record;
+    let periods = periods::search(&record, known);
+    let lag = match (known.offset_samples, &periods, &known.controlled_element) {
+        (None, Ok(found), Some((_, element))) => Some(lag::of_control(&record, found, element)),
+        (None, Err(_), Some(_)) => Some(Err("no excitation was found by whose lines it could be seen".to_owned())),
+        _ => None,
+    };
+    Ok(Seen { record, periods, lag })
+}

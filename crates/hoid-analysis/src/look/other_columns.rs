@@ -1,0 +1,98 @@
+//! A file without the columns that were asked for, in which error and control are found all the same: nothing
+//! is chosen silently, the reader is told what to ask for.
+
+use std::path::Path;
+
+use hoid_io::{ColumnExpression, IoError, ReadOptions, survey};
+use thiserror::Error;
+
+use super::{advice::typed, columns::Roles, file::names};
+
+/// A file without the columns that were asked for, in which error and control are found all the same.
+#[derive(Debug, Clone, PartialEq, Error)]
+#[error("{}: {}", self.found(), self.as_keys())]
+pub struct OtherColumns {
+    /// The file.
+    pub file: String,
+    /// What was asked for and is not there.
+    pub missing: String,
+    /// The columns that there are.
+    pub available: String,
+    /// The error; `None` where none is wanted.
+    pub input: Option<String>,
+    /// The control.
+    pub output: String,
+}
+
+impl OtherColumns {
+    /// What was asked for, what there is, and what it looks like.
+    pub fn found(&self) -> String {
+        let Self {
+            file,
+            missing,
+            available,
+            input,
+            output,
+        } = self;
+        let error = input
+            .as_ref()
+            .map_or(String::new(), |input| format!("e = {input} and "));
+        format!("there is no column {missing} in {file} (columns: {available}). It looks like {error}u = {output}")
+    }
+
+    /// The remedy as keys and values, as in a manifest and in Python.
+    pub fn as_keys(&self) -> String {
+        let input = self.input.as_ref().map(|input| format!("input=\"{input}\""));
+        let all = input.into_iter().chain([format!("output=\"{}\"", self.output)]);
+        all.collect::<Vec<_>>().join(", ")
+    }
+
+    /// The remedy as a command: that which was typed, its program left out, with these columns.
+    pub fn command(&self, typed_words: impl IntoIterator<Item = String>) -> String {
+        let mut words = vec!["hoid".to_owned()];
+        let mut all = typed_words.into_iter();
+        while let Some(word) = all.next() {
+            match word.as_str() {
+                "--input" | "--output" => drop(all.next()),
+                other if other.starts_with("--input=") || other.starts_with("--output=") => {}
+                _ => words.push(word),
+            }
+        }
+        for (option, column) in [("--input", self.input.as_ref()), ("--output", Some(&self.output))] {
+            words.extend(
+                column
+                    .into_iter()
+                    .flat_map(|column| [option.to_owned(), column.clone()]),
+            );
+        }
+        typed(&words)
+    }
+}
+
+/// The columns that a file looks like it has, in place of those that were asked for; `None` where the error is
+/// another one, or that is not certain.
+pub fn other_columns(error: &IoError, path: &Path, options: &ReadOptions) -> Option<OtherColumns> {
+    let IoError::NoSuchColumn {
+        file,
+        missing,
+        available,
+        ..
+    } = error
+    else {
+        return None;
+    };
+    let found = survey(path).ok()?;
+    let names = names(&found);
+    let kept = |column: &ColumnExpression| column.is_among(&names).then(|| column.to_string());
+    let input = options.input.as_ref().map(kept);
+    let output = kept(&options.output);
+    let roles = Roles::of(&names, input.as_ref().and_then(Option::as_deref), output.as_deref());
+    let certain = roles.output.certain && (roles.input.certain || input.is_none());
+    certain.then(|| OtherColumns {
+        file: file.clone(),
+        missing: missing.replace('"', ""),
+        available: available.clone(),
+        input: input.map(|_| roles.input.column),
+        output: roles.output.column,
+    })
+}

@@ -1,0 +1,56 @@
+//! What is known of a file before it is looked at, as `hoid info` and `hoid group init` take it.
+
+use clap::Args;
+use hoid::analysis::Known;
+use hoid::model::ContinuousTransferFunction;
+
+/// What is known already, and therefore not looked for.
+#[derive(Debug, Args)]
+pub struct LookArgs {
+    /// Column of the input (tracking error), or a difference such as r-y [default: by its name]
+    #[arg(long, value_name = "COLUMN", allow_hyphen_values = true)]
+    pub input: Option<String>,
+    /// Column of the output (control) [default: by its name]
+    #[arg(long, value_name = "COLUMN", allow_hyphen_values = true)]
+    pub output: Option<String>,
+    /// Column of the excitation, or none [default: the one whose power stands in lines]
+    #[arg(long, value_name = "COLUMN|none")]
+    pub excitation: Option<String>,
+    /// Controlled element in s, as 90/(s(s+6)) or 90/1,6,0; with it, and a column y, it is found by how
+    /// many samples the control was recorded late
+    #[arg(long, value_name = "ELEMENT", value_parser = parse_element, allow_hyphen_values = true)]
+    pub controlled_element: Option<(String, ContinuousTransferFunction)>,
+    /// Sampling frequency in Hz; replaces the column t
+    #[arg(long, value_name = "HZ")]
+    pub fs: Option<f64>,
+    /// Begin of the span that counts, s [default: whole periods of the excitation]
+    #[arg(long, value_name = "S", allow_hyphen_values = true)]
+    pub from: Option<f64>,
+    /// End of the span that counts, s
+    #[arg(long, value_name = "S", allow_hyphen_values = true)]
+    pub to: Option<f64>,
+}
+
+impl LookArgs {
+    /// What was typed.
+    pub fn known(&self) -> Known {
+        Known {
+            input: self.input.clone(),
+            output: self.output.clone(),
+            excitation: self.excitation.clone(),
+            controlled_element: self.controlled_element.clone(),
+            sampling_hz: self.fs,
+            from_s: self.from,
+            to_s: self.to,
+            offset_samples: None,
+        }
+    }
+}
+
+/// The element as it was typed, and as it is meant.
+fn parse_element(text: &str) -> Result<(String, ContinuousTransferFunction), String> {
+    let element = text
+        .parse::<ContinuousTransferFunction>()
+        .map_err(|error| error.to_string())?;
+    Ok((text.to_owned(), element))
+}

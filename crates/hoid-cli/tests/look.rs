@@ -1,0 +1,234 @@
+//! One look at a file: `hoid info`, `hoid group init`, `identify`, `describe` and `track` see the same columns
+//! and the same span, and say what to type.
+#![allow(clippy::unwrap_used)]
+
+mod common;
+
+use std::{fs, path::Path};
+
+use tempfile::TempDir;
+
+use common::{bad, good, json};
+
+/// A person on an integrator, recorded as time, r, y and u: two periods of 20 s, begun 3 s before the first and
+/// stopped 1 s after the last.
+fn recorded() -> TempDir {
+    let directory = TempDir::new().unwrap();
+    let people = "simulate-group --people --subjects 1 --runs 1 --plants integrator --out people";
+    good(directory.path(), &people.split(' ').collect::<Vec<_>>());
+    let text = fs::read_to_string(directory.path().join("people/S1_integrator_1.csv")).unwrap();
+    let rows: Vec<Vec<f64>> = text
+        .lines()
+        .filter(|line| line.starts_with(|c: char| c.is_ascii_digit()))
+        .map(|line| line.split(',').map(|cell| cell.parse().unwrap()).collect())
+        .collect();
+    assert_eq!(rows.len(), 2400);
+    let mut csv = "time,r,y,u\n".to_owned();
+    for k in 0..2640_usize {
+        // Columns t, e, u, d, y, of which the last rows come first again.
+        let row = &rows[(k + 2400 - 180) % 2400];
+        // No target before the first period and behind the last.
+        let (r, e) = (if !(180..2580).contains(&k) { 0.0 } else { row[3] }, row[1]);
+        csv.push_str(&format!("{},{r},{},{}\n", k as f64 / 60.0, r - e, row[2]));
+    }
+    fs::create_dir(directory.path().join("runs")).unwrap();
+    fs::write(directory.path().join("runs/A_so_1.csv"), csv).unwrap();
+    directory
+}
+
+fn words(line: &str) -> Vec<&str> {
+    line.split(' ').collect()
+}
+
+/// The arguments of a command that was shown.
+fn shown<'a>(text: &'a str, verb: &str) -> Vec<&'a str> {
+    let at = text.find(&format!("hoid {verb} ")).unwrap();
+    words(text[at..].lines().next().unwrap()).split_off(1)
+}
+
+#[test]
+fn one_file_has_one_reading() {
+    let directory = recorded();
+    let at = directory.path();
+    let file = "runs/A_so_1.csv";
+    let said = good(at, &["info", file]);
+    let next = shown(&said, "identify");
+    assert_eq!(
+        next,
+        words("identify runs/A_so_1.csv --input r-y --output u --from 3 --to 43"),
+        "{said}"
+    );
+    let look = json(at, &["info", file, "--json"])["look"].clone();
+    assert_eq!(look["next"], format!("hoid {}", next.join(" ")));
+    assert_eq!(look["input"]["column"], "r-y");
+    assert_eq!(look["excitation"]["column"], "r");
+    assert_eq!(
+        (&look["excitation"]["from_s"], &look["excitation"]["to_s"]),
+        (&3.0.into(), &43.0.into())
+    );
+    assert!((look["excitation"]["period_s"].as_f64().unwrap() - 20.0).abs() < 1e-6);
+
+    good(at, &["group", "init", "runs"]);
+    let manifest: toml::Table = toml::from_str(&fs::read_to_string(at.join("runs/group.toml")).unwrap()).unwrap();
+    let read = &manifest["read"];
+    assert_eq!(
+        (read["input"].as_str(), read["output"].as_str()),
+        (Some("r-y"), Some("u"))
+    );
+    assert_eq!(
+        (read["from_s"].as_float(), read["to_s"].as_float()),
+        (Some(3.0), Some(43.0))
+    );
+    assert_eq!(manifest["conditions"]["so"]["excitation"].as_str(), Some("r"));
+
+    // Without the columns each says which they are, and what it says can be typed.
+    for (verb, more) in [
+        ("identify", &[][..]),
+        ("describe", &[]),
+        ("track", &["--out", "trace.csv"]),
+    ] {
+        let typed = [&[verb, file][..], more].concat();
+        let (code, message) = bad(at, &typed);
+        let expected =
+            "there is no column e in runs/A_so_1.csv (columns: t, r, y, u). It looks like e = r-y and u = u: ";
+        assert!(code == 1 && message.contains(expected), "{message}");
+        let command = shown(&message, verb);
+        assert_eq!(command, [&typed[..], &["--input", "r-y", "--output", "u"]].concat());
+        let found = json(at, &[&command[..], &["--from", "3", "--to", "43", "--json"]].concat());
+        assert_eq!(found["records"][0]["samples"], 2400, "{verb}");
+    }
+    // What was typed wrongly is replaced.
+    let (_, message) = bad(at, &["identify", file, "--input=q", "--output", "u"]);
+    assert_eq!(
+        shown(&message, "identify"),
+        words("identify runs/A_so_1.csv --input r-y --output u")
+    );
+}
+
+#[test]
+fn nothing_is_guessed_where_it_is_not_certain() {
+    let directory = TempDir::new().unwrap();
+    let at = directory.path();
+    common::write(at, "two.csv", "t,r,target,y,u", 300, |k| {
+        format!(
+            "{},{},{},{},{}",
+            k as f64 / 100.0,
+            (k as f64).sin(),
+            k % 7,
+            k % 5,
+            k % 3
+        )
+    });
+    common::write(at, "none.csv", "a,b", 9, |k| format!("{k},{}", k * k));
+    common::write(at, "empty.csv", "t,e,u", 0, |_| String::new());
+    let (_, message) = bad(at, &["identify", "two.csv"]);
+    assert!(
+        message.contains("has no column \"e\"") && !message.contains("looks like"),
+        "{message}"
+    );
+    for file in ["two.csv", "none.csv"] {
+        let look = json(at, &["info", file, "--json"])["look"].clone();
+        assert!(look["next"].is_null(), "{look}");
+        assert!(good(at, &["info", file]).contains("--input COLUMN --output COLUMN"));
+        // Named, they are read.
+        let columns = ["info", file, "--input", "y", "--output", "b"];
+        assert!(!good(at, &columns).contains("not found"));
+    }
+    let named = ["info", "two.csv", "--input", "r-y", "--excitation", "none"];
+    let said = good(at, &named);
+    assert!(said.contains("excitation  as asked for") && said.contains("Next: hoid identify two.csv --input r-y"));
+    let (code, _) = bad(at, &["info", "empty.csv"]);
+    assert_eq!(code, 1);
+}
+
+/// Samples, and estimates with their errors by name, of the people of a group.
+fn of_group(at: &Path, manifest: &str) -> (f64, Vec<(f64, f64)>) {
+    fs::write(at.join("runs/group.toml"), manifest).unwrap();
+    let _ = fs::remove_dir_all(at.join("out"));
+    let found = json(at, &["group", "runs", "--out", "out", "--csv", "--json"]);
+    let estimates = fs::read_to_string(at.join("out/estimates.csv")).unwrap();
+    let head: Vec<&str> = estimates.lines().next().unwrap().split(',').collect();
+    let column = |name: &str| head.iter().position(|known| *known == name).unwrap();
+    let (from, to) = (column("from_s"), column("to_s"));
+    let spans = estimates.lines().skip(1).map(|line| {
+        let cells: Vec<&str> = line.split(',').collect();
+        cells[to].parse::<f64>().unwrap_or(0.0) - cells[from].parse::<f64>().unwrap_or(0.0)
+    });
+    let longest = spans.fold(0.0, f64::max);
+    ((longest * 60.0).round(), pairs(&found["people"][0]["parameters"]))
+}
+
+fn pairs(parameters: &serde_json::Value) -> Vec<(f64, f64)> {
+    let of = |name: &str| {
+        let one = &parameters[name];
+        (one["value"].as_f64().unwrap(), one["standard_error"].as_f64().unwrap())
+    };
+    ["T_L", "omega_nm", "zeta_nm", "tau_e"].map(of).to_vec()
+}
+
+#[test]
+fn whole_periods_are_kept_under_an_offset() {
+    let directory = recorded();
+    let at = directory.path();
+    let span = words("--input r-y --from 3 --to 43 --offset u=1 --json");
+    let found = json(at, &[&["identify", "runs/A_so_1.csv"][..], &span].concat());
+    assert_eq!(found["records"][0]["samples"], 2400);
+    let of_identify = pairs(&found["operator"]);
+    let head = "name = \"a\"\n[read]\ninput = \"r-y\"\noutput = \"u\"\nfrom_s = 3.0\nto_s = 43.0\n";
+    let run = "[[runs]]\nsubject = \"A\"\ncondition = \"so\"\nrun = \"1\"\nfile = \"A_so_1.csv\"\n";
+    let of_condition = "[conditions.so]\nexcitation = \"r\"\noffset_samples = 1.0\n";
+    let prepared = "[prepare]\noffset = { u = 1 }\n[conditions.so]\nexcitation = \"r\"\n";
+    for offset in [of_condition, prepared] {
+        let (samples, of_group) = of_group(at, &format!("{head}{offset}{run}"));
+        assert_eq!(samples, 2400.0);
+        for (one, other) in of_identify.iter().zip(&of_group) {
+            assert!(
+                (one.0 - other.0).abs() <= 1e-9 * one.0.abs(),
+                "{of_identify:?} {of_group:?}"
+            );
+            assert!((one.1 - other.1).abs() <= 1e-6 * one.1, "{of_identify:?} {of_group:?}");
+        }
+    }
+    // Where the file ends with the span there is nothing to move in from.
+    let whole = words("--input r-y --offset u=1 --json");
+    let found = json(at, &[&["identify", "runs/A_so_1.csv"][..], &whole].concat());
+    assert_eq!(found["records"][0]["samples"], 2639);
+}
+
+#[test]
+fn a_delay_in_seconds_is_nk() {
+    let directory = common::simulated();
+    let at = directory.path();
+    let fit = |delay: &[&str]| {
+        let typed = words("identify c1.csv --structure bj --orders nd=1 --json");
+        json(at, &[&typed[..], delay].concat())
+    };
+    let (samples, seconds) = (fit(&["--nk", "29"]), fit(&["--delay", ".28"]));
+    assert_eq!(seconds["orders"]["nk"], 29);
+    assert_eq!(samples["parameters"], seconds["parameters"]);
+    let setting = |found: &serde_json::Value| {
+        let all = found["settings"].to_string();
+        all.contains("0.28 s")
+    };
+    assert!(setting(&seconds) && !setting(&samples), "{}", seconds["settings"]);
+    assert_eq!(fit(&["--delay", "0.27..0.29"])["orders"]["nk"], 29);
+    let track = |delay: &[&str]| {
+        let typed = words("track c1.csv --method rpem --orders nd=1 --out trace.csv --json");
+        let found = json(at, &[&typed[..], delay].concat());
+        fs::remove_file(at.join("trace.csv")).unwrap();
+        found["last"].clone()
+    };
+    assert_eq!(track(&["--nk", "29"]), track(&["--delay", ".28"]));
+    for (wrong, says) in [
+        (&["--delay", ".28", "--nk", "29"][..], "cannot be used with"),
+        (&["--delay", "-1"], "expected"),
+        (&["--delay", ".4...3"], "no delay in s"),
+        (&["--delay", "inf"], "no delay in s"),
+    ] {
+        let (code, message) = bad(at, &[&["identify", "c1.csv"][..], wrong].concat());
+        assert!(
+            code == 2 && (message.contains(says) || message.contains("unexpected")),
+            "{message}"
+        );
+    }
+}
