@@ -17,7 +17,7 @@
 //! | a high rate is lowered | `rate` |
 //! | the describing function, where the excitation is recorded | `description`, `offset` |
 //! | the fit, a second opinion, the loop, the settings of the estimator | `estimators`: a file each |
-//! | what the recordings say | `identification`, `recordings` |
+//! | what the recordings say | `identified`, `recordings` |
 //! | the level of u, the settings that all share | `level`, `settings` |
 //!
 //! ```
@@ -39,6 +39,7 @@ mod error;
 mod estimators;
 mod files;
 mod identification;
+mod identified;
 mod level;
 mod offset;
 mod prior;
@@ -52,10 +53,11 @@ mod settings;
 pub use description::Excitation;
 pub use error::AnalysisError;
 pub use estimators::{BatchEstimator, Fitted, PolynomialFit, Polynomials};
-pub use identification::{Identification, Identified, identify};
+pub use identification::Identification;
+pub use identified::{Identified, identify};
 pub use offset::{late_samples, without_offsets};
 pub use prior::prior_of_text;
-pub use quality::findings_of_quality;
+pub use quality::{findings_of_channels, findings_of_quality};
 pub use rate::kept_rate;
 pub use reading::Reading;
 pub use recordings::{Account, Recordings};
