@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use hoid_ident::{family::FamilyFit, frequency::Description};
+use hoid_ident::{Fit, family::FamilyFit, frequency::Description, validation::GoodnessOfFit};
 use hoid_model::{Decimation, Detrend, Record, Verdict, uncertainty::Estimate};
 
 use crate::{
@@ -30,6 +30,15 @@ pub struct Identified<F = FamilyFit> {
     rate: Decimation,
     counts_samples: bool,
     taken_out: Detrend,
+}
+
+/// How well a model tells a recording that it was not fitted to.
+#[derive(Debug, Clone)]
+pub struct Validated {
+    /// The recording.
+    pub name: String,
+    /// How well.
+    pub quality: GoodnessOfFit,
 }
 
 /// The operator of a person from their runs, by the defaults.
@@ -103,18 +112,20 @@ impl fmt::Display for Identified {
 }
 
 impl<F> Identified<F> {
-    /// Other recordings of the person, prepared as those that were fitted: to judge the fit on them.
+    /// How well a model of the fit tells another recording of the person, prepared as those that were fitted.
     ///
     /// # Errors
-    /// [`AnalysisError`] where there is none, or its rate cannot be lowered.
-    pub fn alike(&self, other: Recordings) -> Result<Recordings, AnalysisError> {
-        if other.is_empty() {
-            return Err(AnalysisError::NoRecordings);
-        }
-        let mut other = other.at_rate(self.rate, self.counts_samples)?;
-        for record in &mut other.records {
-            *record = record.clone().detrended(self.taken_out);
-        }
-        Ok(other)
+    /// [`AnalysisError`] where there is none, of another rate, or too short.
+    pub fn validated(&self, model: &Fit, other: Recordings) -> Result<Validated, AnalysisError> {
+        let name = other.names.first().cloned().ok_or(AnalysisError::NoRecordings)?;
+        let other = other.at_rate(self.rate, self.counts_samples)?.records.into_iter();
+        let prepared: Vec<Record> = other.map(|record| record.detrended(self.taken_out)).collect();
+        let quality = model.quality(&prepared)?;
+        Ok(Validated { name, quality })
+    }
+
+    /// Whether the fit is one without the means of e and u, which leaves each record its level.
+    pub fn is_without_means(&self) -> bool {
+        self.taken_out == Detrend::Mean
     }
 }

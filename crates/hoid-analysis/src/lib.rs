@@ -54,7 +54,7 @@ pub use description::Excitation;
 pub use error::AnalysisError;
 pub use estimators::{BatchEstimator, Fitted, PolynomialFit, Polynomials};
 pub use identification::Identification;
-pub use identified::{Identified, identify};
+pub use identified::{Identified, Validated, identify};
 pub use offset::{late_samples, without_offsets};
 pub use prior::prior_of_text;
 pub use quality::{findings_of_channels, findings_of_quality};
