@@ -18,7 +18,7 @@
 //! | a high rate is lowered | `rate` |
 //! | the describing function, where the excitation is recorded | `description`, `offset` |
 //! | the fit, a second opinion, the loop, the settings of the estimator | `estimators`: a file each |
-//! | what the recordings say | `identification`, `recordings` |
+//! | what the recordings say | `identified`, `recordings` |
 //! | the level of u, the settings that all share | `level`, `settings` |
 //!
 //! ```
@@ -40,6 +40,7 @@ mod error;
 mod estimators;
 mod files;
 mod identification;
+mod identified;
 mod level;
 mod look;
 mod offset;
@@ -54,11 +55,12 @@ mod settings;
 pub use description::Excitation;
 pub use error::AnalysisError;
 pub use estimators::{BatchEstimator, Fitted, PolynomialFit, Polynomials};
-pub use identification::{Identification, Identified, identify};
+pub use identification::Identification;
+pub use identified::{Identified, Validated, identify};
 pub use look::{Advice, Known, Lag, Look, OtherColumns, Periods, Role, Roles, Seen, typed};
 pub use offset::{late_samples, without_offsets};
 pub use prior::prior_of_text;
-pub use quality::findings_of_quality;
+pub use quality::{findings_of_channels, findings_of_quality};
 pub use rate::kept_rate;
 pub use reading::Reading;
 pub use recordings::{Account, Recordings};

@@ -8,7 +8,7 @@
 //!
 //! No error bar knows of these.
 
-use hoid_io::{QualityIssueKind, Step};
+use hoid_io::{QualityIssueKind, Step, quality_of_record};
 use hoid_model::{Finding, Record};
 
 use crate::recordings::Account;
@@ -19,6 +19,15 @@ const AT_ENDS: f64 = 0.05;
 const COARSE: [f64; 2] = [0.05, 0.15];
 /// Longest gap that may be bridged by a straight line, s.
 const BRIDGED_S: f64 = 0.25;
+
+/// What the channels of a record that was not read from a file say of any result.
+pub fn findings_of_channels(record: &Record) -> Vec<Finding> {
+    let account = Account {
+        quality_issues: quality_of_record(record),
+        ..Account::default()
+    };
+    findings_of_quality(&account, record)
+}
 
 /// What the quality of the channels says of any result.
 pub fn findings_of_quality(account: &Account, record: &Record) -> Vec<Finding> {

@@ -3,7 +3,7 @@
 use hoid_io::{QualityIssue, Step, quality_of_record};
 use hoid_model::{Fault, Finding, Record, Verdict, uncertainty::Estimate};
 
-use crate::{quality::findings_of_quality, reading::Source};
+use crate::reading::Source;
 
 /// What was done to a record, and what is wrong with the sampling of its file.
 #[derive(Debug, Clone, Default)]
@@ -52,15 +52,6 @@ impl Recordings {
             all.push(name, record, account);
         }
         all
-    }
-
-    /// What the channels of a record that was not read from a file say of any result.
-    pub fn channel_findings(record: &Record) -> Vec<Finding> {
-        let account = Account {
-            quality_issues: quality_of_record(record),
-            ..Account::default()
-        };
-        findings_of_quality(&account, record)
     }
 
     /// One more.

@@ -253,11 +253,15 @@ fn another_run_of_the_person_judges_the_operator() {
         .run(Recordings::of_records([recorded(1, |e, u| (e, u))]))
         .unwrap();
     let other = Recordings::of_records([recorded(2, |e, u| (e, u))]);
-    let other = found.alike(other).unwrap();
-    assert_eq!(other.names, ["run 2"]);
-    let quality = found.fit.operator(0).polynomial_fit.quality(&other.records).unwrap();
-    assert!(quality.vaf_simulation > 80.0, "{}", quality.vaf_simulation);
-    assert!(found.alike(Recordings::default()).is_err());
+    let model = &found.fit.operator(0).polynomial_fit;
+    let judged = found.validated(model, other).unwrap();
+    assert_eq!(judged.name, "run 2");
+    assert!(
+        judged.quality.vaf_simulation > 80.0,
+        "{}",
+        judged.quality.vaf_simulation
+    );
+    assert!(found.validated(model, Recordings::default()).is_err());
 }
 
 #[test]

@@ -8,7 +8,7 @@ use std::fs;
 use serde_json::Value;
 use tempfile::TempDir;
 
-use common::{bad, good, json, simulated};
+use common::{bad, good, hoid, json, simulated, wave, write};
 
 #[test]
 fn identify_prints_the_json_of_the_contract() {
@@ -328,6 +328,29 @@ fn a_change_of_another_form_is_found() {
     let said = good(d, &arguments);
     for part in ["of the form lead-lag", "before the change", "after it", "T_I"] {
         assert!(said.contains(part), "{said} lacks {part}");
+    }
+}
+
+#[test]
+fn a_validation_file_is_read_and_told_once() {
+    let directory = tempfile::tempdir().unwrap();
+    let d = directory.path();
+    for name in ["run.csv", "again.csv"] {
+        write(d, name, "t,e,u", 2000, |k| {
+            let (t, e, u) = wave(k);
+            let u = if name == "again.csv" { u.clamp(-0.8, 0.8) } else { u };
+            format!("{t},{e},{u}")
+        });
+    }
+    for structure in [
+        &["--form", "lead", "--orders", "nd=1"][..],
+        &["--nk", "29", "--orders", "nd=1"],
+    ] {
+        let arguments = [&["identify", "run.csv", "--validate", "again.csv"], structure].concat();
+        let output = hoid(d, &arguments);
+        let says = String::from_utf8(output.stderr).unwrap();
+        let told = says.matches("again.csv: u stays at its largest value").count();
+        assert_eq!(told, 1, "{structure:?}: {says}");
     }
 }
 

@@ -10,7 +10,7 @@ use hoid_ident::{
         OperatorPrior, Parameter, ParameterPrior,
     },
 };
-use hoid_model::{FaultHandling, Form, ModelError, operator_family::Coordinate, uncertainty::Estimate};
+use hoid_model::{FaultHandling, Form, operator_family::Coordinate, uncertainty::Estimate};
 use numpy::{PyArray1, PyArray2};
 use pyo3::{prelude::*, types::PyDict};
 
@@ -20,6 +20,7 @@ use crate::{
     errors::{Outcome, bad_option},
     faults::{UsedRecord, faults_of, used_records},
     figures::{self, Pair, VerdictParts, pair, verdict},
+    files,
     fit::PyFit,
     interrupt, names,
 };
@@ -142,9 +143,7 @@ pub fn identify_operator(
         excitation: Excitation::of_text(excitation.as_deref()),
         period_s: period,
         faults: names::choice::<FaultHandling>("faults", faults)?,
-        rate: decimate
-            .parse()
-            .map_err(|error: ModelError| bad_option(error.to_string()))?,
+        rate: files::decimation(decimate)?,
         controlled_element: controlled_element.map(|e| e.transfer_function()).transpose()?,
     };
     let how = asked.clone();

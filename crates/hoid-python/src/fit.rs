@@ -31,6 +31,8 @@ pub struct PyFit {
     records: usize,
     /// What it is worth and what it is of, where it is a result by itself.
     identified: Option<(Verdict, Recordings)>,
+    /// Whether a level of u was estimated of each record.
+    with_levels: bool,
 }
 
 impl PyFit {
@@ -41,14 +43,17 @@ impl PyFit {
             grey_box: None,
             records,
             identified: None,
+            with_levels: false,
         }
     }
 
     /// Polynomials that were identified.
     pub fn of_polynomials(found: Identified<PolynomialFit>) -> Self {
+        let with_levels = found.is_without_means();
         let PolynomialFit { fit, choice } = found.fit;
         let records = found.data.len();
         Self {
+            with_levels,
             identified: Some((found.verdict, found.data)),
             ..Self::new(fit, choice, records)
         }
@@ -56,18 +61,12 @@ impl PyFit {
 
     /// An operator and its remnant that were identified.
     pub fn of_grey_box(found: Identified<GreyBoxFit>) -> Self {
-        let records = found.data.len();
+        let first = Self::new(found.fit.polynomial_fit(0).clone(), None, found.data.len());
         Self {
+            with_levels: found.is_without_means(),
+            grey_box: Some(found.fit),
             identified: Some((found.verdict, found.data)),
-            ..Self::new(found.fit.polynomial_fit(0).clone(), None, records)
-        }
-        .with_grey_box(found.fit)
-    }
-
-    fn with_grey_box(self, fit: GreyBoxFit) -> Self {
-        Self {
-            grey_box: Some(fit),
-            ..self
+            ..first
         }
     }
 
@@ -208,10 +207,11 @@ impl PyFit {
             .collect()
     }
 
-    /// The level of u in each record of the fit as it was read, where it was estimated.
+    /// The level of u in each record of the fit as it was read; empty where none was estimated.
     #[getter]
     fn levels(&self) -> Vec<Option<Pair>> {
-        let accounts = self.identified.iter().flat_map(|(_, data)| &data.accounts);
+        let identified = self.identified.iter().filter(|_| self.with_levels);
+        let accounts = identified.flat_map(|(_, data)| &data.accounts);
         accounts.map(|account| account.level.map(pair)).collect()
     }
 

@@ -9,13 +9,14 @@ use hoid_ident::{
     Estimator, GreyBox, GreyBoxFit, InitialState, Instruments, Loss, SearchOptions, SigmoidChange, SigmoidFit,
     estimators, settings::MethodSpec,
 };
-use hoid_model::{FaultHandling, ModelError, Record};
+use hoid_model::{Decimation, FaultHandling, Record};
 use pyo3::prelude::*;
 
 use crate::{
     arrays::{self, Wanted},
     errors::{Failure, Outcome, bad_option},
     family::PriorOfUser,
+    files,
     fit::PyFit,
     interrupt::{self, Standing},
     names::{self, Kind},
@@ -78,18 +79,24 @@ pub fn identify<'py>(
     };
     let initial_state = names::initial_state(initial_state)?;
     let constraints = names::constraints(fix, bound)?;
-    let faults = names::choice::<FaultHandling>("faults", faults)?;
-    let rate = decimate
-        .parse()
-        .map_err(|error: ModelError| bad_option(error.to_string()))?;
+    let handling = (
+        names::choice::<FaultHandling>("faults", faults)?,
+        files::decimation(decimate)?,
+    );
     let samples: usize = records.iter().map(Record::len).sum();
 
     /// How it is done, for a thread of its own.
     fn work<E: BatchEstimator + Send + 'static>(
-        how: Identification<E>,
+        estimator: E,
+        (faults, rate): (FaultHandling, Decimation),
         records: Vec<Record>,
         found: impl FnOnce(Box<Identified<E::Fit>>) -> Found + Send + 'static,
     ) -> Work {
+        let how = Identification {
+            faults,
+            rate,
+            ..Identification::of(estimator)
+        };
         Box::new(move |standing| {
             let run = || how.run(Recordings::of_records(records));
             Ok(found(Box::new(interrupt::told(standing, run)?)))
@@ -122,12 +129,7 @@ pub fn identify<'py>(
                 ..usual
             };
             let models = estimator.ranges(records[0].sample_time())?.combinations()?.len();
-            let how = Identification {
-                faults,
-                rate,
-                ..Identification::of(estimator)
-            };
-            (work(how, records, Found::Polynomials), models)
+            (work(estimator, handling, records, Found::Polynomials), models)
         }
         Kind::GreyBox => {
             let usual = GreyBox::new(names::range("remnant_order", remnant_order.unwrap_or((1, 4)))?);
@@ -139,12 +141,7 @@ pub fn identify<'py>(
                 search: search(usual.search),
                 ..usual
             };
-            let how = Identification {
-                faults,
-                rate,
-                ..Identification::of(estimator)
-            };
-            (work(how, records, Found::GreyBox), 10)
+            (work(estimator, handling, records, Found::GreyBox), 10)
         }
         Kind::TimeVarying => {
             if initial_state.is_some_and(|rule| rule != InitialState::Estimate) {
@@ -172,12 +169,7 @@ pub fn identify<'py>(
                 search: search(usual.search),
                 ..usual
             };
-            let how = Identification {
-                faults,
-                rate,
-                ..Identification::of(estimator)
-            };
-            (work(how, records, Found::Change), 10)
+            (work(estimator, handling, records, Found::Change), 10)
         }
     };
     let found = if samples * models < LONG && progress.is_none() {

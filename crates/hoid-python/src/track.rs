@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use hoid_analysis::Recordings;
+use hoid_analysis::findings_of_channels;
 use hoid_ident::{Choice, IdentError};
 use hoid_io::{ColumnValues, OutputColumn, OutputTable};
 use hoid_report::{BatchLine, TraceSection, TrackReport, default_batch_fits, write_report};
@@ -204,7 +204,7 @@ impl PyTrace {
     fn verdict(&self, py: Python<'_>, record: &Bound<'_, PyAny>) -> Outcome<figures::VerdictParts> {
         let record = arrays::record(record, Wanted::Only(&[]))?;
         let found = py.detach(|| self.trace.verdict(&record, self.choice.as_ref()))?;
-        Ok(figures::verdict(&found.behind(Recordings::channel_findings(&record))))
+        Ok(figures::verdict(&found.behind(findings_of_channels(&record))))
     }
 
     /// Why most of the rows without a crossover have none, and how many there are; None without a

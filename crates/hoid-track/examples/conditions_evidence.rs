@@ -53,7 +53,7 @@ struct Found {
 fn tracker(name: &str, record: &Record) -> Tracker {
     let method: Method = name.parse().unwrap();
     if method.starts_itself() {
-        let options = TrackOptions::usual(method, record.sample_time().nk(0.2));
+        let options = TrackOptions::told_nothing(method, record.sample_time());
         return Tracker::new(&options, None, record.sample_time()).unwrap();
     }
     let options = match name {

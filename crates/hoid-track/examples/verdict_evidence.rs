@@ -372,7 +372,7 @@ fn said(
 ) -> Said {
     let options = TrackOptions {
         controlled_element: element,
-        ..TrackOptions::usual(method.clone(), record.sample_time().nk(0.2))
+        ..TrackOptions::told_nothing(method.clone(), record.sample_time())
     };
     let trace = track(record, &options, 10).unwrap();
     let from = Instant::now();

@@ -113,6 +113,7 @@ _ANSWERS = (
     "candidates",
     "criterion",
     "delay_interval",
+    "levels",
 )
 
 
@@ -150,9 +151,6 @@ class Fit:
         self._verdict: Verdict | None = None
         #: Faults of the records that were looked for: kind, channel, from, to, size, action.
         self.faults: list[dict[str, Any]] = _faults.faults_of(native)
-        found = native.levels
-        #: Empty where no level was estimated.
-        self._levels = found if any(pair is not None for pair in found) else []
 
     def __getstate__(self) -> dict[str, Any]:
         if self.records:
@@ -262,10 +260,10 @@ class Fit:
     def levels(self) -> list[Estimate | None]:
         """The level of u of each record: the constant that is no response to e, in the unit of u.
 
-        Estimated of recorded data; empty for simulated runs and with ``faults="keep"``, and where
+        Estimated of recorded data; empty for simulated runs and with ``faults="keep"``. None where
         the model has no static gain.
         """
-        return [None if pair is None else Estimate(*pair) for pair in self._levels]
+        return [None if pair is None else Estimate(*pair) for pair in self._native.levels]
 
     @property
     def remnant(self) -> Remnant | None:

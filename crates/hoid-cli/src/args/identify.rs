@@ -6,8 +6,7 @@ use clap::Args;
 use hoid::ident::{
     Focus, InitialState, IvMethod, SearchMethod, estimator_setting, estimators,
     order_selection::Criterion,
-    settings::Setting,
-    settings::{Kind, MethodSpec},
+    settings::{Kind, MethodSpec, Setting},
 };
 use hoid::io::{readable_endings, writable_endings};
 use hoid::model::{ContinuousTransferFunction, Form, Structure, remnant::RemnantDiscretisation};

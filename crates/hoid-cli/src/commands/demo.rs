@@ -76,19 +76,15 @@ fn tracked(record: &Record, stages: &[Stage]) -> Result<Vec<(String, Trace)>, Cl
         .into_iter()
         .map(|method| {
             let structure = method.usual_structure();
-            let told_nothing = method.starts_itself();
-            let options = if told_nothing {
-                TrackOptions::told_nothing(method.clone(), record.sample_time())
+            let (options, told) = if method.starts_itself() {
+                let options = TrackOptions::told_nothing(method.clone(), record.sample_time());
+                (options, "told nothing".to_owned())
             } else {
-                TrackOptions {
+                let options = TrackOptions {
                     start: StartAt::Span(Some((from, to))),
                     ..TrackOptions::new(method.clone(), structure, structure.operator_orders(nk))
-                }
-            };
-            let told = if told_nothing {
-                "told nothing".to_owned()
-            } else {
-                structure.label()
+                };
+                (options, structure.label())
             };
             Ok((format!("{}, {told}", method.name()), track(record, &options, 1)?))
         })

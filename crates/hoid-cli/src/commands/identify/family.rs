@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use hoid::analysis::{Identified, Reading, Recordings};
+use hoid::analysis::{Identified, Recordings};
 use hoid::ident::frequency::Description;
 use hoid::report::{
     ModelSection, Picture, Report,
@@ -22,19 +22,11 @@ use crate::{
     json, output,
 };
 
-pub fn run(args: &IdentifyArgs, reading: &Reading, read: Recordings) -> Result<(), CliError> {
+pub fn run(args: &IdentifyArgs, read: Recordings, other: Option<Recordings>) -> Result<(), CliError> {
     let identification = identification(args, estimate::operator(args)?);
-    // Read before anything is written: a bad validation file leaves nothing behind.
-    let other = args.validate.as_deref();
-    let other = other.map(|path| reading.file(path, reading::told)).transpose()?;
     let identified = output::watched("fitting", || identification.run(read))?;
-    let validation = other
-        .map(|other| {
-            let other = identified.alike(other)?;
-            let quality = identified.fit.operator(0).polynomial_fit.quality(&other.records)?;
-            Ok::<_, CliError>((other.names[0].clone(), quality))
-        })
-        .transpose()?;
+    let model = &identified.fit.operator(0).polynomial_fit;
+    let validation = other.map(|other| identified.validated(model, other)).transpose()?;
     let Identified {
         fit,
         data,
@@ -48,7 +40,7 @@ pub fn run(args: &IdentifyArgs, reading: &Reading, read: Recordings) -> Result<(
         records: &data.records,
         accounts: &data.accounts,
         element: args.controlled_element.as_ref(),
-        validation: validation.as_ref().map(|(name, quality)| (name.as_str(), *quality)),
+        validation: validation.as_ref().map(|v| (v.name.as_str(), v.quality)),
         settings: &reading::rows(settings),
     };
     if let Some(path) = &args.picture.figure {

@@ -54,7 +54,7 @@ pub fn run(args: &IdentifyArgs) -> Result<(), CliError> {
             let found = output::watched("fitting", || identification.run(read))?;
             show(args, &found, &found.fit.fit, found.fit.choice.as_ref(), None, other)
         }
-        ModelKind::Family => family::run(args, &reading, read),
+        ModelKind::Family => family::run(args, read, other),
     }
 }
 
@@ -68,12 +68,7 @@ fn show<F>(
     other: Option<Recordings>,
 ) -> Result<(), CliError> {
     let (data, verdict) = (&found.data, &found.verdict);
-    let validation = other
-        .map(|other| {
-            let other = found.alike(other)?;
-            Ok::<_, CliError>((other.names[0].clone(), fit.quality(&other.records)?))
-        })
-        .transpose()?;
+    let validation = other.map(|other| found.validated(fit, other)).transpose()?;
     let settings = reading::rows(found.settings.clone());
     let (records, with_input) = (&data.records, fit.model().structure().has_input());
     let operator = fit.operator();
@@ -104,7 +99,7 @@ fn show<F>(
         margins: margins.as_ref(),
         validations: &validations,
         ahead,
-        validation: validation.as_ref().map(|(file, q)| (file.as_str(), *q)),
+        validation: validation.as_ref().map(|v| (v.name.as_str(), v.quality)),
         settings: &settings,
     };
     let pictured = with_input && (args.report.is_some() || args.picture.figure.is_some());
