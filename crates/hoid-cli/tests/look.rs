@@ -97,8 +97,10 @@ fn one_file_has_one_reading() {
         let found = json(at, &[&command[..], &["--from", "3", "--to", "43", "--json"]].concat());
         assert_eq!(found["records"][0]["samples"], 2400, "{verb}");
     }
-    // What was typed wrongly is replaced.
-    let (_, message) = bad(at, &["identify", file, "--input=q", "--output", "u"]);
+    // What was typed is replaced; of another name a near one is looked for.
+    let (_, message) = bad(at, &["identify", file, "--input", "R"]);
+    assert!(message.contains("did you mean \"r\"?"), "{message}");
+    let (_, message) = bad(at, &["identify", file, "--input=e", "--output", "u"]);
     assert_eq!(
         shown(&message, "identify"),
         words("identify runs/A_so_1.csv --input r-y --output u")

@@ -153,7 +153,7 @@ fn wrong_usage_ends_with_two() {
         &["identify", "c1.csv", "--structure", "grey-box", "--nk", "29"],
         &["identify", "c1.csv", "--structure", "grey-box", "--orders", "nb=2"],
         &["identify", "c1.csv", "--structure", "bj", "--remnant-order", "1"],
-        &["identify", "c1.csv", "--structure", "bj", "--delay", "0.1..0.3"],
+        &["identify", "c1.csv", "--structure", "bj", "--delay", "0.3..0.1"],
         &["identify", "c1.csv", "--structure", "bj", "--form", "lead-lag"],
         &["identify", "c1.csv", "--remnant-order", "1", "--form", "lead-lag"],
         &["identify", "c1.csv", "--prior", "omega_nm=1"],

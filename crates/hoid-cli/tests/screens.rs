@@ -182,7 +182,8 @@ fn files_of_a_newcomer_are_read_or_answered_with_what_to_do() {
     });
 
     let (_, message) = bad(d, &["identify", "mine.csv"]);
-    assert!(message.contains("did you mean \"Tracking error\"?"), "{message}");
+    let command = "hoid identify mine.csv --input 'Tracking error' --output Stick";
+    assert!(message.contains(command), "{message}");
     let own = [
         "--input",
         "Tracking error",

@@ -26,18 +26,27 @@ pub struct Advice {
 }
 
 impl Look {
-    /// How the file is to be read; `None` where it is not certain which columns are error and control, or
-    /// they make no record.
+    /// How the file is to be read; `None` where it is not certain which columns are error and control. Of
+    /// one that makes no record yet the columns are known alone.
     pub fn advice(&self) -> Option<Advice> {
-        let seen = self.seen.as_ref().ok().filter(|_| self.roles.are_certain())?;
+        if !self.roles.are_certain() {
+            return None;
+        }
         // Both where one is not the usual: a command is easier to read with both.
         let (input, output) = (&self.roles.input, &self.roles.output);
         let usual = input.column == "e" && output.column == "u";
         let named = |role: &Role| (!usual).then(|| role.column.clone());
-        let (begin_s, end_s) = (seen.record.time_s(0), seen.record.time_s(seen.record.len()));
-        let periods = seen.periods.as_ref().ok();
-        let span = periods.map(|found| found.span_s);
-        let late = match &seen.lag {
+        let seen = self.seen.as_ref().ok();
+        let ends = seen.map(|seen| (seen.record.time_s(0), seen.record.time_s(seen.record.len())));
+        let periods = seen.and_then(|seen| seen.periods.as_ref().ok());
+        let (from_s, to_s) = match periods.map(|found| found.span_s).zip(ends) {
+            Some(((from_s, to_s), (begin_s, end_s))) => (
+                Some(from_s).filter(|t| *t != begin_s),
+                Some(to_s).filter(|t| *t != end_s),
+            ),
+            None => (self.known.from_s, self.known.to_s),
+        };
+        let late = match seen.and_then(|seen| seen.lag.as_ref()) {
             Some(Ok(lag)) => Some(lag.samples),
             _ => self.known.offset_samples,
         };
@@ -45,8 +54,8 @@ impl Look {
             input: named(input),
             output: named(output),
             sampling_hz: self.known.sampling_hz,
-            from_s: span.map_or(self.known.from_s, |span| Some(span.0).filter(|t| *t != begin_s)),
-            to_s: span.map_or(self.known.to_s, |span| Some(span.1).filter(|t| *t != end_s)),
+            from_s,
+            to_s,
             late_samples: late.filter(|samples| *samples != 0.0),
             excitation: periods
                 .map(|found| found.channel.clone())

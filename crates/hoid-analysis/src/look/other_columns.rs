@@ -69,8 +69,8 @@ impl OtherColumns {
     }
 }
 
-/// The columns that a file looks like it has, in place of those that were asked for; `None` where the error is
-/// another one, or that is not certain.
+/// The columns that a file has in place of e and u; `None` where the error is another one, or that is not
+/// certain.
 pub fn other_columns(error: &IoError, path: &Path, options: &ReadOptions) -> Option<OtherColumns> {
     let IoError::NoSuchColumn {
         file,
@@ -83,9 +83,16 @@ pub fn other_columns(error: &IoError, path: &Path, options: &ReadOptions) -> Opt
     };
     let found = survey(path).ok()?;
     let names = names(&found);
-    let kept = |column: &ColumnExpression| column.is_among(&names).then(|| column.to_string());
-    let input = options.input.as_ref().map(kept);
-    let output = kept(&options.output);
+    // Only the usual names stand for what is not known; another name was meant as it was typed.
+    let of = |column: &ColumnExpression, usual: &str| {
+        let found = column.is_among(&names).then(|| column.to_string());
+        (found.is_some() || column.to_string() == usual).then_some(found)
+    };
+    let input = match &options.input {
+        Some(column) => Some(of(column, "e")?),
+        None => None,
+    };
+    let output = of(&options.output, "u")?;
     let roles = Roles::of(&names, input.as_ref().and_then(Option::as_deref), output.as_deref());
     let certain = roles.output.certain && (roles.input.certain || input.is_none());
     certain.then(|| OtherColumns {

@@ -73,7 +73,14 @@ fn looks_like(look: &Look, file: &str) -> String {
         text.push_str(&format!("  {name:10}  {words}\n"));
     }
     text.push_str(&match look.advice() {
-        Some(advice) => format!("Next: {}\n", advice.command("identify", file)),
+        Some(advice) => {
+            let mended = if look.seen.is_ok() {
+                ""
+            } else {
+                ", with the remedy above"
+            };
+            format!("Next{mended}: {}\n", advice.command("identify", file))
+        }
         None => {
             "Next: hoid identify with the columns of error and control: --input COLUMN --output COLUMN\n".to_owned()
         }

@@ -1,0 +1,113 @@
+//! One look at a file, and what a reader is told by it.
+#![allow(clippy::unwrap_used)]
+
+use std::{f64::consts::TAU, fs, path::PathBuf};
+
+use hoid_analysis::{AnalysisError, Known, Look, Reading};
+use tempfile::TempDir;
+
+/// A target of period 10 s from 2 s to 22 s of 25 s, an output y = u/s by a control that is recorded a sample late.
+fn written(header: &str, columns: impl Fn(f64, f64, f64, f64) -> String) -> (TempDir, PathBuf) {
+    let (ts, n) = (0.02, 1250);
+    let sum = |t: f64, phase: f64| {
+        let of = |h: f64| (TAU * h * t / 10.0 + phase * h).sin();
+        [1.0, 3.0, 7.0, 12.0].map(of).iter().sum::<f64>()
+    };
+    let u: Vec<f64> = (0..n).map(|k| sum(k as f64 * ts, 1.3)).collect();
+    let mut y = vec![0.0; n];
+    for k in 1..n {
+        y[k] = y[k - 1] + ts * u[k - 1];
+    }
+    let mut text = format!("{header}\n");
+    for k in 0..n {
+        let t = k as f64 * ts;
+        let r = if (100..1100).contains(&k) { sum(t, 0.2) } else { 0.0 };
+        text.push_str(&columns(t, r, y[k], u[k.saturating_sub(1)]));
+        text.push('\n');
+    }
+    let directory = TempDir::new().unwrap();
+    let path = directory.path().join("run.csv");
+    fs::write(&path, text).unwrap();
+    (directory, path)
+}
+
+fn plain(t: f64, r: f64, y: f64, u: f64) -> String {
+    format!("{t},{r},{y},{u}")
+}
+
+#[test]
+fn a_file_is_seen_as_a_whole() {
+    let (_directory, path) = written("Time (s),Target,y,Stick [V]", plain);
+    let known = Known {
+        controlled_element: Some(("1/s".to_owned(), "1/s".parse().unwrap())),
+        ..Known::default()
+    };
+    let look = Look::at(&path, &known).unwrap();
+    assert_eq!(look.units(), [("Stick [V]", "V")]);
+    let seen = look.seen.as_ref().unwrap();
+    assert_eq!(seen.periods.as_ref().unwrap().span_s, (2.0, 22.0));
+    let lag = seen.lag.as_ref().unwrap().as_ref().unwrap();
+    assert_eq!((lag.samples, lag.seconds), (1.0, 0.02));
+    let advice = look.advice().unwrap();
+    assert_eq!(
+        advice.command("identify", "my run.csv"),
+        "hoid identify 'my run.csv' --input Target-y --output 'Stick [V]' --from 2 --to 22 --offset u=1 \
+         --excitation Target --controlled-element 1/s"
+    );
+    // What is known is not looked for.
+    let known = Known {
+        excitation: Some("none".to_owned()),
+        from_s: Some(5.0),
+        offset_samples: Some(0.0),
+        ..known
+    };
+    let look = Look::at(&path, &known).unwrap();
+    let advice = look.advice().unwrap();
+    assert_eq!(
+        (advice.from_s, advice.to_s, advice.late_samples),
+        (Some(5.0), None, None)
+    );
+    assert!(look.seen.unwrap().lag.is_none());
+}
+
+#[test]
+fn a_file_that_makes_no_record_has_columns_all_the_same() {
+    let (_directory, path) = written("t,r,y,u", |t, r, y, u| {
+        if (7.0..7.1).contains(&t) {
+            format!("{t},{r},,{u}")
+        } else {
+            plain(t, r, y, u)
+        }
+    });
+    let look = Look::at(&path, &Known::default()).unwrap();
+    assert!(look.seen.as_ref().unwrap_err().to_string().contains("--fill"));
+    assert_eq!(look.advice().unwrap().arguments(), ["--input", "r-y", "--output", "u"]);
+    fs::write(&path, "a,b\n1,2\n").unwrap();
+    assert!(Look::at(&path, &Known::default()).unwrap().advice().is_none());
+    fs::write(&path, "").unwrap();
+    assert!(Look::at(&path, &Known::default()).is_err());
+}
+
+#[test]
+fn a_reader_is_told_the_columns() {
+    let (_directory, path) = written("t,r,y,u", plain);
+    let refused = |reading: &Reading| reading.file(&path, |_, _| ()).unwrap_err();
+    let usual = Reading::default();
+    let AnalysisError::OtherColumns(others) = refused(&usual) else {
+        panic!("no other columns");
+    };
+    assert_eq!((others.input.as_deref(), others.output.as_str()), (Some("r-y"), "u"));
+    let words = others.to_string();
+    assert!(
+        words.ends_with("It looks like e = r-y and u = u: input=\"r-y\", output=\"u\""),
+        "{words}"
+    );
+    assert_eq!(
+        others.command(["track", "run.csv", "--input=e", "--output", "u", "--out", "t.csv"].map(str::to_owned)),
+        "hoid track run.csv --out t.csv --input r-y --output u"
+    );
+    // A name that was typed is meant.
+    let mut typed = Reading::default();
+    typed.options.output = "stick".parse().unwrap();
+    assert!(matches!(refused(&typed), AnalysisError::Io(_)));
+}
