@@ -19,7 +19,7 @@ use crate::{
 };
 
 /// How a model is identified from recordings: by default the operator of a person.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Identification<E = FamilyEstimator> {
     /// What is fitted, and how. Its excitation and period are those below.
     pub estimator: E,

@@ -20,6 +20,8 @@
 //! | what the recordings say | `identification`, `recordings` |
 //! | the level of u, the settings that all share | `level`, `settings` |
 //!
+//! Options come as fields, or by their names from texts: `options`.
+//!
 //! ```
 //! use hoid_analysis::{Identification, Recordings};
 //! use hoid_model::scenario::{Condition, Scenario};
@@ -41,6 +43,7 @@ mod files;
 mod identification;
 mod level;
 mod offset;
+mod options;
 mod prior;
 mod quality;
 mod rate;
@@ -54,6 +57,7 @@ pub use error::AnalysisError;
 pub use estimators::{BatchEstimator, Fitted, PolynomialFit, Polynomials};
 pub use identification::{Identification, Identified, identify};
 pub use offset::{late_samples, without_offsets};
+pub use options::Options;
 pub use prior::prior_of_text;
 pub use quality::findings_of_quality;
 pub use rate::kept_rate;

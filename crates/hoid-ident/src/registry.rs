@@ -233,6 +233,7 @@ fn delay() -> Setting {
         "Shortest and longest delay tau_e",
     )
     .unit("s")
+    .bounds(Bounds::NonNegative)
 }
 
 fn individual() -> Setting {

@@ -114,10 +114,7 @@ pub fn identify<'py>(
                 criterion: names::criterion(criterion)?,
                 start,
                 method: names::fit_method(method)?,
-                instruments: instruments.map(|text| match text.as_str() {
-                    "simulated" => Instruments::Simulated,
-                    _ => Instruments::External(text),
-                }),
+                instruments: instruments.as_deref().map(Instruments::of_text),
                 ..usual
             };
             let models = estimator.ranges(records[0].sample_time())?.combinations()?.len();

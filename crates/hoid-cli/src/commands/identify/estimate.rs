@@ -244,10 +244,7 @@ pub fn polynomials(args: &IdentifyArgs, structure: Structure) -> Result<Polynomi
         criterion: args.criterion,
         start: args.start.as_deref().map(orders::start).transpose()?,
         method: args.method,
-        instruments: args.instruments.as_deref().map(|text| match text {
-            "simulated" => Instruments::Simulated,
-            channel => Instruments::External(channel.to_owned()),
-        }),
+        instruments: args.instruments.as_deref().map(Instruments::of_text),
     })
 }
 
