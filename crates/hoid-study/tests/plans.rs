@@ -166,7 +166,7 @@ fn options_of_an_operator_are_checked() {
             18,
             "nc and nd of the noise alone",
         ),
-        ("method = \"operator\"\norders.nd = 25", 18, "0 to 24"),
+        ("method = \"operator\"\norders.nd = 25", 18, "within 0..24"),
         ("method = \"operator\"\norders.nd = \"4..1\"", 18, "as \"0..8\""),
         ("method = \"operator\"\nprior = \"fit.json\"", 18, "is a file"),
         ("method = \"operator\"\nprior = \"omega:2\"", 18, "NAME=CENTRE:SPREAD"),

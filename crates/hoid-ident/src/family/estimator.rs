@@ -117,7 +117,7 @@ impl FamilyEstimator {
                 ));
             }
             if *range.end() > HIGHEST_NOISE_ORDER {
-                return Err(refuse(format!("0 to {HIGHEST_NOISE_ORDER}")));
+                return Err(refuse(format!("a number or a range within 0..{HIGHEST_NOISE_ORDER}")));
             }
         }
         let nc = named.get("nc").cloned().unwrap_or(0..=0);
