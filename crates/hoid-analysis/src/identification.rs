@@ -6,7 +6,7 @@ use hoid_model::{ContinuousTransferFunction, Decimation, FaultHandling};
 use crate::description::Excitation;
 
 /// How a model is identified from recordings: by default the operator of a person.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Identification<E = FamilyEstimator> {
     /// What is fitted, and how. Its excitation and period are those below.
     pub estimator: E,

@@ -21,6 +21,8 @@
 //! | what the recordings say | `identified`, `recordings` |
 //! | the level of u, the settings that all share | `level`, `settings` |
 //!
+//! Options come as fields, or by their names from texts: `options`.
+//!
 //! ```
 //! use hoid_analysis::{Identification, Recordings};
 //! use hoid_model::scenario::{Condition, Scenario};
@@ -44,6 +46,7 @@ mod identified;
 mod level;
 mod look;
 mod offset;
+mod options;
 mod prior;
 mod quality;
 mod rate;
@@ -59,6 +62,7 @@ pub use identification::Identification;
 pub use identified::{Identified, Validated, identify};
 pub use look::{Advice, Known, Lag, Look, OtherColumns, Periods, Role, Roles, Seen, typed};
 pub use offset::{late_samples, without_offsets};
+pub use options::Options;
 pub use prior::prior_of_text;
 pub use quality::{findings_of_channels, findings_of_quality};
 pub use rate::kept_rate;

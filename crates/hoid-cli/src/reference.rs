@@ -36,7 +36,8 @@ fn options_page(methods: &[MethodSpec]) -> String {
                     recursive method is a flag of `hoid track` and `hoid stream` (with hyphens), a key of an estimator in a plan, and a keyword \
                     of `pyhoid.track` and `pyhoid.Tracker`. In a plan a range of times carries its unit (`track_delay_s`); in Python `lambda` \
                     is called `forgetting_factor`. An option of a batch estimator is a flag of `hoid identify` and a keyword of \
-                    `pyhoid.identify` (where `orders` of `family` are `nc` and `nd`).\n"
+                    `pyhoid.identify` (where `orders` of `family` are `nc` and `nd`). Options of `family` (which plans call `operator`), \
+                    `time-varying` and the instrumental-variable methods are keys of an estimator in a plan too.\n"
         .to_owned();
     for spec in methods.iter().chain(&estimators()) {
         let structures: Vec<&str> = spec.structures.iter().map(|structure| structure.name()).collect();

@@ -198,6 +198,71 @@ fn a_run_of_a_study_can_be_repeated_by_hand() {
     assert!((of_study - value).abs() < 1e-9, "{of_study} {value}");
 }
 
+/// A study has what `hoid identify` has of the same run in a file, digit for digit, verdict included.
+#[test]
+fn a_study_and_identify_give_the_same_answer() {
+    let directory = TempDir::new().unwrap();
+    let at = directory.path();
+    let plan = r#"
+name = "twins"
+seed = 3
+replications = 1
+[[scenarios]]
+condition = ["C1", "C4"]
+remnant.noise_level = 0.1
+[[estimators]]
+name = "operator"
+method = "operator"
+[[estimators]]
+name = "change"
+method = "operator"
+change = "sigmoid"
+[[estimators]]
+name = "SRIV"
+method = "sriv"
+"#;
+    fs::write(at.join("twins.toml"), plan).unwrap();
+    let said = good(at, &["study", "run", "twins.toml", "--out", "s", "--csv"]);
+    assert!(said.contains("trustworthy"), "{said}");
+    let table = hoid::io::read_table(&at.join("s/fits.csv")).unwrap();
+    let texts = |column: &str| match table.column(column) {
+        Some(hoid::io::ColumnValues::Text(values)) => values.clone(),
+        other => panic!("{column}: {other:?}"),
+    };
+    let (conditions, names, verdicts) = (texts("condition"), texts("name"), texts("verdict"));
+    for (cell, condition) in [("0", "C1"), ("1", "C4")] {
+        let simulate =
+            format!("simulate --condition {condition} --noise-level 0.1 --seed 3 --cell {cell} --out run.csv");
+        good(at, &simulate.split(' ').collect::<Vec<_>>());
+        for (name, options) in [
+            ("operator", "--prior none"),
+            ("change", "--structure time-varying"),
+            ("SRIV", "--method sriv --nk 29"),
+        ] {
+            let call = format!("identify run.csv --json {options}");
+            let out = Command::new(env!("CARGO_BIN_EXE_hoid"))
+                .args(call.split(' '))
+                .current_dir(at)
+                .output()
+                .unwrap();
+            let found: serde_json::Value = serde_json::from_slice(&out.stdout).unwrap();
+            let row = (0..names.len()).find(|row| conditions[*row] == condition && names[*row] == name);
+            let row = row.unwrap();
+            assert_eq!(found["verdict"]["level"], verdicts[row], "{condition} {name}");
+            let parameters = found["parameters"].as_array().unwrap();
+            assert!(parameters.len() > 3, "{condition} {name}");
+            for p in parameters {
+                let column = p["name"].as_str().unwrap();
+                let Some(hoid::io::ColumnValues::Real(of_study)) = table.column(column) else {
+                    panic!("no column {column}");
+                };
+                let (a, b) = (of_study[row], p["value"].as_f64().unwrap());
+                assert_eq!(a, b, "{condition} {name} {column}");
+            }
+        }
+    }
+}
+
 #[test]
 fn wrong_plans_and_names_are_refused() {
     let directory = TempDir::new().unwrap();

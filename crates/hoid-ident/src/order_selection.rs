@@ -36,6 +36,14 @@ pub struct OrderRanges {
 /// Orders by their names (na, nb, nc, nd, nf, nk), each with its range.
 pub type NamedOrders = BTreeMap<String, RangeInclusive<usize>>;
 
+/// A range as users write it.
+pub(crate) fn written(range: &RangeInclusive<usize>) -> String {
+    match (*range.start(), *range.end()) {
+        (low, high) if low == high => low.to_string(),
+        (low, high) => format!("{low}..{high}"),
+    }
+}
+
 impl From<Orders> for OrderRanges {
     fn from(o: Orders) -> Self {
         let one = |n: usize| n..=n;
@@ -56,8 +64,7 @@ impl fmt::Display for OrderRanges {
         for (name, range) in self.named() {
             match (*range.start(), *range.end()) {
                 (0, 0) if name != "nk" || *self.nb.end() == 0 => continue,
-                (low, high) if low == high => write!(f, "{separator}{name}={low}")?,
-                (low, high) => write!(f, "{separator}{name}={low}..{high}")?,
+                _ => write!(f, "{separator}{name}={}", written(range))?,
             }
             separator = ", ";
         }

@@ -235,6 +235,7 @@ fn delay() -> Setting {
         "Delay tau_e, or the shortest and the longest; of polynomials nk = tau_e/Ts + 1",
     )
     .unit("s")
+    .bounds(Bounds::NonNegative)
 }
 
 fn individual() -> Setting {

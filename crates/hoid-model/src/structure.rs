@@ -165,6 +165,18 @@ pub struct Orders {
 }
 
 impl Orders {
+    /// Each order with its name.
+    pub fn named(&self) -> [(&'static str, usize); 6] {
+        [
+            ("na", self.na),
+            ("nb", self.nb),
+            ("nc", self.nc),
+            ("nd", self.nd),
+            ("nf", self.nf),
+            ("nk", self.nk),
+        ]
+    }
+
     /// Number of coefficients, the length of theta.
     pub fn parameters(&self) -> usize {
         self.na + self.nb + self.nc + self.nd + self.nf
@@ -242,16 +254,10 @@ impl Orders {
 
 impl fmt::Display for Orders {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let all = [
-            ("na", self.na),
-            ("nb", self.nb),
-            ("nc", self.nc),
-            ("nd", self.nd),
-            ("nf", self.nf),
-        ];
-        let mut parts: Vec<String> = all
+        let mut parts: Vec<String> = self
+            .named()
             .iter()
-            .filter(|(_, n)| *n > 0)
+            .filter(|(name, n)| *n > 0 && *name != "nk")
             .map(|(name, n)| format!("{name}={n}"))
             .collect();
         // Without an input there is no delay.

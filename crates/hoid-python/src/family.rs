@@ -1,13 +1,13 @@
 //! `pyhoid.identify` by default: the operator of a person, of the family of operators.
 
-use std::ops::RangeInclusive;
+use std::collections::BTreeMap;
 
 use hoid_analysis::{Excitation, Identification, Identified, Recordings};
 use hoid_ident::{
     SearchOptions,
     family::{
-        AgreementMethod, ClusterKind, FamilyEstimator, FamilyFit, FormFigures, HIGHEST_NOISE_ORDER, LoopMeasures,
-        OperatorPrior, Parameter, ParameterPrior,
+        AgreementMethod, ClusterKind, FamilyEstimator, FamilyFit, FormFigures, LoopMeasures, OperatorPrior, Parameter,
+        ParameterPrior,
     },
 };
 use hoid_model::{FaultHandling, Form, operator_family::Coordinate, uncertainty::Estimate};
@@ -24,9 +24,6 @@ use crate::{
     fit::PyFit,
     interrupt, names,
 };
-
-/// Highest order nd that is searched by default beside a search of nc.
-const HIGHEST_BESIDE_NC: usize = 8;
 
 /// The operator of a person; the package wraps it in `pyhoid.OperatorFit`.
 #[pyclass(name = "OperatorFit", module = "pyhoid._pyhoid", frozen)]
@@ -117,7 +114,9 @@ pub fn identify_operator(
     // The order of the noise is chosen by Akaike's; a word that is none is wrong all the same.
     names::criterion(criterion)?;
     let records = arrays::records(&records, Wanted::All)?;
-    let usual = FamilyEstimator::default();
+    let mut named = BTreeMap::from([("nc".to_owned(), nc)]);
+    named.extend(nd.map(|nd| ("nd".to_owned(), nd)));
+    let usual = FamilyEstimator::default().with_noise_orders(&names::named_orders(&named)?)?;
     let estimator = FamilyEstimator {
         forms: match form {
             "auto" => usual.forms,
@@ -126,8 +125,6 @@ pub fn identify_operator(
         neuromuscular,
         prior: prior.prior()?,
         delay_range_s: delay.unwrap_or(usual.delay_range_s),
-        nd: noise_range(nc, nd)?,
-        nc: names::range("nc", nc)?,
         individual: individual.iter().map(|name| coordinate(name)).collect::<Outcome<_>>()?,
         run_to_run: run_to_run.unwrap_or(usual.run_to_run),
         initial_state: names::initial_state(initial_state)?.unwrap_or_default(),
@@ -159,15 +156,6 @@ pub fn identify_operator(
         asked,
         channel: described.and_then(|found| found.channel),
     })
-}
-
-/// An ARMA model is searched over few autoregressive orders.
-fn noise_range(nc: (usize, usize), nd: Option<(usize, usize)>) -> Outcome<RangeInclusive<usize>> {
-    match nd {
-        Some(ends) => names::range("nd", ends),
-        None if nc.1 > 0 => Ok(0..=HIGHEST_BESIDE_NC),
-        None => Ok(0..=HIGHEST_NOISE_ORDER),
-    }
 }
 
 fn coordinate(name: &str) -> Outcome<Coordinate> {

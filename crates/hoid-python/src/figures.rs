@@ -54,14 +54,7 @@ pub fn termination<'py>(py: Python<'py>, found: Termination) -> PyResult<Bound<'
 
 pub fn orders<'py>(py: Python<'py>, o: &Orders) -> PyResult<Bound<'py, PyDict>> {
     let all = PyDict::new(py);
-    for (name, value) in [
-        ("na", o.na),
-        ("nb", o.nb),
-        ("nc", o.nc),
-        ("nd", o.nd),
-        ("nf", o.nf),
-        ("nk", o.nk),
-    ] {
+    for (name, value) in o.named() {
         all.set_item(name, value)?;
     }
     Ok(all)

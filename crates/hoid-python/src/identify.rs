@@ -122,10 +122,7 @@ pub fn identify<'py>(
                 criterion: names::criterion(criterion)?,
                 start,
                 method: names::fit_method(method)?,
-                instruments: instruments.map(|text| match text.as_str() {
-                    "simulated" => Instruments::Simulated,
-                    _ => Instruments::External(text),
-                }),
+                instruments: instruments.as_deref().map(Instruments::of_text),
                 ..usual
             };
             let models = estimator.ranges(records[0].sample_time())?.combinations()?.len();
@@ -150,12 +147,7 @@ pub fn identify<'py>(
                      give \"auto\" or \"estimate\"",
                 ));
             }
-            let usual = SigmoidChange::default();
-            let nd = match orders.iter().next() {
-                None => usual.nd,
-                Some((name, (low, high))) if orders.len() == 1 && name == "nd" && low == high => *low,
-                Some(_) => return Err(bad_option("the time-varying fit takes only nd, a single number")),
-            };
+            let usual = SigmoidChange::default().with_noise_orders(&names::named_orders(&orders)?)?;
             let estimator = SigmoidChange {
                 form: match form.as_deref() {
                     None | Some("auto") => usual.form,
@@ -163,7 +155,6 @@ pub fn identify<'py>(
                 },
                 neuromuscular,
                 prior: prior.map_or(Ok(usual.prior.clone()), PriorOfUser::prior)?,
-                nd,
                 delay_range_s: delay.unwrap_or(usual.delay_range_s),
                 constraints,
                 search: search(usual.search),

@@ -1,5 +1,6 @@
 //! One block of a study: some replications of a cell, with all estimators of the cell.
 
+use hoid_analysis::{AnalysisError, Recordings};
 use hoid_ident::{Fit, IdentError};
 use hoid_model::Record;
 use hoid_sim::{RunSeed, Simulator};
@@ -9,7 +10,7 @@ use crate::{
     batch_fits::BatchFits,
     columns::Schemas,
     estimate_rows::{BlockTables, EstimateRows},
-    plan::{EstimatorCell, Plan, Task},
+    plan::{Analysis, EstimatorCell, Plan, Task},
     prepared::Preparation,
 };
 
@@ -175,6 +176,7 @@ impl<'a> CellRun<'a> {
                 self.rows.fit_row(estimator, grey.polynomial_fit(0), record, operator)?;
                 self.rows.termination(grey.termination());
             }
+            Task::Analysis(analysis) => self.analyse(analysis, record, estimator)?,
             Task::Track(options) => {
                 let kept = self.plan.trace_every.unwrap_or(ERRORS_EVERY);
                 let every = greatest_common_divisor(kept, ERRORS_EVERY);
@@ -185,6 +187,32 @@ impl<'a> CellRun<'a> {
                 if self.plan.trace_every.is_some() {
                     self.rows.trace_rows(&trace, kept / every, estimator, replication);
                 }
+            }
+        }
+        Ok(())
+    }
+
+    /// As `hoid identify` does it with the recording.
+    fn analyse(&mut self, analysis: &Analysis, record: &Record, estimator: &'a EstimatorCell) -> Result<(), String> {
+        let text = |error: AnalysisError| error.to_string();
+        let recording = Recordings::of_records([record.clone()]);
+        match analysis {
+            Analysis::Operator(how) => {
+                let found = how.run(recording).map_err(text)?;
+                self.rows.operator_row(&found)?;
+                self.rows.verdict(&found.verdict);
+            }
+            Analysis::Change(how) => {
+                let found = how.run(recording).map_err(text)?;
+                self.rows.change_row(&found)?;
+                self.rows.verdict(&found.verdict);
+            }
+            Analysis::Instrumental(how) => {
+                let found = how.run(recording).map_err(text)?;
+                let fit = &found.fit.fit;
+                let operator = fit.operator().map_err(|reason| reason.to_string());
+                self.rows.fit_row(estimator, fit, &found.data.records[0], operator)?;
+                self.rows.verdict(&found.verdict);
             }
         }
         Ok(())

@@ -2,7 +2,7 @@
 //!
 //! | table | a row is | columns |
 //! |---|---|---|
-//! | fits | one estimator on one replication | what was simulated and estimated; how it ended; theta, operator, remnant with standard errors; error measures |
+//! | fits | one estimator on one replication | what was simulated and estimated; how it ended, what it is worth; theta, operator, remnant with standard errors; error measures |
 //! | traces | one kept point of a recursion | cell, replication, estimator, t; theta and operator |
 //! | cells | one scenario of the grid | its settings and its true parameters |
 //!
@@ -13,7 +13,7 @@ use std::collections::BTreeMap;
 
 use hoid_io::{ColumnKind, ColumnSchema, ColumnValues, OutputColumn, OutputTable, TableSchema};
 
-use crate::plan::{Plan, Task};
+use crate::plan::{Analysis, Plan, Task};
 
 /// The operator's parameters, in the order of all tables.
 pub const OPERATOR: [&str; 5] = ["K_e", "T_L", "K_e_dot", "omega_nm", "zeta_nm"];
@@ -223,6 +223,10 @@ fn fits(plan: &Plan, theta: &[String], comments: Vec<String>) -> TableSchema {
     c.add(Whole, &["decimate"]);
     c.add(Real, &["from_s", "to_s"]);
     c.add(Text, &["status", "reason", "termination"]);
+    let analyses: Vec<&Analysis> = plan.estimators.iter().filter_map(|e| e.task.analysis()).collect();
+    if !analyses.is_empty() {
+        c.add(Text, &["verdict", "findings", "form"]);
+    }
     c.add(Whole, &["converged", "iterations"]);
     c.add(Real, &["loss", "innovation_variance", "vaf", "response_error"]);
     if plan.estimators.iter().any(|e| e.versus.is_some()) {
@@ -231,6 +235,12 @@ fn fits(plan: &Plan, theta: &[String], comments: Vec<String>) -> TableSchema {
     let mut estimated: Vec<&str> = theta.iter().map(String::as_str).collect();
     estimated.extend(OPERATOR);
     estimated.extend(["tau_e", "T_n", "K_n"]);
+    let of_analyses: Vec<String> = analyses.iter().flat_map(|analysis| analysis.parameters()).collect();
+    for name in &of_analyses {
+        if !estimated.contains(&name.as_str()) {
+            estimated.push(name);
+        }
+    }
     for name in &estimated {
         c.add(Real, &[name]);
         if plan.standard_errors {
@@ -238,6 +248,9 @@ fn fits(plan: &Plan, theta: &[String], comments: Vec<String>) -> TableSchema {
         }
     }
     c.add(Real, &["T_n_backward_euler", "K_n_backward_euler"]);
+    if analyses.iter().any(|analysis| matches!(analysis, Analysis::Change(_))) {
+        c.add(Real, &["change_found"]);
+    }
     if plan.estimators.iter().any(|e| matches!(e.task, Task::Track(_))) {
         for name in TRACED {
             c.add(

@@ -1,9 +1,10 @@
 //! The estimates of a cell as rows of the tables of fits and traces.
 
-use hoid_ident::{Fit, Termination};
+use hoid_analysis::Identified;
+use hoid_ident::{Fit, Series, SigmoidFit, Termination};
 use hoid_io::OutputTable;
 use hoid_model::{
-    Record,
+    NamedChoice, Record, Severity, Verdict,
     remnant::RemnantDiscretisation,
     remnant_gain::NoiseDefinition,
     scenario::RemnantStrength,
@@ -95,15 +96,7 @@ impl<'a> EstimateRows<'a> {
         rows.text("method", estimator.method());
         if let Some(structure) = estimator.structure() {
             rows.text("structure", structure.name());
-            let orders = estimator.orders(&cell.resolved);
-            for (name, n) in [
-                ("na", orders.na),
-                ("nb", orders.nb),
-                ("nc", orders.nc),
-                ("nd", orders.nd),
-                ("nf", orders.nf),
-                ("nk", orders.nk),
-            ] {
+            for (name, n) in estimator.orders(&cell.resolved).named() {
                 rows.real(name, n as f64);
             }
         }
@@ -154,8 +147,7 @@ impl<'a> EstimateRows<'a> {
         record: &Record,
         operator: Result<OperatorEstimate, String>,
     ) -> Result<(), String> {
-        let simulated = fit.simulate(record).map_err(|error| error.to_string())?;
-        let vaf = hoid_ident::validation::vaf(&record.output()[simulated.first..], &simulated.values);
+        let vaf = vaf(record, &fit.simulate(record).map_err(|error| error.to_string())?);
         let nk = fit.orders().nk;
         let other = estimator
             .versus
@@ -198,6 +190,69 @@ impl<'a> EstimateRows<'a> {
             }
         }
         Ok(())
+    }
+
+    /// The operator of a person.
+    pub fn operator_row(&mut self, found: &Identified) -> Result<(), String> {
+        let (fit, record) = (&found.fit, &found.data.records[0]);
+        let of = fit.operator(0);
+        let simulated = of.polynomial_fit.simulate(record).map_err(|error| error.to_string())?;
+        self.termination(fit.termination);
+        let rows = &mut self.fits;
+        rows.text("form", fit.form.name());
+        rows.real("nc", fit.noise_orders.0 as f64);
+        rows.real("nd", fit.noise_orders.1 as f64);
+        rows.real("loss", fit.loss);
+        rows.real("innovation_variance", fit.innovation_variance);
+        rows.real("vaf", vaf(record, &simulated));
+        if let Some(true_response) = &self.true_response {
+            rows.real("response_error", true_response.error_percent(&of.polynomial_fit));
+        }
+        // T_I of a pure integration is no number.
+        for p in of.parameters.iter().filter(|p| p.value.is_finite()) {
+            let estimate = Estimate {
+                value: p.value,
+                standard_error: p.standard_error,
+            };
+            set(rows, &p.name, estimate);
+        }
+        rows.text("status", "ok");
+        Ok(())
+    }
+
+    /// An operator whose gains change: each before (1) and after (2) the change.
+    pub fn change_row(&mut self, found: &Identified<SigmoidFit>) -> Result<(), String> {
+        let (fit, record) = (&found.fit, &found.data.records[0]);
+        let simulated = fit.simulate(record).map_err(|error| error.to_string())?;
+        self.termination(fit.termination());
+        let rows = &mut self.fits;
+        rows.text("form", fit.form().name());
+        rows.real("nd", fit.d().len() as f64);
+        rows.real("loss", fit.loss());
+        rows.real("innovation_variance", fit.innovation_variance());
+        rows.real("vaf", vaf(record, &simulated));
+        rows.real("change_found", f64::from(u8::from(fit.change_found())));
+        for (end, operator) in [(1, fit.initial_operator()), (2, fit.last_operator())] {
+            for p in &operator.parameters {
+                set(rows, &format!("{}{end}", p.name), p.estimate);
+            }
+        }
+        for p in fit.parameters() {
+            set(rows, &p.name, p.estimate);
+        }
+        rows.text("status", "ok");
+        Ok(())
+    }
+
+    /// What the estimate is worth, and the kinds of what speaks against it.
+    pub fn verdict(&mut self, verdict: &Verdict) {
+        let against = verdict
+            .findings()
+            .iter()
+            .filter(|finding| finding.severity > Severity::Note);
+        let kinds: Vec<&str> = against.map(|finding| finding.kind).collect();
+        self.fits.text("verdict", verdict.level.choice_name());
+        self.fits.text("findings", &kinds.join(", "));
     }
 
     pub fn track_row(&mut self, trace: &Trace, record: &Record) {
@@ -287,6 +342,11 @@ impl<'a> EstimateRows<'a> {
             }
         }
     }
+}
+
+/// Part of the output that a model simulates, %.
+fn vaf(record: &Record, simulated: &Series) -> f64 {
+    hoid_ident::validation::vaf(&record.output()[simulated.first..], &simulated.values)
 }
 
 fn set(rows: &mut Rows, name: &str, estimate: Estimate) {

@@ -1,10 +1,13 @@
 //! The true values of what is estimated.
 
-use hoid_model::remnant::{RemnantDiscretisation, RemnantFilter};
+use hoid_model::{
+    remnant::{RemnantDiscretisation, RemnantFilter},
+    schedule::Schedule,
+};
 
 use crate::{
     columns::OPERATOR,
-    plan::{Cell, EstimatorCell, Task},
+    plan::{Analysis, Cell, EstimatorCell, Task},
 };
 
 /// True value of a column of the table of fits, where it is known and does not change within the
@@ -16,7 +19,9 @@ pub fn true_value(cell: &Cell, estimator: &EstimatorCell, name: &str) -> f64 {
         Task::Track(_) => (scenario.measurement_s, scenario.measurement_s),
         _ => estimator.span_s.unwrap_or((0.0, scenario.measurement_s)),
     };
-    let close = |a: f64, b: f64| (a - b).abs() <= 1e-2 * a.abs().max(b.abs());
+    if let Some(Analysis::Change(_)) = estimator.task.analysis() {
+        return of_change(cell, name);
+    }
     let [first, last] = [from, to].map(|t| cell.resolved.parameters_at(t).operator);
     if !close(first.k_e, last.k_e) || !close(first.t_l_s, last.t_l_s) {
         return f64::NAN;
@@ -27,7 +32,9 @@ pub fn true_value(cell: &Cell, estimator: &EstimatorCell, name: &str) -> f64 {
     } else {
         after
     };
-    if let Some(i) = OPERATOR.iter().position(|p| *p == name) {
+    // Of a form that is not the lead K is the gain at rest too.
+    let named = if name == "K" { "K_e" } else { name };
+    if let Some(i) = OPERATOR.iter().position(|p| *p == named) {
         return state.operator[i];
     }
     let coefficient = match name {
@@ -47,10 +54,38 @@ pub fn true_value(cell: &Cell, estimator: &EstimatorCell, name: &str) -> f64 {
     state.discrete[coefficient]
 }
 
+fn close(a: f64, b: f64) -> bool {
+    (a - b).abs() <= 1e-2 * a.abs().max(b.abs())
+}
+
+/// Of an operator whose gains change: before (1) and after (2) the change, its instant and its rate.
+fn of_change(cell: &Cell, name: &str) -> f64 {
+    let scenario = cell.resolved.scenario();
+    let ends = cell.truth();
+    let constant = |of: [f64; 2]| if close(of[0], of[1]) { of[0] } else { f64::NAN };
+    let place = |parameter: &str| OPERATOR.iter().position(|p| *p == parameter);
+    let end = |digit| name.strip_suffix(digit).and_then(place);
+    match (name, &scenario.schedule) {
+        // Who changes there and back is not who is looked for.
+        (_, Schedule::Alternating { .. }) => f64::NAN,
+        ("t_M", schedule) => schedule.change_s().unwrap_or(f64::NAN),
+        ("G", schedule) => schedule.rate_per_s().unwrap_or(f64::NAN),
+        ("tau_e", _) => constant([scenario.initial.operator.tau_e_s, scenario.last.operator.tau_e_s]),
+        _ => match (end('1'), end('2'), place(name)) {
+            (Some(i), _, _) => ends[0].operator[i],
+            (_, Some(i), _) => ends[1].operator[i],
+            (_, _, Some(i)) => constant(ends.map(|end| end.operator[i])),
+            _ => f64::NAN,
+        },
+    }
+}
+
 /// Coefficients of D and the innovation variance of the remnant as it is held over each sample.
 fn of_noise_model(cell: &Cell, estimator: &EstimatorCell, k_n: f64, name: &str) -> f64 {
     let remnant = cell.resolved.scenario().remnant;
-    if estimator.decimate > 1 || !matches!(estimator.task, Task::Fit(_)) {
+    let by_polynomials =
+        matches!(estimator.task, Task::Fit(_)) || matches!(estimator.task.analysis(), Some(Analysis::Instrumental(_)));
+    if estimator.decimate > 1 || !by_polynomials {
         return f64::NAN;
     }
     let model = RemnantFilter::new(k_n, remnant.time_constant_s, remnant.order).and_then(|filter| {

@@ -128,6 +128,84 @@ fn bad_plans_name_line_and_remedy() {
     }
 }
 
+/// Options of what is run as `hoid identify` runs it: as the registry has them, checked before anything runs.
+#[test]
+fn options_of_an_operator_are_checked() {
+    let of = |text: &str| {
+        let text = GOOD.replace("method = \"rls\"\nmemory = 256", text);
+        Plan::parse(&text, "bad.toml")
+    };
+    for text in [
+        "method = \"operator\"",
+        "method = \"family\"\nform = [\"auto\", \"lead\"]\nprior = \"population\"\norders.nd = \"0..4\"",
+        "method = \"operator\"\nneuromuscular = \"no\"\nrun_to_run = 0.1\nperiod_s = 81.92\ntolerance = 1e-6",
+        "method = \"time-varying\"\nfix = { zeta_nm = 0.3 }\nbound = { T_L1 = \"0..2\" }\ndelay_range_s = [0.1, 0.4]",
+        "method = \"iv4\"\ninstruments = \"simulated\"\nmax_iterations = 9",
+    ] {
+        of(text).unwrap_or_else(|error| panic!("{text}: {error}"));
+    }
+    let change = |text: &str| of(text).unwrap().estimators.pop().unwrap().task;
+    assert_eq!(
+        change("method = \"time-varying\""),
+        change("method = \"operator\"\nchange = \"sigmoid\"")
+    );
+    for (text, line, words) in [
+        (
+            "method = \"operator\"\nform = \"lid\"",
+            18,
+            "form is lid, expected one of gain, lead",
+        ),
+        ("method = \"operator\"\nmemory = 256", 18, "memory has no effect here"),
+        (
+            "method = \"operator\"\nstructure = \"bj\"",
+            18,
+            "structure has no effect here",
+        ),
+        (
+            "method = \"operator\"\norders.nf = 2",
+            18,
+            "nc and nd of the noise alone",
+        ),
+        ("method = \"operator\"\norders.nd = 25", 18, "within 0..24"),
+        ("method = \"operator\"\norders.nd = \"4..1\"", 18, "as \"0..8\""),
+        ("method = \"operator\"\nprior = \"fit.json\"", 18, "is a file"),
+        ("method = \"operator\"\nprior = \"omega:2\"", 18, "NAME=CENTRE:SPREAD"),
+        ("method = \"operator\"\ndelay_s = [0.5, 0.1]", 18, "LO..HI"),
+        (
+            "method = \"time-varying\"\nchange = \"none\"",
+            18,
+            "leave one of them out",
+        ),
+        (
+            "method = \"time-varying\"\norders.nd = \"1..2\"",
+            18,
+            "a single number nd",
+        ),
+        (
+            "method = \"time-varying\"\nfix = { zeta = 0.3 }",
+            18,
+            "has zeta, expected one of K_e1",
+        ),
+        (
+            "method = \"sriv\"\nform = \"lead\"",
+            18,
+            "form has no effect here: it belongs to operator",
+        ),
+        (
+            "method = \"fit\"\nstructure = \"bj\"\norders.nd = \"1..2\"",
+            19,
+            "belongs to operator",
+        ),
+    ] {
+        let message = of(text).expect_err(text).to_string();
+        assert!(
+            message.starts_with(&format!("plan bad.toml, line {line}:")),
+            "{message}"
+        );
+        assert!(message.contains(words), "{text}: {message}");
+    }
+}
+
 #[test]
 fn a_plan_without_scenarios_or_estimators_says_so() {
     for key in ["scenarios", "estimators"] {

@@ -73,20 +73,51 @@ fn content(directory: &Path) -> BTreeMap<String, Vec<u8>> {
         .collect()
 }
 
-fn whole(jobs: usize) -> (tempfile::TempDir, BTreeMap<String, Vec<u8>>) {
+fn whole_of(plan: &Plan, jobs: usize) -> (tempfile::TempDir, BTreeMap<String, Vec<u8>>) {
     let directory = tempfile::tempdir().unwrap();
     let options = RunOptions {
         jobs: Some(jobs),
         ..RunOptions::default()
     };
-    assert!(quiet(&plan(), directory.path(), options).unwrap());
+    assert!(quiet(plan, directory.path(), options).unwrap());
     let found = content(directory.path());
     (directory, found)
 }
 
+fn whole(jobs: usize) -> (tempfile::TempDir, BTreeMap<String, Vec<u8>>) {
+    whole_of(&plan(), jobs)
+}
+
+/// The same bytes for any number of threads and shards.
+fn division_does_not_show(plan: &Plan, threads: &[usize], shards: &[u64]) -> BTreeMap<String, Vec<u8>> {
+    let (_one, expected) = whole_of(plan, 1);
+    for &jobs in threads {
+        assert!(whole_of(plan, jobs).1 == expected, "{jobs} threads");
+    }
+    for &of in shards {
+        let directory = tempfile::tempdir().unwrap();
+        let shards: Vec<PathBuf> = (1..=of)
+            .map(|index| {
+                let path = directory.path().join(index.to_string());
+                let options = RunOptions {
+                    shard: Some(Shard { index, of }),
+                    ..RunOptions::default()
+                };
+                assert!(quiet(plan, &path, options).unwrap());
+                path
+            })
+            .rev()
+            .collect();
+        let out = directory.path().join("all");
+        merge(&shards, &out, false).unwrap();
+        assert!(content(&out) == expected, "{of} shards");
+    }
+    expected
+}
+
 #[test]
 fn threads_and_shards_do_not_show() {
-    let (_one, expected) = whole(1);
+    let expected = division_does_not_show(&plan(), &[2, 7], &[1, 2, 7]);
     assert_eq!(
         expected.keys().collect::<Vec<_>>(),
         [
@@ -98,27 +129,33 @@ fn threads_and_shards_do_not_show() {
             "traces.parquet"
         ]
     );
-    for jobs in [2, 7] {
-        assert!(whole(jobs).1 == expected, "{jobs} threads");
-    }
-    for of in [1, 2, 7] {
-        let directory = tempfile::tempdir().unwrap();
-        let shards: Vec<PathBuf> = (1..=of)
-            .map(|index| {
-                let path = directory.path().join(index.to_string());
-                let options = RunOptions {
-                    shard: Some(Shard { index, of }),
-                    ..RunOptions::default()
-                };
-                assert!(quiet(&plan(), &path, options).unwrap());
-                path
-            })
-            .rev()
-            .collect();
-        let out = directory.path().join("all");
-        merge(&shards, &out, false).unwrap();
-        assert!(content(&out) == expected, "{of} shards");
-    }
+}
+
+#[test]
+fn threads_and_shards_do_not_show_in_verdicts() {
+    let text = r#"
+name = "verdicts"
+seed = 7
+replications = 3
+block = 1
+
+[[scenarios]]
+condition = "C4"
+remnant.noise_level = 0.1
+
+[[estimators]]
+name = "operator"
+method = "operator"
+
+[[estimators]]
+name = "change"
+method = "time-varying"
+
+[[estimators]]
+name = "SRIV"
+method = "sriv"
+"#;
+    division_does_not_show(&Plan::parse(text, "verdicts.toml").unwrap(), &[3], &[2]);
 }
 
 #[test]

@@ -12,7 +12,18 @@ use hoid::report::numbers;
 use crate::{error::CliError, text};
 
 /// Parameters that are shown, the first that the table has.
-const PARAMETERS: [&str; 7] = ["K_e", "K_over_T_I", "K", "T_L", "T_I", "omega_nm", "zeta_nm"];
+const PARAMETERS: [&str; 10] = [
+    "K_e",
+    "K_over_T_I",
+    "K",
+    "T_L",
+    "T_I",
+    "omega_nm",
+    "zeta_nm",
+    "K_e2",
+    "T_L2",
+    "t_M",
+];
 /// Columns of a screen that is 80 wide.
 const MOST_PARAMETERS: usize = 3;
 /// Rows of one screen.
@@ -28,11 +39,17 @@ pub fn answer(tables: &[PathBuf]) -> Result<String, CliError> {
 }
 
 /// One estimator in one cell.
+#[derive(Default)]
 struct Row {
     cell: String,
     estimator: String,
-    /// Estimates that are an operator, and all.
-    estimates: (f64, f64),
+    /// All estimates.
+    all: f64,
+    /// Rates of those that are no operator.
+    failed: f64,
+    not_convertible: f64,
+    /// Rate of those whose verdict is trustworthy, where there are verdicts.
+    trustworthy: Option<f64>,
     /// One a parameter, empty where there is none.
     biases: Vec<String>,
 }
@@ -43,18 +60,16 @@ fn words(summary: &OutputTable) -> String {
         texts(summary, "estimator"),
         texts(summary, "quantity"),
     );
-    let [count, missing, median, error] = ["count", "missing", "median", "median_se"].map(|name| reals(summary, name));
+    let [count, mean, median, error] = ["count", "mean", "median", "median_se"].map(|name| reals(summary, name));
+    let has = |what: &String| quantity.contains(what);
     let bias = |name: &str| format!("bias_{name}");
     let shown: Vec<&str> = PARAMETERS
         .into_iter()
-        .filter(|name| quantity.contains(&bias(name)))
+        .filter(|name| has(&bias(name)))
         .take(MOST_PARAMETERS)
         .collect();
     let mut rows: Vec<Row> = Vec::new();
     for i in 0..quantity.len() {
-        let Some(at) = shown.iter().position(|name| bias(name) == quantity[i]) else {
-            continue;
-        };
         let known = rows
             .iter()
             .position(|row| row.cell == cell[i] && row.estimator == estimator[i]);
@@ -62,23 +77,40 @@ fn words(summary: &OutputTable) -> String {
             rows.push(Row {
                 cell: cell[i].clone(),
                 estimator: estimator[i].clone(),
-                estimates: (count[i], count[i] + missing[i]),
                 biases: vec![String::new(); shown.len()],
+                ..Row::default()
             });
             rows.len() - 1
         });
-        let (value, error) = numbers::with_uncertainty(median[i], Some(error[i]));
-        rows[place].biases[at] = format!("{value} ± {error}");
+        let row = &mut rows[place];
+        match quantity[i].as_str() {
+            "failed" => (row.all, row.failed) = (count[i], mean[i]),
+            "not_convertible" => row.not_convertible = mean[i],
+            "trustworthy" => row.trustworthy = Some(mean[i]),
+            quantity => {
+                if let Some(at) = shown.iter().position(|name| bias(name) == quantity) {
+                    let (value, error) = numbers::with_uncertainty(median[i], Some(error[i]));
+                    row.biases[at] = format!("{value} ± {error}");
+                }
+            }
+        }
     }
+    rows.retain(|row| row.trustworthy.is_some() || row.biases.iter().any(|bias| !bias.is_empty()));
     if rows.is_empty() {
         return String::new();
     }
+    let verdicts = rows.iter().any(|row| row.trustworthy.is_some());
     let mut headings = vec!["cell", "estimator", "fits"];
+    headings.extend(verdicts.then_some("trustworthy"));
     headings.extend(&shown);
     let mut table = text::table(&headings);
     for row in rows.iter().take(MOST_ROWS) {
+        let of_all = |rate: f64| format!("{}/{}", (rate * row.all).round(), row.all);
         let mut cells = vec![row.cell.clone(), row.estimator.clone()];
-        cells.push(format!("{}/{}", row.estimates.0, row.estimates.1));
+        cells.push(of_all(1.0 - row.failed - row.not_convertible));
+        if verdicts {
+            cells.push(row.trustworthy.map(of_all).unwrap_or_default());
+        }
         cells.extend(row.biases.iter().cloned());
         table.add_row(cells);
     }
@@ -122,22 +154,43 @@ mod tests {
             values,
         };
         let names = |all: &[&str]| ColumnValues::Text(all.iter().map(|&one| one.to_owned()).collect());
+        let rows: [(u64, &str, &str, u64, [f64; 3]); 9] = [
+            (0, "ARX", "loss", 10, [0.0, 1.0, 0.1]),
+            (0, "ARX", "bias_K_e", 3, [0.0, 1.8, 1.4]),
+            (0, "ARX", "bias_T_L", 3, [0.0, -12.34, 2.1]),
+            (0, "ARX", "failed", 10, [0.1, f64::NAN, f64::NAN]),
+            (0, "ARX", "not_convertible", 10, [0.6, f64::NAN, f64::NAN]),
+            (1, "operator", "bias_K_e", 10, [0.0, 0.12, 0.48]),
+            (1, "operator", "failed", 10, [0.0, f64::NAN, f64::NAN]),
+            (1, "operator", "trustworthy", 10, [0.7, f64::NAN, f64::NAN]),
+            (1, "record", "failed", 10, [0.0, f64::NAN, f64::NAN]),
+        ];
+        let real = |which: usize| ColumnValues::Real(rows.iter().map(|row| row.4[which]).collect());
         let table = OutputTable {
             comments: Vec::new(),
             columns: vec![
-                column("cell", ColumnValues::Whole(vec![0, 0, 0, 1])),
-                column("estimator", names(&["ARX", "ARX", "ARX", "BJ"])),
-                column("quantity", names(&["loss", "bias_K_e", "bias_T_L", "bias_K_e"])),
-                column("count", ColumnValues::Whole(vec![10, 3, 3, 10])),
-                column("missing", ColumnValues::Whole(vec![0, 7, 7, 0])),
-                column("median", ColumnValues::Real(vec![1.0, 1.8, -12.34, 0.12])),
-                column("median_se", ColumnValues::Real(vec![0.1, 1.4, 2.1, 0.48])),
+                column("cell", ColumnValues::Whole(rows.iter().map(|row| row.0).collect())),
+                column("estimator", names(&rows.map(|row| row.1))),
+                column("quantity", names(&rows.map(|row| row.2))),
+                column("count", ColumnValues::Whole(rows.iter().map(|row| row.3).collect())),
+                column("mean", real(0)),
+                column("median", real(1)),
+                column("median_se", real(2)),
             ],
         };
         let words = words(&table);
-        for part in ["3/10", "1.8 ± 1.4", "-12.3 ± 2.1", "10/10", "0.12 ± 0.48", "fits"] {
+        for part in [
+            "3/10",
+            "1.8 ± 1.4",
+            "-12.3 ± 2.1",
+            "10/10",
+            "7/10",
+            "trustworthy",
+            "0.12 ± 0.48",
+            "fits",
+        ] {
             assert!(words.contains(part), "{part}: {words}");
         }
-        assert!(!words.contains("omega_nm"), "{words}");
+        assert!(!words.contains("omega_nm") && !words.contains("record"), "{words}");
     }
 }

@@ -20,11 +20,15 @@ use crate::{
     IdentError, InitialState, SearchOptions,
     criterion::{Data, Workspace},
     frequency::{DescribingFunction, DescriptionOptions, describe_runs},
-    informative_data, progress,
+    informative_data,
+    order_selection::{NamedOrders, written},
+    progress,
 };
 
 /// Highest order of the noise model.
 pub const HIGHEST_NOISE_ORDER: usize = 24;
+/// Highest nd that is searched beside an nc: an ARMA model needs few.
+const HIGHEST_BESIDE_NC: usize = 8;
 /// Most pairs (nc, nd) that are compared where there is an nc.
 const MOST_NOISE_PAIRS: usize = 60;
 
@@ -95,6 +99,36 @@ struct Start {
 }
 
 impl FamilyEstimator {
+    /// With orders nc and nd of the noise that are named; an nd that is not is searched, beside an nc from 0 to
+    /// 8.
+    ///
+    /// # Errors
+    /// [`IdentError::BadOption`] for another order, and for one that is too high.
+    pub fn with_noise_orders(self, named: &NamedOrders) -> Result<Self, IdentError> {
+        for (name, range) in named {
+            let refuse = |expected: String| IdentError::BadOption {
+                option: format!("order {name}"),
+                found: written(range),
+                expected,
+            };
+            if !matches!(name.as_str(), "nc" | "nd") {
+                return Err(refuse(
+                    "the orders nc and nd of the noise alone: the form says the others".to_owned(),
+                ));
+            }
+            if *range.end() > HIGHEST_NOISE_ORDER {
+                return Err(refuse(format!("a number or a range within 0..{HIGHEST_NOISE_ORDER}")));
+            }
+        }
+        let nc = named.get("nc").cloned().unwrap_or(0..=0);
+        let highest = match *nc.end() {
+            0 => HIGHEST_NOISE_ORDER,
+            _ => HIGHEST_BESIDE_NC,
+        };
+        let nd = named.get("nd").cloned().unwrap_or(0..=highest);
+        Ok(Self { nc, nd, ..self })
+    }
+
     /// Fits all records together.
     ///
     /// # Errors

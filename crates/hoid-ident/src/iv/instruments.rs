@@ -20,6 +20,14 @@ pub enum Instruments {
 }
 
 impl Instruments {
+    /// As users write them: `simulated`, or the name of a channel.
+    pub fn of_text(text: &str) -> Self {
+        match text {
+            "simulated" => Self::Simulated,
+            channel => Self::External(channel.to_owned()),
+        }
+    }
+
     /// The forcing function f_t where all records have it: in a closed loop it is the signal that
     /// the noise does not reach. Else those that are simulated.
     pub fn usual(records: &[Record]) -> Self {

@@ -19,6 +19,7 @@ use crate::{
     family::OperatorPrior,
     informative_data::{check_record, common_sample_time},
     level::without_level,
+    order_selection::{NamedOrders, written},
 };
 
 /// Lower minima that the walks along t_M and G may come upon before the fit is left at the last
@@ -82,6 +83,24 @@ impl Default for SigmoidChange {
 }
 
 impl SigmoidChange {
+    /// With an order nd of the noise that is named.
+    ///
+    /// # Errors
+    /// [`IdentError::BadOption`] for another order, and for a range.
+    pub fn with_noise_orders(self, named: &NamedOrders) -> Result<Self, IdentError> {
+        for (name, range) in named {
+            if name != "nd" || range.start() != range.end() {
+                return Err(IdentError::BadOption {
+                    option: format!("order {name}"),
+                    found: written(range),
+                    expected: "a single number nd of an operator that changes, as nd=2".to_owned(),
+                });
+            }
+        }
+        let nd = named.get("nd").map_or(self.nd, |nd| *nd.start());
+        Ok(Self { nd, ..self })
+    }
+
     /// Fits one change to all records: parameters and t_M in common (t_M on the time axis of each
     /// record), initial states of each.
     ///

@@ -58,6 +58,18 @@ pub struct NamedParameter {
     pub coordinate: Option<Coordinate>,
 }
 
+impl Form {
+    /// The parameters of an operator of this form, in the order of [`FamilyOperator::named`].
+    pub fn parameters(self, neuromuscular: bool) -> Vec<&'static str> {
+        let any = FamilyOperator {
+            form: self,
+            neuromuscular,
+            coordinates: vec![1.0; self.coordinates(neuromuscular).len()],
+        };
+        any.named().iter().map(|p| p.name).collect()
+    }
+}
+
 impl FamilyOperator {
     /// An operator with these coordinates, in the order of [`Form::coordinates`].
     ///

@@ -3,7 +3,7 @@
 //! ```toml
 //! [[estimators]]
 //! name = "BJ"
-//! method = "fit"                  # or "grey-box", "record", or a recursive method
+//! method = "fit"                  # or "operator", "grey-box", "sriv", "record", a recursive method ...
 //! structure = "bj"
 //! orders = { nd = [1, 2], nk = "true" }
 //! ```
@@ -14,12 +14,15 @@
 
 use std::collections::BTreeMap;
 
-use hoid_ident::{Estimator, GreyBox};
+use hoid_ident::{Estimator, GreyBox, IdentError};
 use hoid_model::{Detrend, Orders, SampleTime, Structure, scenario::ResolvedScenario};
 use hoid_track::{Method, StartAt, TrackOptions};
 
 use super::{
-    estimator_table::{EstimatorTable, FIT, GREY_BOX, OfScenario, Order, OrdersTable, RECORD, StartValue},
+    analysis::Analysis,
+    estimator_table::{
+        EstimatorTable, FIT, GREY_BOX, OfScenario, Order, OrdersTable, RECORD, StartValue, what_is_done,
+    },
     grid::{Axis, Variant},
     problem::PlanProblem,
 };
@@ -60,8 +63,20 @@ pub enum Task {
     Fit(Box<Estimator>),
     /// The operator's parameters are fitted.
     GreyBox(Box<GreyBox>),
+    /// What is done as `hoid identify` does it, verdict included.
+    Analysis(Box<Analysis>),
     /// The operator is tracked.
     Track(Box<TrackOptions>),
+}
+
+impl Task {
+    /// What is done as `hoid identify` does it; none of the others.
+    pub(crate) fn analysis(&self) -> Option<&Analysis> {
+        match self {
+            Self::Analysis(analysis) => Some(analysis),
+            _ => None,
+        }
+    }
 }
 
 impl EstimatorCell {
@@ -71,8 +86,10 @@ impl EstimatorCell {
             line: variant.line_of_key(key).or_else(|| variant.lines.first().copied()),
             reason: format!("{key} {reason}"),
         };
+        let analysis = table.analysis(&at)?;
         let method = match table.method.as_str() {
             FIT | GREY_BOX | RECORD => None,
+            _ if analysis.is_some() => None,
             name => Some(name.parse::<Method>().map_err(|_| at("method", unknown_method(name)))?),
         };
         let structure = match &table.structure {
@@ -81,7 +98,9 @@ impl EstimatorCell {
                 .parse::<Structure>()
                 .map_err(|error| at("structure", format!("is wrong: {error}")))?,
         };
-        table.check_placement(method.as_ref(), &at)?;
+        if analysis.is_none() {
+            table.check_placement(method.as_ref(), None, &at)?;
+        }
         if table.method == FIT && table.structure.is_none() {
             return Err(at(
                 "structure",
@@ -120,6 +139,7 @@ impl EstimatorCell {
         let task = match (table.method.as_str(), method) {
             (RECORD, _) => Task::Describe,
             (GREY_BOX, _) => Task::GreyBox(Box::new(table.grey_box(&at)?)),
+            _ if let Some(analysis) = analysis => Task::Analysis(Box::new(analysis)),
             (_, Some(method)) => Task::Track(Box::new(table.track(method, structure, &at)?)),
             _ => Task::Fit(Box::new(table.fit(structure))),
         };
@@ -149,12 +169,13 @@ impl EstimatorCell {
             .is_none_or(|names| names.iter().any(|n| n == scenario))
     }
 
-    /// The structure; none where the record itself is described.
+    /// The polynomial structure; none of an operator, and where the record itself is described.
     pub fn structure(&self) -> Option<Structure> {
         match &self.task {
             Task::Describe => None,
             Task::Fit(estimator) => Some(estimator.structure),
             Task::GreyBox(_) => Some(Structure::BoxJenkins),
+            Task::Analysis(analysis) => analysis.structure(),
             Task::Track(options) => Some(options.structure),
         }
     }
@@ -165,6 +186,7 @@ impl EstimatorCell {
             Task::Describe => RECORD,
             Task::Fit(_) => FIT,
             Task::GreyBox(_) => GREY_BOX,
+            Task::Analysis(analysis) => analysis.name(),
             Task::Track(options) => options.method.name(),
         }
     }
@@ -179,7 +201,7 @@ impl EstimatorCell {
         // for b0 and those after it.
         let delay = (scenario.scenario().initial.operator.tau_e_s / ts + 1e-9).floor() as usize;
         let of = |order: Option<Order>, usual: usize, simulated: usize| match order {
-            None => usual,
+            None | Some(Order::Range(_)) => usual,
             Some(Order::Number(n)) => n,
             Some(Order::Scenario(OfScenario::True)) => simulated,
             Some(Order::Scenario(OfScenario::Ramp)) => simulated.saturating_sub(1),
@@ -192,7 +214,7 @@ impl EstimatorCell {
         Orders {
             na: table.na.unwrap_or(usual.na),
             nb: table.nb.unwrap_or(usual.nb),
-            nc: table.nc.unwrap_or(usual.nc),
+            nc: of(table.nc, usual.nc, 0),
             nd: of(table.nd, nd, scenario.scenario().remnant.order),
             nf: table.nf.unwrap_or(usual.nf),
             nk: of(table.nk, usual.nk, delay + 1),
@@ -225,6 +247,12 @@ impl EstimatorCell {
                 estimator.start = self.theta(&orders);
             }
             Task::GreyBox(grey) => grey.order = orders.nd..=orders.nd,
+            Task::Analysis(analysis) => {
+                // Checked with the plan.
+                if let Ok(of_scenario) = self.with_orders(analysis, scenario) {
+                    **analysis = of_scenario;
+                }
+            }
             Task::Track(options) => {
                 options.orders = orders;
                 if let Some(theta) = self.theta(&orders) {
@@ -235,11 +263,25 @@ impl EstimatorCell {
         task
     }
 
+    fn with_orders(&self, analysis: &Analysis, scenario: &ResolvedScenario) -> Result<Analysis, IdentError> {
+        let noise = self.orders.of_noise(scenario.scenario().remnant.order);
+        analysis.clone().with_orders(&noise, &self.orders(scenario))
+    }
+
     /// Checks orders, start and options against a scenario: the key and what is wrong with it.
     pub(crate) fn check(&self, scenario: &ResolvedScenario) -> Result<(), (&'static str, String)> {
         let orders = self.orders(scenario);
         if let Some(structure) = self.structure() {
             orders.check(structure).map_err(|error| ("orders", error.to_string()))?;
+        }
+        if let Task::Analysis(analysis) = &self.task {
+            let analysis = self
+                .with_orders(analysis, scenario)
+                .map_err(|error| ("orders", error.to_string()))?;
+            if let Some((name, known)) = analysis.unknown_parameter() {
+                let reason = format!("fix or bound has {name}, expected one of {}", known.join(", "));
+                return Err(("fix", reason));
+            }
         }
         let names = orders.parameter_names();
         if let Some(name) = self.start_values.keys().find(|name| !names.contains(name)) {
@@ -292,7 +334,5 @@ impl EstimatorCell {
 }
 
 fn unknown_method(name: &str) -> String {
-    let methods = Method::registry().into_iter().map(|spec| spec.name);
-    let known: Vec<&str> = [FIT, GREY_BOX, RECORD].into_iter().chain(methods).collect();
-    format!("is {name:?}, expected one of {}", known.join(", "))
+    format!("is {name:?}, expected one of {}", what_is_done().join(", "))
 }

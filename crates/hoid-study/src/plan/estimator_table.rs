@@ -2,38 +2,64 @@
 
 use std::collections::BTreeMap;
 
+use hoid_analysis::AnalysisError;
 use hoid_ident::{
-    Estimator, GreyBox, IdentError, InitialState, SearchOptions,
-    settings::{Kind, Setting},
+    Estimator, GreyBox, IdentError, InitialState, NamedOrders, SearchOptions, estimator_setting,
+    settings::{Kind, MethodSpec, Setting},
 };
 use hoid_model::{Detrend, NamedChoice, Orders, Structure};
 use hoid_track::{Method, StartAt, TrackOptions};
 use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer, de::Error as _};
 
-use super::problem::PlanProblem;
+use super::{analysis, analysis::Analysis, problem::PlanProblem};
 
 /// Keys that want a list or a table as it stands.
 pub fn whole_keys() -> Vec<String> {
-    let fixed = ["scenarios", "span_s", "start_span_s", "delay_range_s"].map(str::to_owned);
-    let settings = Method::registry().into_iter().flat_map(|spec| spec.settings);
+    let fixed = ["scenarios", "span_s", "start_span_s", "delay_s", "delay_range_s"].map(str::to_owned);
+    let settings = methods().into_iter().flat_map(|spec| spec.settings);
     let spans = settings
         .filter(|setting| setting.kind == Kind::Span)
         .map(|setting| plan_key(&setting));
     fixed.into_iter().chain(spans).collect()
 }
 
+/// The recursive methods, and what is run as `hoid identify` runs it, with their options.
+pub(super) fn methods() -> Vec<MethodSpec> {
+    [Method::registry(), analysis::methods()].concat()
+}
+
 /// A whole number, or `"true"` for that of the scenario.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(
     untagged,
-    expecting = "an order is a whole number from 0 on, \"true\" (nk, nd) or \"ramp\" (nk)"
+    expecting = "an order is a whole number from 0 on, \"true\" (nk, nd), \"ramp\" (nk) or a range as \"0..8\" (nc, nd of operator)"
 )]
 pub(crate) enum Order {
     /// This one.
     Number(usize),
     /// That of the scenario.
     Scenario(OfScenario),
+    /// One of a range, LO..HI.
+    Range(#[schemars(with = "String")] OrderRange),
+}
+
+/// Orders from the first to the last.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[serde(try_from = "String")]
+pub(crate) struct OrderRange(usize, usize);
+
+impl TryFrom<String> for OrderRange {
+    type Error = &'static str;
+
+    fn try_from(text: String) -> Result<Self, Self::Error> {
+        let number = |part: &str| part.trim().parse::<usize>().ok();
+        let ends = text.split_once("..").and_then(|(a, b)| Some((number(a)?, number(b)?)));
+        match ends {
+            Some((low, high)) if low <= high => Ok(Self(low, high)),
+            _ => Err("expected a range as 0..8"),
+        }
+    }
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
@@ -52,13 +78,49 @@ pub(crate) enum OfScenario {
 pub(crate) struct OrdersTable {
     pub na: Option<usize>,
     pub nb: Option<usize>,
-    pub nc: Option<usize>,
-    /// Order of D, or "true" for the order of the simulated remnant.
+    /// Order of C; of operator also a range.
+    pub nc: Option<Order>,
+    /// Order of D, or "true" for the order of the simulated remnant; of operator also a range.
     pub nd: Option<Order>,
     pub nf: Option<usize>,
     /// Delay in samples, or "true" for that of the simulated operator (its default), or "ramp" for
     /// one less.
     pub nk: Option<Order>,
+}
+
+impl OrdersTable {
+    /// True where an order is a range.
+    fn has_range(&self) -> bool {
+        [self.nc, self.nd, self.nk]
+            .into_iter()
+            .flatten()
+            .any(|order| matches!(order, Order::Range(_)))
+    }
+
+    /// All that are given, for an estimator with orders of its noise alone.
+    pub(super) fn of_noise(&self, remnant_order: usize) -> NamedOrders {
+        let numbers = [("na", self.na), ("nb", self.nb), ("nf", self.nf)];
+        let numbers = numbers.map(|(name, n)| (name, n.map(Order::Number)));
+        let all = numbers
+            .into_iter()
+            .chain([("nc", self.nc), ("nd", self.nd), ("nk", self.nk)]);
+        let range = |name: &str, order: Order| match order {
+            Order::Number(n) => n..=n,
+            Order::Range(OrderRange(low, high)) => low..=high,
+            Order::Scenario(_) if name == "nd" => remnant_order..=remnant_order,
+            Order::Scenario(_) => 0..=0,
+        };
+        all.filter_map(|(name, order)| Some((name.to_owned(), range(name, order?))))
+            .collect()
+    }
+}
+
+/// Whether what is estimated changes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub(super) enum Change {
+    None,
+    Sigmoid,
 }
 
 /// What is estimated from each record, and how. Each value may be a list, which makes it an axis of
@@ -100,13 +162,16 @@ pub(crate) struct EstimatorTable {
     pub(super) starts: Option<usize>,
     /// Most iterations of a search. Default 100.
     pub(super) max_iterations: Option<usize>,
-    /// Range of the delay of the grey box, s. Default 0.05 to 0.6.
-    pub(super) delay_range_s: Option<(f64, f64)>,
+    /// Shortest and longest delay tau_e of an operator, s. Default 0.05 to 0.6, of operator 0.02 to 0.8.
+    #[serde(alias = "delay_range_s")]
+    pub(super) delay_s: Option<(f64, f64)>,
+    /// How the gains of an operator change. Default: none.
+    pub(super) change: Option<Change>,
     /// Span of the start fit of a recursion, s. Default: the first third.
     pub(super) start_span_s: Option<(f64, f64)>,
     /// Time from which a recursion moves its estimate, s.
     pub(super) update_from_s: Option<f64>,
-    /// Options of the recursive method, as the registry of methods has them.
+    /// Options of the method, as the registries of methods and estimators have them.
     #[serde(flatten)]
     #[schemars(skip)]
     pub(super) settings: BTreeMap<String, toml::Value>,
@@ -127,9 +192,11 @@ impl EstimatorTable {
     pub(super) fn check_placement(
         &self,
         method: Option<&Method>,
+        analysis: Option<&Analysis>,
         at: &impl Fn(&str, String) -> PlanProblem,
     ) -> Result<(), PlanProblem> {
         let (fits, grey_box) = (self.method == FIT, self.method == GREY_BOX);
+        let operator = analysis.is_some_and(|analysis| analysis.structure().is_none());
         let tracks = method.is_some();
         // A window is no recursion that starts from coefficients or waits.
         let moves = method.is_some_and(|method| !matches!(method, Method::Window(_)));
@@ -142,7 +209,12 @@ impl EstimatorTable {
                 fits || tracks,
                 "fit and the recursive methods",
             ),
-            ("initial_state", self.initial_state.is_some(), fits || grey_box, both),
+            (
+                "initial_state",
+                self.initial_state.is_some(),
+                fits || grey_box || operator,
+                "fit, grey-box and operator",
+            ),
             (
                 "start",
                 self.start.is_some(),
@@ -157,7 +229,14 @@ impl EstimatorTable {
                 "methods that search",
             ),
             ("versus", self.versus.is_some(), fits || grey_box, both),
-            ("delay_range_s", self.delay_range_s.is_some(), grey_box, "grey-box"),
+            (
+                "delay_s",
+                self.delay_s.is_some(),
+                grey_box || operator,
+                "grey-box and operator",
+            ),
+            ("change", self.change.is_some(), operator, "operator"),
+            ("orders", self.orders.has_range(), operator, "operator, as a range"),
             ("start_span_s", self.start_span_s.is_some(), tracks, recursive),
             ("update_from_s", self.update_from_s.is_some(), moves, recursive),
         ];
@@ -172,16 +251,14 @@ impl EstimatorTable {
                 "and memory are both given: leave one of them out".to_owned(),
             ));
         }
-        if let (None, Some(key)) = (method, self.settings.keys().next()) {
-            let of = methods_with(key);
+        if let (None, None, Some(key)) = (method, analysis, self.settings.keys().next()) {
+            return Err(at(key, misplaced(key)));
+        }
+        if self.method == analysis::TIME_VARYING && self.change == Some(Change::None) {
             return Err(at(
-                key,
-                match of.as_slice() {
-                    [] => {
-                        "is unknown; the book has the keys of an estimator on its page Monte Carlo studies".to_owned()
-                    }
-                    of => format!("has no effect here: it belongs to {}", of.join(", ")),
-                },
+                "change",
+                "is none, and method time-varying is operator with change = \"sigmoid\": leave one of them out"
+                    .to_owned(),
             ));
         }
         if self.start.is_some() && self.start_span_s.is_some() {
@@ -213,10 +290,10 @@ impl EstimatorTable {
 
     pub(super) fn grey_box(&self, at: &impl Fn(&str, String) -> PlanProblem) -> Result<GreyBox, PlanProblem> {
         let usual = GreyBox::new(1..=1);
-        let range = self.delay_range_s.unwrap_or(usual.delay_range_s);
+        let range = self.delay_s.unwrap_or(usual.delay_range_s);
         if !(range.0 > 0.0 && range.0 < range.1 && range.1.is_finite()) {
             return Err(at(
-                "delay_range_s",
+                "delay_s",
                 format!("is {range:?}, expected two positive times, the smaller first"),
             ));
         }
@@ -227,6 +304,63 @@ impl EstimatorTable {
             starts: self.starts.unwrap_or(usual.starts),
             ..usual
         })
+    }
+
+    /// What is run as `hoid identify` runs it, with the options of the table but its orders; `None` for another
+    /// method.
+    pub(super) fn analysis(&self, at: &impl Fn(&str, String) -> PlanProblem) -> Result<Option<Analysis>, PlanProblem> {
+        let changes = self.change == Some(Change::Sigmoid);
+        let Some(mut analysis) = Analysis::of_method(&self.method, changes) else {
+            return Ok(None);
+        };
+        self.check_placement(None, Some(&analysis), at)?;
+        let settings = analysis::methods()
+            .into_iter()
+            .find(|spec| spec.name == analysis.name());
+        let mut left = self.settings.clone();
+        let mut given: Vec<(Setting, String, String)> = Vec::new();
+        for setting in settings.into_iter().flat_map(|spec| spec.settings) {
+            let key = plan_key(&setting);
+            if let Some(value) = left.remove(&key) {
+                let text = text_of(&value, setting.kind).map_err(|reason| at(&key, reason))?;
+                given.push((setting, key, text));
+            }
+        }
+        if let Some(key) = left.keys().next() {
+            return Err(at(key, misplaced(key)));
+        }
+        for (name, key, text) in [
+            (
+                "delay",
+                "delay_s",
+                self.delay_s.map(|(low, high)| format!("{low}..{high}")),
+            ),
+            (
+                "initial_state",
+                "initial_state",
+                self.initial_state.map(|rule| rule.name().to_owned()),
+            ),
+            (
+                "max_iterations",
+                "max_iterations",
+                self.max_iterations.map(|n| n.to_string()),
+            ),
+        ] {
+            let setting = estimator_setting(name).zip(text);
+            given.extend(setting.map(|(setting, text)| (setting, key.to_owned(), text)));
+        }
+        for (setting, key, text) in given {
+            let set = analysis.set(&setting, &text);
+            let known = set.map_err(|error| match error {
+                AnalysisError::Ident(error) => at(&key, in_plan(&error)),
+                AnalysisError::Prior { reason } => at(&key, format!("is wrong: {reason}")),
+                other => at(&key, format!("is wrong: {other}")),
+            })?;
+            if !known {
+                return Err(at(&key, misplaced(&key)));
+            }
+        }
+        Ok(Some(analysis))
     }
 
     /// The method with the options of the table.
@@ -245,11 +379,6 @@ impl EstimatorTable {
                 continue;
             };
             let text = text_of(value, setting.kind).map_err(|reason| at(&key, reason))?;
-            if setting.kind == Kind::Prior && hoid_io::is_fit_file(&text) {
-                let reason =
-                    "is a file, and a plan holds all that it needs; name the parameters, as \"omega_nm=9:0.2\"";
-                return Err(at(&key, reason.to_owned()));
-            }
             if !method.settings().list().iter().any(|own| own.name == setting.name) {
                 let of = methods_with(&key).join(", ");
                 return Err(at(&key, format!("has no effect here: it belongs to {of}")));
@@ -275,9 +404,13 @@ pub(super) const FIT: &str = "fit";
 pub(super) const GREY_BOX: &str = "grey-box";
 pub(super) const RECORD: &str = "record";
 
-fn what_is_done() -> Vec<&'static str> {
-    let methods = Method::registry().into_iter().map(|spec| spec.name);
-    [FIT, GREY_BOX, RECORD].into_iter().chain(methods).collect()
+/// All words for `method`, the default of `hoid identify` first.
+pub(super) fn what_is_done() -> Vec<&'static str> {
+    let analysed = analysis::methods().into_iter().map(|spec| spec.name);
+    let (first, others): (Vec<_>, Vec<_>) = analysed.partition(|name| *name == analysis::OPERATOR);
+    let recursive = Method::registry().into_iter().map(|spec| spec.name);
+    let own = [FIT, GREY_BOX, RECORD];
+    first.into_iter().chain(own).chain(others).chain(recursive).collect()
 }
 
 fn structure_names() -> Vec<&'static str> {
@@ -296,6 +429,10 @@ pub(super) fn plan_key(setting: &Setting) -> String {
 fn text_of(value: &toml::Value, kind: Kind) -> Result<String, String> {
     let wrong = || format!("is {value}, expected {}", in_words(kind));
     Ok(match (value, kind) {
+        (toml::Value::String(text), Kind::Prior) if hoid_io::is_fit_file(text) => {
+            let reason = "is a file, and a plan holds all that it needs; name the parameters, as \"omega_nm=9:0.2\"";
+            return Err(reason.to_owned());
+        }
         (toml::Value::String(text), _) => text.clone(),
         (toml::Value::Integer(n), _) => n.to_string(),
         (toml::Value::Float(x), _) => x.to_string(),
@@ -339,9 +476,17 @@ fn in_plan(error: &IdentError) -> String {
 
 /// The methods that have an option of this key.
 fn methods_with(key: &str) -> Vec<&'static str> {
-    let all = Method::registry().into_iter();
+    let all = methods().into_iter();
     let with = all.filter(|spec| spec.settings.iter().any(|setting| plan_key(setting) == key));
     with.map(|spec| spec.name).collect()
+}
+
+/// What is wrong with a key that the method does not have.
+fn misplaced(key: &str) -> String {
+    match methods_with(key).as_slice() {
+        [] => "is unknown; the book has the keys of an estimator on its page Monte Carlo studies".to_owned(),
+        of => format!("has no effect here: it belongs to {}", of.join(", ")),
+    }
 }
 
 fn unknown_key(method: &Method) -> String {

@@ -24,6 +24,7 @@
 //! axis slowest. The remnant of replication r in cell c is the random stream (seed, c, r), the same
 //! for all estimators. A cell without remnant is run once: all its replications are the same.
 
+mod analysis;
 mod document;
 mod estimator;
 mod estimator_table;
@@ -32,6 +33,7 @@ mod head;
 mod problem;
 mod schema;
 
+pub use analysis::Analysis;
 pub use document::{Cell, Plan};
 pub use estimator::{EstimatorCell, Task};
 pub use grid::Axis;

@@ -4,18 +4,17 @@
 //! single value may also be a list.
 
 use hoid_ident::settings::{Kind, MethodSpec};
-use hoid_track::Method;
 use schemars::{SchemaGenerator, generate::SchemaSettings};
 use serde_json::{Map, Value, json};
 
 use super::{
-    estimator_table::{EstimatorTable, plan_key, whole_keys},
+    estimator_table::{EstimatorTable, methods, plan_key, whole_keys},
     head::Head,
 };
 
 /// The schema (draft 2020-12) as text.
 pub fn plan_schema() -> String {
-    plan_schema_of(&Method::registry())
+    plan_schema_of(&methods())
 }
 
 /// The schema with the options of these methods.
@@ -49,7 +48,7 @@ pub fn plan_schema_of(methods: &[MethodSpec]) -> String {
     format!("{plan:#}\n")
 }
 
-/// The options of the recursive methods, as the registry has them.
+/// The options of the methods, as the registries have them.
 fn add_settings(estimator: &mut Value, methods: &[MethodSpec]) {
     let Some(table) = estimator.as_object_mut() else { return };
     table.insert("additionalProperties".to_owned(), false.into());

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, HashMap};
 use super::rows::{SummaryRow, TraceSummary};
 use crate::{
     Plan,
-    plan::{Cell, EstimatorCell, Task},
+    plan::{Cell, EstimatorCell},
     query::{Query, RowKey},
     true_value::true_value,
 };
@@ -148,7 +148,7 @@ impl Results {
 
 fn row_key(cell: &Cell, estimator: &EstimatorCell) -> RowKey {
     let scenario = cell.resolved.scenario();
-    let orders = (estimator.task != Task::Describe).then(|| estimator.orders(&cell.resolved));
+    let orders = estimator.structure().map(|_| estimator.orders(&cell.resolved));
     let level = match scenario.remnant.strength {
         hoid_model::scenario::RemnantStrength::Level { level, .. } => level,
         hoid_model::scenario::RemnantStrength::Gain { .. } => f64::NAN,

@@ -3,6 +3,7 @@
 use std::{collections::BTreeMap, path::Path};
 
 use hoid_io::{ColumnKind, ColumnValues, OutputTable, TableWriter};
+use hoid_model::{Form, NamedChoice, VerdictLevel};
 
 use super::{
     layout::{BUDGET, PartsOfCell, begin_row, schema, setting_columns},
@@ -30,6 +31,13 @@ const SETTINGS: [&str; 11] = [
     "nk",
     "from_s",
     "to_s",
+];
+
+/// The levels of a verdict, and their quantities.
+const LEVELS: [(VerdictLevel, &str); 3] = [
+    (VerdictLevel::Trustworthy, "trustworthy"),
+    (VerdictLevel::Doubtful, "doubtful"),
+    (VerdictLevel::NotDetermined, "not_determined"),
 ];
 
 /// Statistics of a row of the summary, in the order of their columns.
@@ -96,16 +104,26 @@ pub(crate) fn write_fits(
                     let truth = true_value(cell, estimator, name);
                     put(name, values, truth);
                     if truth.is_finite() && truth != 0.0 {
-                        let bias: Vec<f64> = values.iter().map(|v| 100.0 * (v - truth) / truth).collect();
+                        // The lead of another form is another quantity.
+                        let meant = |lead: &bool| *lead || !name.starts_with("T_L");
+                        let error = |v: f64| 100.0 * (v - truth) / truth;
+                        let of_each = values.iter().zip(&found.leads);
+                        let bias: Vec<f64> = of_each
+                            .map(|(v, lead)| if meant(lead) { error(*v) } else { f64::NAN })
+                            .collect();
                         put(&format!("bias_{name}"), &bias, 0.0);
                     }
                 }
-                for (name, hits) in [
+                let mut rates = vec![
                     ("failed", found.failed),
                     ("not_convertible", found.not_convertible),
                     ("converged", found.converged),
                     ("diverged", found.diverged),
-                ] {
+                ];
+                if estimator.task.analysis().is_some() {
+                    rates.extend(LEVELS.iter().zip(found.levels).map(|((_, name), hits)| (*name, hits)));
+                }
+                for (name, hits) in rates {
                     let (p, se) = rate(hits, found.count);
                     begin_row(&mut rows, &extra, cell, estimator);
                     rows.text("quantity", name);
@@ -168,11 +186,15 @@ struct Collected<'a> {
 #[derive(Clone, Default)]
 struct OfEstimator {
     values: Vec<Vec<f64>>,
+    /// Whether each has the form of what was simulated, a gain with a lead, or none to choose.
+    leads: Vec<bool>,
     count: usize,
     failed: usize,
     not_convertible: usize,
     converged: usize,
     diverged: usize,
+    /// Fits of each level of the verdict.
+    levels: [usize; LEVELS.len()],
 }
 
 impl<'a> Collected<'a> {
@@ -211,10 +233,17 @@ impl<'a> Collected<'a> {
             let Some(i) = place else { continue };
             let of = &mut self.estimators[*i];
             of.count += 1;
+            of.leads.push(match table.column("form") {
+                Some(ColumnValues::Text(forms)) => forms[row].is_empty() || forms[row] == Form::Lead.choice_name(),
+                _ => true,
+            });
             of.failed += usize::from(is("status", row, "failed"));
             of.not_convertible += usize::from(is("status", row, "not convertible"));
             of.converged += usize::from(flag("converged", row));
             of.diverged += usize::from(flag("diverged", row));
+            for (count, (level, _)) in of.levels.iter_mut().zip(LEVELS) {
+                *count += usize::from(is("verdict", row, level.choice_name()));
+            }
         }
     }
 }

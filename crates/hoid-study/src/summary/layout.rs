@@ -7,7 +7,7 @@ use hoid_io::{ColumnKind, ColumnSchema, TableSchema};
 use crate::{
     Plan,
     columns::{Rows, comments, extra_axes},
-    plan::{Cell, EstimatorCell, Task},
+    plan::{Cell, EstimatorCell},
 };
 
 /// Numbers in memory at a time: 256 MB.
@@ -65,7 +65,7 @@ pub(super) fn begin_row(rows: &mut Rows, extra: &[String], cell: &Cell, estimato
     rows.text("estimator", &estimator.label);
     rows.text("name", &estimator.name);
     rows.text("method", estimator.method());
-    if estimator.task != Task::Describe {
+    if estimator.structure().is_some() {
         let orders = estimator.orders(&cell.resolved);
         rows.real("nd", orders.nd as f64);
         rows.real("nk", orders.nk as f64);

@@ -143,7 +143,7 @@ fn of_estimator(estimator: &EstimatorCell, cell: &Cell, task: &Task<'_>) -> Resu
                 operator: vec![operator; task.at.len()],
             })
         }
-        StudyTask::Describe | StudyTask::GreyBox(_) => Err(ThesisError::Unsuited {
+        StudyTask::Describe | StudyTask::GreyBox(_) | StudyTask::Analysis(_) => Err(ThesisError::Unsuited {
             method: "a survey",
             quantity: "an estimator".to_owned(),
             found: estimator.method().to_owned(),

@@ -1,11 +1,9 @@
 //! From the options of `hoid identify` to an estimator.
 
-use std::ops::RangeInclusive;
-
 use hoid::analysis::{BatchEstimator, Excitation, Identification, Polynomials, prior_of_text};
 use hoid::ident::{
-    Estimator, Focus, GreyBox, InitialState, Instruments, Loss, SearchMethod, SearchOptions, SigmoidChange, estimators,
-    family::{FamilyEstimator, HIGHEST_NOISE_ORDER},
+    Estimator, Focus, GreyBox, IdentError, InitialState, Instruments, Loss, NamedOrders, SearchMethod, SearchOptions,
+    SigmoidChange, estimators, family::FamilyEstimator,
 };
 use hoid::model::{Detrend, Structure, operator_family::Coordinate};
 
@@ -176,14 +174,12 @@ fn search(args: &IdentifyArgs, usual: SearchOptions) -> SearchOptions {
 /// The operator of a person.
 pub fn operator(args: &IdentifyArgs) -> Result<FamilyEstimator, CliError> {
     let usual = FamilyEstimator::default();
-    let (nc, nd) = noise_orders(args)?;
+    let usual = usual.with_noise_orders(&noise_orders(args)?).map_err(wrong_orders)?;
     Ok(FamilyEstimator {
         forms: args.form.map_or(usual.forms, |form| vec![form]),
         neuromuscular: args.neuromuscular,
         prior: args.prior.as_deref().map_or(Ok(usual.prior), prior_of_text)?,
         delay_range_s: args.delay.unwrap_or(usual.delay_range_s),
-        nc,
-        nd,
         individual: args
             .individual
             .iter()
@@ -202,31 +198,19 @@ pub fn operator(args: &IdentifyArgs) -> Result<FamilyEstimator, CliError> {
     })
 }
 
-/// nc and nd from `--orders nc=..,nd=..`.
-fn noise_orders(args: &IdentifyArgs) -> Result<(RangeInclusive<usize>, RangeInclusive<usize>), CliError> {
-    let (mut nc, mut nd) = (0..=0, 0..=HIGHEST_NOISE_ORDER);
-    for (name, value) in orders::parse_pairs(args.orders.as_deref().unwrap_or_default()).map_err(CliError::Usage)? {
-        let range = orders::parse_range(&value).map_err(|e| CliError::Usage(format!("--orders {name}: {e}")))?;
-        match name.as_str() {
-            "nc" | "nd" if *range.end() > HIGHEST_NOISE_ORDER => {
-                return Err(CliError::Usage(format!(
-                    "--orders {name}: found {value}; expected orders of 0 to {HIGHEST_NOISE_ORDER}"
-                )));
-            }
-            "nc" => nc = range,
-            "nd" => nd = range,
-            _ => {
-                return Err(CliError::Usage(format!(
-                    "--orders {name}: the operator of the family has the noise orders nc and nd alone; its form says the others"
-                )));
-            }
-        }
-    }
-    // An ARMA model is searched over few autoregressive orders.
-    if *nc.end() > 0 && args.orders.as_deref().is_none_or(|text| !text.contains("nd")) {
-        nd = 0..=8;
-    }
-    Ok((nc, nd))
+/// The orders of the noise from `--orders`.
+fn noise_orders(args: &IdentifyArgs) -> Result<NamedOrders, CliError> {
+    let pairs = orders::parse_pairs(args.orders.as_deref().unwrap_or_default()).map_err(CliError::Usage)?;
+    let of = |(name, value): (String, String)| match orders::parse_range(&value) {
+        Ok(range) => Ok((name, range)),
+        Err(reason) => Err(CliError::Usage(format!("--orders {name}: {reason}"))),
+    };
+    pairs.into_iter().map(of).collect()
+}
+
+/// An option that does not fit the estimator.
+fn wrong_orders(error: IdentError) -> CliError {
+    CliError::Usage(format!("--orders: {error}"))
 }
 
 fn coordinate(name: &str) -> Result<Coordinate, CliError> {
@@ -260,10 +244,7 @@ pub fn polynomials(args: &IdentifyArgs, structure: Structure) -> Result<Polynomi
         criterion: args.criterion,
         start: args.start.as_deref().map(orders::start).transpose()?,
         method: args.method,
-        instruments: args.instruments.as_deref().map(|text| match text {
-            "simulated" => Instruments::Simulated,
-            channel => Instruments::External(channel.to_owned()),
-        }),
+        instruments: args.instruments.as_deref().map(Instruments::of_text),
     })
 }
 
@@ -287,27 +268,16 @@ pub fn sigmoid(args: &IdentifyArgs) -> Result<SigmoidChange, CliError> {
             "--initial-state: the time-varying fit estimates the initial states; give auto or estimate".to_owned(),
         ));
     }
-    let usual = SigmoidChange::default();
+    let usual = SigmoidChange::default()
+        .with_noise_orders(&noise_orders(args)?)
+        .map_err(wrong_orders)?;
     Ok(SigmoidChange {
         form: args.form.unwrap_or(usual.form),
         neuromuscular: args.neuromuscular,
         prior: args.prior.as_deref().map_or(Ok(usual.prior.clone()), prior_of_text)?,
-        nd: noise_order(args)?,
         delay_range_s: args.delay.unwrap_or(usual.delay_range_s),
         constraints: orders::constraints(args.fix.as_deref(), args.bound.as_deref())?,
         search: search(args, usual.search),
         ..usual
     })
-}
-
-/// nd from `--orders nd=N`; the other orders are those of the operator.
-fn noise_order(args: &IdentifyArgs) -> Result<usize, CliError> {
-    let wrong = || CliError::Usage("--orders: the time-varying fit takes nd=N alone, as --orders nd=2".to_owned());
-    match args.orders.as_deref() {
-        None => Ok(SigmoidChange::default().nd),
-        Some(text) => match orders::parse_pairs(text).map_err(CliError::Usage)?.as_slice() {
-            [(name, value)] if name == "nd" => value.parse().map_err(|_| wrong()),
-            _ => Err(wrong()),
-        },
-    }
 }

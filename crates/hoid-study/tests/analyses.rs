@@ -1,0 +1,233 @@
+//! Estimators of a study that are run as `hoid identify` runs them: the operator of a person, one who changes,
+//! instrumental variables, each with its verdict.
+#![allow(clippy::unwrap_used)]
+
+use hoid_analysis::{Identification, Identified, Polynomials, Recordings};
+use hoid_ident::{
+    IvMethod, SigmoidChange,
+    family::{FamilyEstimator, OperatorPrior},
+};
+use hoid_io::{ColumnValues, OutputTable, read_table};
+use hoid_model::{
+    NamedChoice, Record, Structure, Verdict,
+    remnant_gain::NoiseDefinition,
+    scenario::{Condition, RemnantStrength, Scenario},
+};
+use hoid_sim::{RunSeed, Simulator};
+use hoid_study::{Plan, Query, Results, RunOptions, run};
+
+const PLAN: &str = r#"
+name = "people"
+seed = 3
+replications = 2
+
+[[scenarios]]
+name = "steady"
+condition = "C1"
+remnant.noise_level = 0.1
+
+[[scenarios]]
+name = "change"
+condition = "C4"
+remnant.noise_level = 0.1
+
+[[estimators]]
+name = "operator"
+method = "operator"
+
+[[estimators]]
+name = "lead"
+method = "operator"
+form = "lead"
+orders = { nc = "0..1", nd = "true" }
+delay_s = [0.1, 0.5]
+excitation = "none"
+
+[[estimators]]
+name = "change"
+method = "operator"
+change = "sigmoid"
+scenarios = ["change"]
+
+[[estimators]]
+name = "SRIV"
+method = "sriv"
+"#;
+
+/// A study of a plan in a directory, its fits.
+fn fits(text: &str) -> (tempfile::TempDir, OutputTable) {
+    let directory = tempfile::tempdir().unwrap();
+    let plan = Plan::parse(text, "people.toml").unwrap();
+    let outcome = run(&plan, directory.path(), &RunOptions::default(), &|_| (), &|| true).unwrap();
+    assert!(outcome.finished);
+    let fits = read_table(&directory.path().join("fits.parquet")).unwrap();
+    (directory, fits)
+}
+
+fn real(table: &OutputTable, column: &str, row: usize) -> f64 {
+    match table.column(column) {
+        Some(ColumnValues::Real(values)) => values[row],
+        other => panic!("{column}: {other:?}"),
+    }
+}
+
+fn text<'a>(table: &'a OutputTable, column: &str, row: usize) -> &'a str {
+    match table.column(column) {
+        Some(ColumnValues::Text(values)) => &values[row],
+        other => panic!("{column}: {other:?}"),
+    }
+}
+
+fn rows(table: &OutputTable) -> usize {
+    match table.column("name") {
+        Some(ColumnValues::Text(values)) => values.len(),
+        other => panic!("{other:?}"),
+    }
+}
+
+/// The row of an estimator on the first replication of a scenario.
+fn row(table: &OutputTable, scenario: &str, name: &str) -> usize {
+    let is = |row: &usize| text(table, "scenario", *row) == scenario && text(table, "name", *row) == name;
+    (0..rows(table)).find(is).unwrap()
+}
+
+fn record(condition: Condition, cell: u64) -> Record {
+    let mut scenario = Scenario::condition(condition);
+    scenario.remnant.strength = RemnantStrength::Level {
+        level: 0.1,
+        definition: NoiseDefinition::Response,
+    };
+    let seed = RunSeed {
+        seed: 3,
+        cell,
+        replication: 0,
+    };
+    Simulator::new(&scenario).unwrap().run(seed, false).unwrap()
+}
+
+fn has_verdict(table: &OutputTable, row: usize, verdict: &Verdict) {
+    assert_eq!(text(table, "status", row), "ok");
+    assert_eq!(text(table, "verdict", row), verdict.level.choice_name());
+    let against = verdict
+        .findings()
+        .iter()
+        .filter(|f| f.severity > hoid_model::Severity::Note);
+    let kinds: Vec<&str> = against.map(|f| f.kind).collect();
+    assert_eq!(text(table, "findings", row), kinds.join(", "));
+}
+
+fn is_operator(table: &OutputTable, row: usize, found: &Identified) {
+    has_verdict(table, row, &found.verdict);
+    assert_eq!(text(table, "form", row), found.fit.form.name());
+    assert_eq!(real(table, "nd", row), found.fit.noise_orders.1 as f64);
+    for p in &found.fit.operator(0).parameters {
+        assert_eq!(real(table, &p.name, row), p.value, "{}", p.name);
+        assert_eq!(
+            real(table, &format!("{}_se", p.name), row),
+            p.standard_error.unwrap(),
+            "{}",
+            p.name
+        );
+    }
+}
+
+/// Each row is what the analysis of that run gives, to the last bit, with the options of the plan.
+#[test]
+fn a_row_is_the_analysis_of_the_run() {
+    let (directory, fits) = fits(PLAN);
+    let steady = || Recordings::of_records([record(Condition::C1, 0)]);
+    let changed = || Recordings::of_records([record(Condition::C4, 1)]);
+    let operator = FamilyEstimator {
+        prior: OperatorPrior::none(),
+        ..FamilyEstimator::default()
+    };
+    let found = Identification::of(operator.clone()).run(steady()).unwrap();
+    is_operator(&fits, row(&fits, "steady", "operator"), &found);
+
+    let lead = Identification {
+        excitation: hoid_analysis::Excitation::Nothing,
+        ..Identification::of(FamilyEstimator {
+            forms: vec![hoid_model::Form::Lead],
+            nc: 0..=1,
+            nd: 1..=1,
+            delay_range_s: (0.1, 0.5),
+            ..operator
+        })
+    };
+    is_operator(&fits, row(&fits, "change", "lead"), &lead.run(changed()).unwrap());
+
+    let found = Identification::of(SigmoidChange::default()).run(changed()).unwrap();
+    let at = row(&fits, "change", "change");
+    has_verdict(&fits, at, &found.verdict);
+    for p in found.fit.parameters() {
+        assert_eq!(real(&fits, &p.name, at), p.estimate.value, "{}", p.name);
+    }
+    assert_eq!(
+        real(&fits, "K_e_dot2", at),
+        found.fit.last_operator().get("K_e_dot").unwrap().value
+    );
+    assert_eq!(real(&fits, "change_found", at), 1.0);
+
+    let sriv = Polynomials {
+        orders: [("nk".to_owned(), 29..=29)].into(),
+        method: Some(IvMethod::Sriv),
+        ..Polynomials::new(Structure::OutputError)
+    };
+    let found = Identification::of(sriv).run(steady()).unwrap();
+    let at = row(&fits, "steady", "SRIV");
+    has_verdict(&fits, at, &found.verdict);
+    for (name, estimate) in found.fit.fit.parameters() {
+        assert_eq!(real(&fits, &name, at), estimate.value, "{name}");
+    }
+
+    // The summary counts the verdicts, and takes errors against what was simulated.
+    let results = Results::read(directory.path()).unwrap();
+    let one = |quantity: &str, scenario: &str, name: &str| {
+        let query = Query::of(quantity).scenario(scenario).name(name);
+        results.one(&query).unwrap().statistics.mean
+    };
+    for (scenario, name) in [("steady", "operator"), ("change", "change"), ("steady", "SRIV")] {
+        let levels = ["trustworthy", "doubtful", "not_determined"].map(|level| one(level, scenario, name));
+        assert!((levels.iter().sum::<f64>() - 1.0).abs() < 1e-12, "{name}: {levels:?}");
+    }
+    // Nobody who changes is told as constant.
+    assert_eq!(one("trustworthy", "change", "lead"), 0.0);
+    assert!(one("bias_t_M", "change", "change").abs() < 2.0);
+    assert!(one("bias_K_e2", "change", "change").abs() < 30.0);
+}
+
+/// The lead of a form with a lag is no estimate of the lead that was simulated.
+#[test]
+fn a_lead_of_another_form_has_no_bias() {
+    let text = PLAN.replace("form = \"lead\"", "form = \"lead-lag\"");
+    let (directory, fits) = fits(&text);
+    let at = row(&fits, "steady", "lead");
+    assert!(real(&fits, "T_L", at).is_finite() && real(&fits, "K_over_T_I", at).is_finite());
+    let results = Results::read(directory.path()).unwrap();
+    let of = |quantity: &str| results.one(&Query::of(quantity).scenario("steady").name("lead"));
+    assert!(of("bias_T_L").is_none());
+    assert!(of("bias_K").unwrap().statistics.mean.abs() < 30.0);
+}
+
+/// What cannot be fitted is a row with its reason, and has no verdict.
+#[test]
+fn a_run_that_cannot_be_fitted_says_why() {
+    let text = PLAN.replace("method = ", "span_s = [0.0, 0.05]\nmethod = ");
+    let (directory, fits) = fits(&text);
+    assert_eq!(rows(&fits), 2 * (3 + 4));
+    for row in 0..rows(&fits) {
+        let name = shown(&fits, row);
+        assert_eq!(self::text(&fits, "status", row), "failed", "{name}");
+        assert!(!self::text(&fits, "reason", row).is_empty(), "{name}");
+        assert_eq!(self::text(&fits, "verdict", row), "", "{name}");
+        assert!(real(&fits, "K_e", row).is_nan(), "{name}");
+    }
+    let results = Results::read(directory.path()).unwrap();
+    let of = |quantity: &str| results.one(&Query::of(quantity).scenario("steady").name("operator"));
+    assert_eq!(of("failed").unwrap().statistics.mean, 1.0);
+    assert_eq!(of("trustworthy").unwrap().statistics.mean, 0.0);
+}
+
+fn shown(table: &OutputTable, row: usize) -> String {
+    format!("{} {}", text(table, "scenario", row), text(table, "name", row))
+}
