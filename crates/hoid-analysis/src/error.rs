@@ -45,6 +45,24 @@ pub enum AnalysisError {
         /// What was found, what was expected, what to do.
         reason: String,
     },
+    /// An option that does not fit the estimator, or has no such value.
+    #[error("{name}: {reason}")]
+    Option {
+        /// Its name in the registry.
+        name: &'static str,
+        /// What was found, what was expected, what to do.
+        reason: String,
+    },
+    /// An option of other estimators.
+    #[error("{name} belongs to {}{instead}", .of.join(", "))]
+    Misplaced {
+        /// Its name in the registry.
+        name: &'static str,
+        /// The estimators that have it.
+        of: Vec<&'static str>,
+        /// What to give in its place.
+        instead: &'static str,
+    },
     /// There is no recording.
     #[error("no recording was given; name at least one run")]
     NoRecordings,

@@ -53,6 +53,7 @@ mod rate;
 mod reading;
 mod recordings;
 mod repair;
+mod request;
 mod settings;
 
 pub use description::Excitation;
@@ -68,4 +69,5 @@ pub use quality::{findings_of_channels, findings_of_quality};
 pub use rate::kept_rate;
 pub use reading::Reading;
 pub use recordings::{Account, Recordings};
+pub use request::{Asked, Request};
 pub use settings::Setting;

@@ -1,7 +1,7 @@
 //! What ends a command early, and with which exit code.
 
 use hoid::analysis::AnalysisError;
-use hoid::ident::IdentError;
+use hoid::ident::{IdentError, estimator_setting};
 use hoid::io::{IoError, ScenarioFileError};
 use hoid::model::{ModelError, Verdict, VerdictLevel};
 use hoid::report::ReportError;
@@ -10,7 +10,10 @@ use hoid::study::StudyError;
 use hoid::thesis::ThesisError;
 use thiserror::Error;
 
-use crate::interrupt;
+use crate::{
+    args::{flag, in_words},
+    interrupt,
+};
 
 /// Everything that a command can run into.
 #[derive(Debug, Error)]
@@ -73,7 +76,20 @@ impl From<AnalysisError> for CliError {
             | AnalysisError::Prior { .. }
             | AnalysisError::Options { .. }
             | AnalysisError::NoRecordings => Self::Usage(error.to_string()),
+            AnalysisError::Option { name, reason } => Self::Usage(format!("{}: {reason}", typed(name))),
+            AnalysisError::Misplaced { name, of, instead } => {
+                let instead = instead.replace("delay", "--delay");
+                Self::Usage(format!("{} belongs to {}{instead}", typed(name), in_words(&of)))
+            }
         }
+    }
+}
+
+/// An option as it is typed.
+fn typed(name: &str) -> String {
+    match estimator_setting(name) {
+        Some(setting) => format!("--{}", flag(setting.name)),
+        None => name.to_owned(),
     }
 }
 
@@ -89,6 +105,18 @@ impl From<hoid_lab::LabError> for CliError {
 }
 
 impl CliError {
+    /// What is wrong with options, before anything is read.
+    pub fn of_options(error: AnalysisError) -> Self {
+        match error {
+            AnalysisError::Ident(IdentError::BadOption {
+                option,
+                found,
+                expected,
+            }) => Self::Usage(format!("{}: found {found}; expected {expected}", typed(&option))),
+            other => other.into(),
+        }
+    }
+
     /// What follows from the verdict on a result that has been printed.
     ///
     /// # Errors

@@ -2,7 +2,10 @@
 
 use std::path::Path;
 
-use hoid::ident::{Choice, IdentError, OrderRanges};
+use hoid::ident::{
+    Choice, IdentError, OrderRanges,
+    settings::{DelayRange, named_pairs},
+};
 use hoid::io::{is_fit_file, read_fit};
 use hoid::model::{Record, SampleTime, Structure, theta_of};
 use hoid::track::{Method, StartAt, TrackOptions, TrackPlan, ranges_of};
@@ -10,8 +13,7 @@ use hoid::track::{Method, StartAt, TrackOptions, TrackPlan, ranges_of};
 use crate::{
     args::{RecursionArgs, flag, methods_with},
     error::CliError,
-    orders::{self, DelayRange},
-    output,
+    orders, output,
 };
 
 /// The option that may be a file.
@@ -173,7 +175,9 @@ impl Plan {
             setting("structure", options.structure.name().to_owned()),
             setting("orders", orders),
         ];
-        list.extend(self.delay.as_ref().and_then(DelayRange::setting));
+        if let Some(delay @ DelayRange::Seconds(..)) = &self.delay {
+            list.push(setting("delay", delay.to_string()));
+        }
         list.push(setting("memory", options.memory_in_words(ts)));
         for own in options.method.settings().list() {
             // What was given; the memory stands above with the defaults of all parameters.
@@ -218,8 +222,9 @@ fn ranges(
         named.insert("nk".to_owned(), delay.samples(sample_time));
     }
     let start = args.start.as_deref().filter(|text| text.trim() != "nothing");
-    let names: Vec<String> = orders::parse_pairs(start.unwrap_or_default())
-        .map_err(|e| CliError::Usage(format!("--start: {e}")))?
+    let names: Vec<String> = start
+        .map_or(Ok(Vec::new()), named_pairs)
+        .map_err(|expected| CliError::Usage(format!("--start: expected {expected}")))?
         .into_iter()
         .map(|(name, _)| name)
         .collect();

@@ -9,12 +9,18 @@ use hoid::ident::{
 };
 use hoid::track::Method;
 
+use crate::args::in_words;
+
 /// The type of a value in words.
 fn kind_in_words(kind: Kind) -> String {
     match kind {
         Kind::Flag => "flag".to_owned(),
         Kind::Count => "whole number".to_owned(),
         Kind::Number => "number".to_owned(),
+        Kind::NumberOrUsual(usual) => format!("number; {usual} where none is given"),
+        Kind::Counts => "whole number or `LO..HI`".to_owned(),
+        Kind::NumberOrSpan => "number or `LO..HI`".to_owned(),
+        Kind::Delay => "samples (`29`, `20..40`) or seconds (`0.28s`, `0.1s..0.4s`)".to_owned(),
         Kind::Memory => "`256` samples, `2.56s` or `inf`".to_owned(),
         Kind::NumberOrOff => "number or `off`".to_owned(),
         Kind::Span => "`LO..HI`".to_owned(),
@@ -25,6 +31,9 @@ fn kind_in_words(kind: Kind) -> String {
             .collect::<Vec<_>>()
             .join(", "),
         Kind::Channel => "name of a channel".to_owned(),
+        Kind::Names => "`NAME,NAME,...`".to_owned(),
+        Kind::Guess => "`VALUE:WEIGHT`".to_owned(),
+        Kind::Element => "`90/(s(s+6))` or `90/1,6,0`".to_owned(),
         Kind::Prior => "`population`, `none`, `NAME=CENTRE:SPREAD,...`, or a file of `identify --json`".to_owned(),
         Kind::Named(of) => format!("`NAME=VALUE,...`, each {}", kind_in_words(*of)),
     }
@@ -36,8 +45,8 @@ fn options_page(methods: &[MethodSpec]) -> String {
                     recursive method is a flag of `hoid track` and `hoid stream` (with hyphens), a key of an estimator in a plan, and a keyword \
                     of `pyhoid.track` and `pyhoid.Tracker`. In a plan a range of times carries its unit (`track_delay_s`); in Python `lambda` \
                     is called `forgetting_factor`. An option of a batch estimator is a flag of `hoid identify` and a keyword of \
-                    `pyhoid.identify` (where `orders` of `family` are `nc` and `nd`). Options of `family` (which plans call `operator`), \
-                    `time-varying` and the instrumental-variable methods are keys of an estimator in a plan too.\n"
+                    `pyhoid.identify` (where `orders` are `na`, `nb`, ...). Options of `operator`, of one that changes and of the \
+                    instrumental-variable methods are keys of an estimator in a plan too.\n"
         .to_owned();
     for spec in methods.iter().chain(&estimators()) {
         let structures: Vec<&str> = spec.structures.iter().map(|structure| structure.name()).collect();
@@ -82,12 +91,19 @@ fn python_type(kind: Kind) -> String {
         Kind::Flag => "bool".to_owned(),
         Kind::Count => "int".to_owned(),
         Kind::Number => "float".to_owned(),
+        Kind::NumberOrUsual(_) => "float | bool".to_owned(),
+        Kind::Counts => "int | tuple[int, int] | range".to_owned(),
+        Kind::NumberOrSpan => "float | tuple[float, float]".to_owned(),
+        Kind::Delay => "int | tuple[int, int] | range | str".to_owned(),
         Kind::Memory => "float | str".to_owned(),
         Kind::NumberOrOff => "float | Literal[\"off\"]".to_owned(),
         Kind::Span => "tuple[float, float]".to_owned(),
         Kind::OpenSpan => "tuple[float | None, float | None]".to_owned(),
         Kind::Choice(words) => format!("Literal[{}]", quoted(words)),
         Kind::Channel => "str".to_owned(),
+        Kind::Names => "Sequence[str]".to_owned(),
+        Kind::Guess => "tuple[float, float]".to_owned(),
+        Kind::Element => "str | tuple[Sequence[float], Sequence[float]]".to_owned(),
         Kind::Prior => "str | PathLike[str] | Mapping[str, tuple[float, float]] | OperatorFit".to_owned(),
         Kind::Named(of) => format!("Mapping[str, {}]", python_type(*of)),
     }
@@ -116,17 +132,87 @@ fn wrapped(text: &str, indent: &str) -> String {
     lines.join("\n")
 }
 
-/// The keywords of the Python package.
-fn python_settings(methods: &[MethodSpec]) -> String {
-    let mut settings: Vec<(&Setting, Vec<&str>)> = Vec::new();
-    for spec in methods {
-        for setting in &spec.settings {
-            match settings.iter_mut().find(|(known, _)| known.name == setting.name) {
-                Some((_, of)) => of.push(spec.name),
-                None => settings.push((setting, vec![spec.name])),
+/// The options of some methods, each once, with the methods that have it.
+struct Keywords<'a> {
+    settings: Vec<(&'a Setting, Vec<&'a str>)>,
+    methods: usize,
+}
+
+impl<'a> Keywords<'a> {
+    /// Those of the methods, without what Python has in another way.
+    fn of(methods: &'a [MethodSpec], without: &[&str]) -> Self {
+        let mut settings: Vec<(&Setting, Vec<&str>)> = Vec::new();
+        for spec in methods {
+            for setting in spec.settings.iter().filter(|setting| !without.contains(&setting.name)) {
+                match settings.iter_mut().find(|(known, _)| known.name == setting.name) {
+                    Some((_, of)) => of.push(spec.name),
+                    None => settings.push((setting, vec![spec.name])),
+                }
             }
         }
+        Self {
+            settings,
+            methods: methods.len(),
+        }
     }
+
+    fn about(&self, setting: &Setting, of: &[&str]) -> String {
+        let of = if of.len() < self.methods {
+            let words = in_words(of)
+                .replace("--noise remnant", "noise=\"remnant\"")
+                .replace("--change sigmoid", "change=\"sigmoid\"");
+            format!(" For {words}.")
+        } else {
+            String::new()
+        };
+        format!("{}.{of}", setting.help)
+    }
+
+    /// The class of types.
+    fn typed(&self, class: &str, doc: &str) -> String {
+        let mut text = format!("\n\nclass {class}(TypedDict, total=False):\n    \"\"\"{doc}\"\"\"\n");
+        for (setting, of) in &self.settings {
+            let kind = python_type(setting.kind);
+            let line = format!("    {}: {kind} | None", keyword(setting.name));
+            let line = match (line.len() > 100, setting.kind) {
+                (true, Kind::Choice(words)) => format!(
+                    "    {}: (\n        Literal[\n{}        ]\n        | None\n    )",
+                    keyword(setting.name),
+                    words
+                        .iter()
+                        .map(|word| format!("            \"{word}\",\n"))
+                        .collect::<String>()
+                ),
+                _ => line,
+            };
+            text.push_str(&format!("\n{}\n{line}\n", wrapped(&self.about(setting, of), "    # ")));
+        }
+        text
+    }
+
+    /// The paragraphs of a doc string.
+    fn listed(&self, name: &str, function: &str) -> String {
+        let paragraphs: Vec<String> = self
+            .settings
+            .iter()
+            .map(|(setting, of)| {
+                let head = format!(
+                    "        {} : {}",
+                    keyword(setting.name),
+                    python_type(setting.kind).replace('"', "'")
+                );
+                format!("{head}\n{}", wrapped(&self.about(setting, of), "            "))
+            })
+            .collect();
+        format!(
+            "\n\n#: The options, as the documentation of `{function}` lists them.\n{name} = \"\"\"{}\"\"\"\n",
+            paragraphs.join("\n").trim_start()
+        )
+    }
+}
+
+/// The keywords of the Python package.
+fn python_settings(methods: &[MethodSpec], batch: &[MethodSpec]) -> String {
     let names: Vec<&str> = methods.iter().map(|spec| spec.name).collect();
     let structures = hoid::model::Structure::ALL.map(|structure| structure.name());
     let one_a_line = |words: &[&str]| {
@@ -135,64 +221,35 @@ fn python_settings(methods: &[MethodSpec]) -> String {
             .map(|word| format!("    \"{word}\",\n"))
             .collect::<String>()
     };
-    let about = |setting: &Setting, of: &[&str]| {
-        let of = if of.len() < methods.len() {
-            format!(" For {}.", of.join(", "))
-        } else {
-            String::new()
-        };
-        format!("{}.{of}", setting.help)
-    };
-    let mut text = format!(
-        "\"\"\"The recursive methods and their options, made from the registry of the library.\n\n\
-         `HOID_UPDATE_DOCS=1 cargo test -p hoid-cli` renews this file; it is not edited by hand.\n\"\"\"\n\n\
-         from __future__ import annotations\n\nfrom collections.abc import Mapping\nfrom os import PathLike\n\
-         from typing import TYPE_CHECKING, Literal, TypedDict\n\n\
-         if TYPE_CHECKING:\n    from .operator_fit import OperatorFit\n\n\
-         __all__ = [\"METHODS\", \"SETTINGS\", \"MethodSettings\", \"RecursiveMethod\", \"Structure\"]\n\n\
-         #: A recursive method.\nRecursiveMethod = Literal[\n{}]\n\n\
-         #: A polynomial structure.\nStructure = Literal[\n{}]\n\n\n\
-         class MethodSettings(TypedDict, total=False):\n    \"\"\"Options of the recursive methods.\"\"\"\n",
-        one_a_line(&names),
-        one_a_line(&structures),
-    );
-    for (setting, of) in &settings {
-        let kind = python_type(setting.kind);
-        let line = format!("    {}: {kind} | None", keyword(setting.name));
-        let line = match (line.len() > 100, setting.kind) {
-            (true, Kind::Choice(words)) => format!(
-                "    {}: (\n        Literal[\n{}        ]\n        | None\n    )",
-                keyword(setting.name),
-                words
-                    .iter()
-                    .map(|word| format!("            \"{word}\",\n"))
-                    .collect::<String>()
-            ),
-            _ => line,
-        };
-        text.push_str(&format!("\n{}\n{line}\n", wrapped(&about(setting, of), "    # ")));
-    }
-    text.push_str("\n\n#: The methods, as the documentation of `track` lists them.\nMETHODS = \"\"\"");
+    let recursive = Keywords::of(methods, &[]);
+    // The orders have keywords of their own there.
+    let batch = Keywords::of(batch, &["orders"]);
     let methods_text: Vec<String> = methods
         .iter()
         .map(|spec| wrapped(&format!("``\"{}\"``: {};", spec.name, spec.help), "        "))
         .collect();
-    text.push_str(methods_text.join("\n").trim_start().trim_end_matches(';'));
-    text.push_str(".\"\"\"\n\n#: The options, as the documentation of `track` lists them.\nSETTINGS = \"\"\"");
-    let settings_text: Vec<String> = settings
-        .iter()
-        .map(|(setting, of)| {
-            let head = format!(
-                "        {} : {}",
-                keyword(setting.name),
-                python_type(setting.kind).replace('"', "'")
-            );
-            format!("{head}\n{}", wrapped(&about(setting, of), "            "))
-        })
-        .collect();
-    text.push_str(settings_text.join("\n").trim_start());
-    text.push_str("\"\"\"\n");
-    text
+    format!(
+        "\"\"\"The estimators and recursive methods and their options, made from the registries of the library.\n\n\
+         `HOID_UPDATE_DOCS=1 cargo test -p hoid-cli` renews this file; it is not edited by hand.\n\"\"\"\n\n\
+         from __future__ import annotations\n\nfrom collections.abc import Mapping, Sequence\nfrom os import PathLike\n\
+         from typing import TYPE_CHECKING, Literal, TypedDict\n\n\
+         if TYPE_CHECKING:\n    from .operator_fit import OperatorFit\n\n\
+         __all__ = [\n    \"BATCH_SETTINGS\",\n    \"METHODS\",\n    \"SETTINGS\",\n    \"BatchSettings\",\n    \
+         \"MethodSettings\",\n    \"RecursiveMethod\",\n    \"Structure\",\n]\n\n\
+         #: A recursive method.\nRecursiveMethod = Literal[\n{}]\n\n\
+         #: A polynomial structure.\nStructure = Literal[\n{}]\n{}{}\n\n\
+         #: The methods, as the documentation of `track` lists them.\nMETHODS = \"\"\"{}.\"\"\"{}{}",
+        one_a_line(&names),
+        one_a_line(&structures),
+        recursive.typed("MethodSettings", "Options of the recursive methods."),
+        batch.typed("BatchSettings", "Options of the batch estimators."),
+        methods_text.join("\n").trim_start().trim_end_matches(';'),
+        format!("\n{}", recursive.listed("SETTINGS", "track").trim_start_matches('\n')).replacen("\n#:", "\n\n#:", 1),
+        batch
+            .listed("BATCH_SETTINGS", "identify")
+            .trim_start_matches("\n\n")
+            .replacen("#:", "\n#:", 1),
+    )
 }
 
 #[cfg(test)]
@@ -222,7 +279,10 @@ mod tests {
 
     #[test]
     fn python_has_the_options_of_the_registry() {
-        is_as_written("python/src/pyhoid/_settings.py", &python_settings(&Method::registry()));
+        is_as_written(
+            "python/src/pyhoid/_settings.py",
+            &python_settings(&Method::registry(), &estimators()),
+        );
     }
 
     /// Every option of the registry of estimators is a flag of `hoid identify`, with its default
@@ -270,9 +330,26 @@ mod tests {
         );
         let schema = hoid::study::plan_schema_of(&methods);
         assert!(schema.contains("\"tremor_band_s\"") && schema.contains("count as tremor. For multiple-model."));
-        let python = python_settings(&methods);
+        let python = python_settings(&methods, &estimators());
         assert!(python.contains("    tremor_band: tuple[float, float] | None\n"));
         assert!(options_page(&methods).contains("| `tremor_band` | `LO..HI` | s | 8..12 |"));
+    }
+
+    #[test]
+    fn a_new_option_of_a_batch_estimator_needs_no_other_edit() {
+        let mut batch = estimators();
+        let dummy = Setting::of("tremor_band", &(8.0, 12.0)).help(&["Frequencies that count as tremor"]);
+        batch[0].settings.push(dummy);
+        let help = with_settings(Command::new("identify"), &batch)
+            .render_long_help()
+            .to_string();
+        assert!(
+            help.contains("--tremor-band <LO..HI>") && help.contains("[for operator]"),
+            "{help}"
+        );
+        let python = python_settings(&Method::registry(), &batch);
+        assert!(python.contains("    # Frequencies that count as tremor. For operator.\n    tremor_band: "));
+        assert!(options_page(&batch).contains("| `tremor_band` | `LO..HI` |  | 8..12 |"));
     }
 
     #[test]
@@ -283,7 +360,7 @@ mod tests {
             help: "a method that is new",
             ..methods[0].clone()
         });
-        assert!(python_settings(&methods).contains("    \"setpoint\",\n"));
+        assert!(python_settings(&methods, &estimators()).contains("    \"setpoint\",\n"));
         assert!(options_page(&methods).contains("\n## setpoint\n\nWhat it is: a method that is new.\n"));
     }
 }

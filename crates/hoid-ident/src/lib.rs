@@ -102,7 +102,7 @@ mod optimize;
 pub mod order_selection;
 mod pem;
 pub mod progress;
-mod registry;
+pub mod registry;
 mod searched_delay;
 pub mod settings;
 mod sigmoid;

@@ -8,7 +8,7 @@
 
 use std::{collections::BTreeMap, fmt, ops::RangeInclusive};
 
-use hoid_model::{Orders, Record, Structure};
+use hoid_model::{MAX_DELAY, MAX_ORDER, Orders, Record, Structure};
 use rayon::prelude::*;
 
 use crate::{Estimator, Fit, IdentError, SearchOptions, criterion::first_residual};
@@ -35,6 +35,30 @@ pub struct OrderRanges {
 
 /// Orders by their names (na, nb, nc, nd, nf, nk), each with its range.
 pub type NamedOrders = BTreeMap<String, RangeInclusive<usize>>;
+
+/// Refuses what is no order, and orders that no model has.
+///
+/// # Errors
+/// [`IdentError::BadOption`].
+pub fn check_order(name: &str, range: &RangeInclusive<usize>) -> Result<(), IdentError> {
+    let bad = |found: String, expected: String| IdentError::BadOption {
+        option: if name == "nk" { "nk" } else { "orders" }.to_owned(),
+        found,
+        expected,
+    };
+    let most = match name {
+        "nk" => MAX_DELAY,
+        "na" | "nb" | "nc" | "nd" | "nf" => MAX_ORDER,
+        _ => return Err(bad(name.to_owned(), "na, nb, nc, nd, nf or nk".to_owned())),
+    };
+    match *range.end() <= most {
+        true => Ok(()),
+        false => Err(bad(
+            format!("{name} = {}", range.end()),
+            format!("at most {most} is possible: give a smaller number or range"),
+        )),
+    }
+}
 
 /// A range as users write it.
 pub(crate) fn written(range: &RangeInclusive<usize>) -> String {

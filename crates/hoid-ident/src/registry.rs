@@ -1,47 +1,130 @@
 //! The registry of batch estimators: what each is called, what it is, and which options it takes.
 //!
-//! The command line takes names, help and placement of its flags from here, the book its page of
-//! options, Python what belongs to what. A new instrumental-variable method is in the list by being
-//! in [`IvMethod::ALL`].
+//! Flags and help of the command line, keys of plans, keywords of Python, the page of options and the names of
+//! printed settings are made from this list. A new instrumental-variable method is in it by being in
+//! [`IvMethod::ALL`].
 
-use hoid_model::{Form, NamedChoice, Structure};
+use hoid_model::Structure;
 
 use crate::{
-    criterion::InitialState,
     estimator::Focus,
     family::FamilyEstimator,
+    grey_box::GreyBox,
     iv::IvMethod,
     optimize::{SearchMethod, SearchOptions},
     settings::{Bounds, Kind, MethodSpec, Setting},
     sigmoid::SigmoidChange,
 };
 
+/// Words for a form.
+const FORMS: &[&str] = &[
+    "auto",
+    "gain",
+    "lead",
+    "lead2",
+    "lag",
+    "lead-lag",
+    "lead2-lag",
+    "quadratic-integral",
+    "lead-droop",
+];
+
+/// The operator of a person.
+pub const OPERATOR: &str = "operator";
+/// The same with its remnant of order m as noise: a gain with a lead.
+pub const REMNANT: &str = "operator noise=remnant";
+/// The same with gains that change once.
+pub const CHANGE: &str = "operator change=sigmoid";
+/// Polynomials by the prediction error method.
+pub const PEM: &str = "pem";
+
 /// What is known of each batch estimator.
 pub fn estimators() -> Vec<MethodSpec> {
-    let instrumental = IvMethod::ALL.map(|method| MethodSpec {
-        name: method.name(),
-        help: method.help(),
-        source: method.source(),
-        structures: method.structures(),
-        settings: vec![
-            orders(),
+    let family = MethodSpec {
+        name: OPERATOR,
+        help: "the operator of a person: form, parameters with prior, errors by runs, a verdict",
+        source: "McRuer and Jex 1967; the reference text, equation 2.2",
+        structures: &[Structure::BoxJenkins],
+        settings: [
+            vec![
+                noise(),
+                change(),
+                form(),
+                neuromuscular(),
+                operator_prior("population"),
+                excitation(),
+                period(),
+                controlled_element(),
+                orders("nc=0,nd=0..24 of its noise"),
+                delay(FamilyEstimator::default().delay_range_s),
+                individual(),
+                run_to_run(),
+                initial_state(),
+            ],
+            search(FamilyEstimator::default().search),
+        ]
+        .concat(),
+    };
+    let grey_box = MethodSpec {
+        name: REMNANT,
+        help: "operator and remnant in physical parameters, with a real delay",
+        source: "Ljung 1999, section 4.3; the reference text, equation 4",
+        structures: &[Structure::BoxJenkins],
+        settings: [
+            vec![
+                noise(),
+                change(),
+                remnant_order(),
+                controlled_element(),
+                delay(GreyBox::new(1..=4).delay_range_s),
+                individual(),
+                initial_state(),
+                fix(),
+                bound(),
+            ],
+            search(GreyBox::new(1..=4).search),
+        ]
+        .concat(),
+    };
+    let sigmoid = MethodSpec {
+        name: CHANGE,
+        help: "the operator's gains change once, by a sigmoid; any form",
+        source: "Zaal 2016; the reference text, section II",
+        structures: &[Structure::BoxJenkins],
+        settings: [
+            vec![
+                noise(),
+                change(),
+                form(),
+                neuromuscular(),
+                operator_prior("none"),
+                orders("nd=1 of its noise"),
+                delay(SigmoidChange::default().delay_range_s),
+                initial_state(),
+                fix(),
+                bound(),
+            ],
+            search(SigmoidChange::default().search),
+        ]
+        .concat(),
+    };
+    let polynomials = || {
+        vec![
+            orders("the operator's: bj nb=2,nd=1..4,nf=2; arx na=2,nb=2"),
             nk(),
-            delay(),
-            instruments(),
-            max_iterations(SearchOptions::default()),
-            tolerance(SearchOptions::default()),
-        ],
-    });
+            polynomial_delay(),
+            criterion(),
+            controlled_element(),
+        ]
+    };
     let pem = MethodSpec {
-        name: "pem",
-        help: "prediction error method",
+        name: PEM,
+        help: "polynomials by the prediction error method",
         source: "Ljung 1999, chapters 7 and 10; the reference text, section III",
         structures: &Structure::ALL,
         settings: [
+            polynomials(),
             vec![
-                orders(),
-                nk(),
-                delay(),
                 initial_state(),
                 start(),
                 fix(),
@@ -55,64 +138,30 @@ pub fn estimators() -> Vec<MethodSpec> {
         ]
         .concat(),
     };
-    let grey_box = MethodSpec {
-        name: "grey-box",
-        help: "operator and remnant in physical parameters, with a real delay",
-        source: "Ljung 1999, section 4.3; the reference text, equation 4",
-        structures: &[Structure::BoxJenkins],
+    let instrumental = IvMethod::ALL.map(|method| MethodSpec {
+        name: method.name(),
+        help: method.help(),
+        source: method.source(),
+        structures: method.structures(),
         settings: [
-            vec![delay(), remnant_order(), individual(), initial_state(), fix(), bound()],
-            search(SearchOptions::default()),
-        ]
-        .concat(),
-    };
-    let family = MethodSpec {
-        name: "family",
-        help: "the operator of a person: form, parameters with prior, errors by runs, a verdict",
-        source: "McRuer and Jex 1967; the reference text, equation 2.2",
-        structures: &[Structure::BoxJenkins],
-        settings: [
+            polynomials(),
             vec![
-                form(),
-                neuromuscular(),
-                operator_prior(),
-                excitation(),
-                period(),
-                orders(),
-                delay(),
-                individual(),
-                run_to_run(),
-                initial_state(),
+                instruments(),
+                max_iterations(SearchOptions::default()),
+                tolerance(SearchOptions::default()),
             ],
-            search(FamilyEstimator::default().search),
         ]
         .concat(),
-    };
-    let sigmoid = MethodSpec {
-        name: "time-varying",
-        help: "the operator's gains change once, by a sigmoid; any form",
-        source: "Zaal 2016; the reference text, section II",
-        structures: &[Structure::BoxJenkins],
-        settings: [
-            vec![
-                form(),
-                neuromuscular(),
-                operator_prior(),
-                orders(),
-                delay(),
-                initial_state(),
-                fix(),
-                bound(),
-            ],
-            search(SigmoidChange::default().search),
-        ]
-        .concat(),
-    };
-    [pem]
+    });
+    [family, grey_box, sigmoid, pem]
         .into_iter()
         .chain(instrumental)
-        .chain([family, grey_box, sigmoid])
         .collect()
+}
+
+/// An estimator by its name.
+pub fn estimator_spec(name: &str) -> Option<MethodSpec> {
+    estimators().into_iter().find(|spec| spec.name == name)
 }
 
 /// An option of the registry by its name.
@@ -134,27 +183,47 @@ fn setting(name: &'static str, kind: Kind, default: &str, help: &str) -> Setting
     }
 }
 
-fn named<T: NamedChoice>() -> Vec<&'static str> {
-    T::CHOICES.iter().map(|choice| choice.choice_name()).collect()
-}
-
 /// How the search of an estimator steps and ends, by its own defaults.
 fn search(usual: SearchOptions) -> Vec<Setting> {
     vec![search_method(), max_iterations(usual), tolerance(usual)]
 }
 
-fn orders() -> Setting {
+fn noise() -> Setting {
+    let help =
+        "Noise of the operator: ar an autoregression, arma with a moving average (nc), remnant the remnant of order m";
+    setting("noise", Kind::Choice(&["ar", "arma", "remnant"]), "ar", help)
+}
+
+fn change() -> Setting {
+    let help = "Whether the operator changes: not at all, or its gains once, by a sigmoid";
+    setting("change", Kind::Choice(&["none", "sigmoid"]), "none", help)
+}
+
+fn controlled_element() -> Setting {
+    let help = "Controlled element in s, as 90/(s(s+6)), or NUM/DEN by descending powers of s, as 90/1,6,0: adds \
+                crossover frequency and margins";
+    setting("controlled_element", Kind::Element, "", help)
+}
+
+fn criterion() -> Setting {
+    let help = "What decides between candidates when something is searched";
+    let words = &["loss", "aic", "aicc", "bic", "fpe", "mdl", "yic"];
+    setting("criterion", Kind::Choice(words), "bic", help)
+}
+
+fn orders(usual: &str) -> Setting {
     setting(
         "orders",
-        Kind::Named(&Kind::Count),
-        "the operator's: bj nb=2,nd=1..4,nf=2; arx na=2,nb=2; grey-box nc=0,nd=0..24 of its noise",
+        Kind::Named(&Kind::Counts),
+        usual,
         "Orders, each a number or a range to search, as nb=2,nc=0,nd=1..4,nf=2; nb counts b0, b1, ...",
     )
 }
 
 fn nk() -> Setting {
-    let help = "Delay of b0 in samples, a number or a range to search";
-    setting("nk", Kind::Count, "0.05 to 0.6 s", help)
+    let help =
+        "Delay of b0 in samples (29), or dead time in s (0.28s); a number or a range (20..40, 0.1s..0.4s) to search";
+    setting("nk", Kind::Delay, "0.05 to 0.6 s", help)
 }
 
 fn instruments() -> Setting {
@@ -169,20 +238,15 @@ fn instruments() -> Setting {
 fn remnant_order() -> Setting {
     setting(
         "remnant_order",
-        Kind::Count,
+        Kind::Counts,
         "1..4",
         "Order m of the remnant, a number or a range to search",
     )
 }
 
 fn form() -> Setting {
-    let mut words = vec!["auto"];
-    words.extend(named::<Form>());
-    let help = format!(
-        "Form of the operator: {}; auto: the simplest that held-out runs do not refute, of time-varying lead",
-        words.join(", ")
-    );
-    setting("form", Kind::Channel, "auto", &help)
+    let help = "Form of the operator; auto: the simplest that held-out runs do not refute, of one that changes lead";
+    setting("form", Kind::Choice(FORMS), "auto", help)
 }
 
 fn neuromuscular() -> Setting {
@@ -194,11 +258,11 @@ fn neuromuscular() -> Setting {
     )
 }
 
-fn operator_prior() -> Setting {
+fn operator_prior(usual: &str) -> Setting {
     setting(
         "prior",
         Kind::Prior,
-        "population; of time-varying none",
+        usual,
         "What is known of the person before the data: population (published people), none, a JSON result of another fit, or \
          NAME=CENTRE:SPREAD of omega_nm, zeta_nm, tau_e, T_L, T_I, as omega_nm=10.5:0.3 (the spread is relative)",
     )
@@ -227,43 +291,43 @@ fn run_to_run() -> Setting {
     setting("run_to_run", Kind::Number, &usual, help).bounds(Bounds::AtLeast(0.0))
 }
 
-fn delay() -> Setting {
-    setting(
-        "delay",
-        Kind::Span,
-        "0.05..0.6; of the family 0.02..0.8",
-        "Delay tau_e, or the shortest and the longest; of polynomials nk = tau_e/Ts + 1",
-    )
-    .unit("s")
-    .bounds(Bounds::NonNegative)
+fn delay((low, high): (f64, f64)) -> Setting {
+    delay_of(&format!("{low}..{high}"))
+}
+
+fn polynomial_delay() -> Setting {
+    delay_of("")
+}
+
+fn delay_of(usual: &str) -> Setting {
+    let help = "Delay tau_e, or the shortest and the longest; of polynomials in place of nk = tau_e/Ts + 1";
+    setting("delay", Kind::NumberOrSpan, usual, help)
+        .unit("s")
+        .bounds(Bounds::NonNegative)
 }
 
 fn individual() -> Setting {
     setting(
         "individual",
-        Kind::Channel,
+        Kind::Names,
         "",
         "Parameters that each record has for itself, as K,T_L",
     )
 }
 
 fn initial_state() -> Setting {
-    let rules = named::<InitialState>();
-    let help = format!(
-        "Initial states of each record: auto, {}; auto: estimate, and backcast for an output alone (ar, ma, arma)",
-        rules.join(", ")
-    );
+    let help = "Initial states of each record; auto: estimate, and backcast for an output alone (ar, ma, arma)";
     setting(
         "initial_state",
         Kind::Choice(&["auto", "zero", "estimate", "backcast"]),
         "auto",
-        &help,
+        help,
     )
 }
 
 fn start() -> Setting {
     let help = "Start of the search, all coefficients as f1=-1.9,f2=.92,b0=.04,...";
-    setting("start", Kind::Named(&Kind::Number), "own starts", help)
+    setting("start", Kind::Named(&Kind::Number), "own starts", help).bounds(Bounds::Finite)
 }
 
 fn fix() -> Setting {
@@ -273,6 +337,7 @@ fn fix() -> Setting {
         "",
         "Parameters held at a value, as d1=-0.85,f1=-1.9",
     )
+    .bounds(Bounds::Finite)
 }
 
 fn bound() -> Setting {
@@ -282,12 +347,12 @@ fn bound() -> Setting {
 
 fn coefficient_prior() -> Setting {
     let help = "Guesses of coefficients with a weight W, as f1=-1.9:0.5: the loss grows by W (f1 + 1.9)^2";
-    setting("coefficient_prior", Kind::Named(&Kind::Channel), "", help)
+    setting("coefficient_prior", Kind::Named(&Kind::Guess), "", help)
 }
 
 fn robust() -> Setting {
-    let help = "Loss of Huber instead of squares: residuals beyond K standard deviations count linearly";
-    setting("robust", Kind::Number, "", help).bounds(Bounds::Positive)
+    let help = "Loss of Huber instead of squares: residuals beyond so many standard deviations count linearly; of no number 1.345";
+    setting("robust", Kind::NumberOrUsual("1.345"), "", help).bounds(Bounds::Positive)
 }
 
 fn focus() -> Setting {
@@ -333,6 +398,8 @@ fn tolerance(usual: SearchOptions) -> Setting {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::{criterion::InitialState, order_selection::Criterion};
+    use hoid_model::{Form, NamedChoice};
 
     #[test]
     fn every_estimator_says_what_it_is_and_each_option_once() {
@@ -349,10 +416,11 @@ mod tests {
             }
         }
         let names: Vec<&str> = all.iter().map(|spec| spec.name).collect();
-        assert_eq!(
-            names,
-            ["pem", "iv4", "sriv", "rivbj", "family", "grey-box", "time-varying"]
-        );
+        assert_eq!(names, [OPERATOR, REMNANT, CHANGE, PEM, "iv4", "sriv", "rivbj"]);
+    }
+
+    fn named<T: NamedChoice>() -> Vec<&'static str> {
+        T::CHOICES.iter().map(|choice| choice.choice_name()).collect()
     }
 
     #[test]
@@ -361,8 +429,10 @@ mod tests {
             Some(Kind::Choice(words)) => words.to_vec(),
             other => panic!("{name}: {other:?}"),
         };
+        assert_eq!(words("form")[1..], named::<Form>());
         assert_eq!(words("focus"), named::<Focus>());
         assert_eq!(words("search_method"), named::<SearchMethod>());
+        assert_eq!(words("criterion"), named::<Criterion>());
         assert_eq!(words("initial_state")[1..], named::<InitialState>());
     }
 }

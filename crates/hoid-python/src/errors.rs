@@ -3,7 +3,10 @@
 //! The messages are those of the libraries, with keywords in place of command-line options.
 
 use hoid_analysis::AnalysisError;
-use hoid_ident::IdentError;
+use hoid_ident::{
+    IdentError,
+    registry::{CHANGE, OPERATOR, REMNANT},
+};
 use hoid_io::{IoError, ScenarioFileError};
 use hoid_model::{ModelError, NotConvertible, UnknownName};
 use hoid_report::ReportError;
@@ -128,12 +131,27 @@ impl From<AnalysisError> for Failure {
                 others.found(),
                 others.as_keys()
             ))),
+            AnalysisError::Misplaced { name, of, instead } => {
+                let of: Vec<String> = of.into_iter().map(estimator).collect();
+                bad_option(format!("{name} belongs to {}{instead}", of.join(", ")))
+            }
             AnalysisError::SameSamples { .. } => Self(DataError::new_err(text)),
             AnalysisError::NoSuchChannel { .. }
             | AnalysisError::Prior { .. }
             | AnalysisError::Options { .. }
+            | AnalysisError::Option { .. }
             | AnalysisError::NoRecordings => Self(OptionError::new_err(text)),
         }
+    }
+}
+
+/// How an estimator is asked for.
+fn estimator(name: &str) -> String {
+    match name {
+        OPERATOR => format!("structure=\"{OPERATOR}\""),
+        REMNANT => "noise=\"remnant\"".to_owned(),
+        CHANGE => "change=\"sigmoid\"".to_owned(),
+        name => format!("method=\"{name}\""),
     }
 }
 

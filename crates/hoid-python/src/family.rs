@@ -1,28 +1,15 @@
 //! `pyhoid.identify` by default: the operator of a person, of the family of operators.
 
-use std::collections::BTreeMap;
-
-use hoid_analysis::{Excitation, Identification, Identified, Recordings};
-use hoid_ident::{
-    SearchOptions,
-    family::{
-        AgreementMethod, ClusterKind, FamilyEstimator, FamilyFit, FormFigures, LoopMeasures, OperatorPrior, Parameter,
-        ParameterPrior,
-    },
-};
-use hoid_model::{FaultHandling, Form, operator_family::Coordinate, uncertainty::Estimate};
+use hoid_analysis::{Identification, Identified, Recordings};
+use hoid_ident::family::{AgreementMethod, ClusterKind, FamilyFit, FormFigures, LoopMeasures, Parameter};
 use numpy::{PyArray1, PyArray2};
 use pyo3::{prelude::*, types::PyDict};
 
 use crate::{
-    arrays::{self, Wanted, array, matrix},
-    controlled_element::ControlledElement,
-    errors::{Outcome, bad_option},
+    arrays::{array, matrix},
     faults::{UsedRecord, faults_of, used_records},
     figures::{self, Pair, VerdictParts, pair, verdict},
-    files,
     fit::PyFit,
-    interrupt, names,
 };
 
 /// The operator of a person; the package wraps it in `pyhoid.OperatorFit`.
@@ -34,136 +21,20 @@ pub struct PyOperatorFit {
     asked: Identification,
     /// Channel of the excitation.
     channel: Option<String>,
+    settings: Vec<(String, String)>,
 }
 
-/// Name, value, standard error of a parameter of another fit, and whether it is determined.
-type FoundRow = (String, Option<f64>, Option<f64>, bool);
-
-/// A prior as text; or parameter, centre, spread and source of each entry; or another fit,
-/// its parameters and where they are from.
-#[derive(FromPyObject)]
-pub enum PriorOfUser {
-    Text(String),
-    Entries(Vec<(String, f64, f64, String)>),
-    Fit((Vec<FoundRow>, String)),
-}
-
-impl PriorOfUser {
-    pub fn prior(self) -> Outcome<OperatorPrior> {
-        Ok(match self {
-            Self::Text(text) => text.parse()?,
-            Self::Entries(entries) => OperatorPrior::new(
-                entries
-                    .into_iter()
-                    .map(|(parameter, centre, spread, source)| ParameterPrior {
-                        parameter,
-                        centre,
-                        spread,
-                        source,
-                    })
-                    .collect(),
-            )?,
-            Self::Fit((rows, source)) => {
-                let parameters = rows.iter().filter_map(|(name, value, standard_error, determined)| {
-                    let estimate = Estimate {
-                        value: (*value)?,
-                        standard_error: *standard_error,
-                    };
-                    Some((name.as_str(), estimate, *determined))
-                });
-                let prior = OperatorPrior::of_parameters(parameters, &source)?;
-                if prior.entries().is_empty() {
-                    return Err(bad_option(format!(
-                        "prior {source}: no parameter in it is determined and has an error; give a fit that determines \
-                         some, or \"population\""
-                    )));
-                }
-                prior
-            }
-        })
+impl PyOperatorFit {
+    /// An operator that was identified.
+    pub fn new(found: Identified, asked: Identification) -> Self {
+        Self {
+            channel: found.described.and_then(|described| described.channel),
+            settings: figures::settings(found.settings),
+            found: found.fit,
+            data: found.data,
+            asked,
+        }
     }
-}
-
-#[pyfunction]
-#[pyo3(signature = (records, *, form, neuromuscular, prior, excitation, period, controlled_element, individual, delay, nc, nd, run_to_run,
-    initial_state, search_method, max_iterations, tolerance, faults, decimate, criterion, progress))]
-#[allow(clippy::too_many_arguments)]
-pub fn identify_operator(
-    py: Python<'_>,
-    records: Vec<Bound<'_, PyAny>>,
-    form: &str,
-    neuromuscular: bool,
-    prior: PriorOfUser,
-    excitation: Option<String>,
-    period: Option<f64>,
-    controlled_element: Option<ControlledElement>,
-    individual: Vec<String>,
-    delay: Option<(f64, f64)>,
-    nc: (usize, usize),
-    nd: Option<(usize, usize)>,
-    run_to_run: Option<f64>,
-    initial_state: &str,
-    search_method: &str,
-    max_iterations: Option<usize>,
-    tolerance: Option<f64>,
-    faults: &str,
-    decimate: &str,
-    criterion: &str,
-    progress: Option<Bound<'_, PyAny>>,
-) -> Outcome<PyOperatorFit> {
-    // The order of the noise is chosen by Akaike's; a word that is none is wrong all the same.
-    names::criterion(criterion)?;
-    let records = arrays::records(&records, Wanted::All)?;
-    let mut named = BTreeMap::from([("nc".to_owned(), nc)]);
-    named.extend(nd.map(|nd| ("nd".to_owned(), nd)));
-    let usual = FamilyEstimator::default().with_noise_orders(&names::named_orders(&named)?)?;
-    let estimator = FamilyEstimator {
-        forms: match form {
-            "auto" => usual.forms,
-            name => vec![names::choice::<Form>("form", name)?],
-        },
-        neuromuscular,
-        prior: prior.prior()?,
-        delay_range_s: delay.unwrap_or(usual.delay_range_s),
-        individual: individual.iter().map(|name| coordinate(name)).collect::<Outcome<_>>()?,
-        run_to_run: run_to_run.unwrap_or(usual.run_to_run),
-        initial_state: names::initial_state(initial_state)?.unwrap_or_default(),
-        search: SearchOptions {
-            method: names::search_method(search_method)?,
-            max_iterations: max_iterations.unwrap_or(usual.search.max_iterations),
-            tolerance: tolerance.unwrap_or(usual.search.tolerance),
-        },
-        ..usual
-    };
-    let asked = Identification {
-        estimator,
-        excitation: Excitation::of_text(excitation.as_deref()),
-        period_s: period,
-        faults: names::choice::<FaultHandling>("faults", faults)?,
-        rate: files::decimation(decimate)?,
-        controlled_element: controlled_element.map(|e| e.transfer_function()).transpose()?,
-    };
-    let how = asked.clone();
-    let work = move |standing: &std::sync::Arc<interrupt::Standing>| {
-        interrupt::told(standing, || how.run(Recordings::of_records(records)))
-    };
-    let Identified {
-        fit, data, described, ..
-    } = interrupt::run(py, 1, progress.as_ref(), false, work)?;
-    Ok(PyOperatorFit {
-        found: fit,
-        data,
-        asked,
-        channel: described.and_then(|found| found.channel),
-    })
-}
-
-fn coordinate(name: &str) -> Outcome<Coordinate> {
-    Coordinate::of_parameter(name).ok_or_else(|| {
-        bad_option(format!(
-            "individual: there is no parameter {name}; expected K, T_L, T_I, omega_nm, zeta_nm or tau_e"
-        ))
-    })
 }
 
 /// Name, unit, value, standard error, interval, share of the prior, whether it is determined.
@@ -210,6 +81,12 @@ fn form_row<'py>(py: Python<'py>, f: &FormFigures) -> PyResult<Bound<'py, PyDict
 
 #[pymethods]
 impl PyOperatorFit {
+    /// The settings that were used.
+    #[getter]
+    fn settings(&self) -> Vec<(String, String)> {
+        self.settings.clone()
+    }
+
     /// The form, and whether it has neuromuscular dynamics.
     #[getter]
     fn form(&self) -> (&'static str, bool) {

@@ -123,6 +123,11 @@ pub fn plain_margins<'py>(py: Python<'py>, m: &Margins) -> PyResult<Bound<'py, P
     Ok(all)
 }
 
+/// Settings that were used, by their printed names.
+pub fn settings(all: Vec<hoid_analysis::Setting>) -> Vec<(String, String)> {
+    all.into_iter().map(|setting| (setting.name, setting.value)).collect()
+}
+
 pub fn quality<'py>(py: Python<'py>, q: &GoodnessOfFit) -> PyResult<Bound<'py, PyDict>> {
     let all = PyDict::new(py);
     all.set_item("vaf_simulation", q.vaf_simulation)?;

@@ -33,6 +33,7 @@ pub struct PyFit {
     identified: Option<(Verdict, Recordings)>,
     /// Whether a level of u was estimated of each record.
     with_levels: bool,
+    settings: Vec<(String, String)>,
 }
 
 impl PyFit {
@@ -44,6 +45,7 @@ impl PyFit {
             records,
             identified: None,
             with_levels: false,
+            settings: Vec::new(),
         }
     }
 
@@ -54,6 +56,7 @@ impl PyFit {
         let records = found.data.len();
         Self {
             with_levels,
+            settings: figures::settings(found.settings),
             identified: Some((found.verdict, found.data)),
             ..Self::new(fit, choice, records)
         }
@@ -64,6 +67,7 @@ impl PyFit {
         let first = Self::new(found.fit.polynomial_fit(0).clone(), None, found.data.len());
         Self {
             with_levels: found.is_without_means(),
+            settings: figures::settings(found.settings),
             grey_box: Some(found.fit),
             identified: Some((found.verdict, found.data)),
             ..first
@@ -99,6 +103,12 @@ fn series(py: Python<'_>, found: Series) -> SeriesParts<'_> {
 
 #[pymethods]
 impl PyFit {
+    /// The settings that were used.
+    #[getter]
+    fn settings(&self) -> Vec<(String, String)> {
+        self.settings.clone()
+    }
+
     #[getter]
     fn structure(&self) -> &'static str {
         if self.fit.is_grey_box() {

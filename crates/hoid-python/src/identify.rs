@@ -2,184 +2,116 @@
 
 use std::{collections::BTreeMap, sync::Arc};
 
-use hoid_analysis::{
-    AnalysisError, BatchEstimator, Identification, Identified, PolynomialFit, Polynomials, Recordings,
-};
+use hoid_analysis::{AnalysisError, Asked, BatchEstimator, Identification, Identified, Recordings, Request};
 use hoid_ident::{
-    Estimator, GreyBox, GreyBoxFit, InitialState, Instruments, Loss, SearchOptions, SigmoidChange, SigmoidFit,
-    estimators, settings::MethodSpec,
+    estimators,
+    settings::{Kind, MethodSpec, Setting},
 };
-use hoid_model::{Decimation, FaultHandling, Record};
+use hoid_model::{FaultHandling, Record};
 use pyo3::prelude::*;
 
 use crate::{
     arrays::{self, Wanted},
-    errors::{Failure, Outcome, bad_option},
-    family::PriorOfUser,
+    errors::{Failure, Outcome},
+    family::PyOperatorFit,
     files,
     fit::PyFit,
     interrupt::{self, Standing},
-    names::{self, Kind},
+    names,
     time_varying::PyTimeVaryingFit,
 };
 
 /// Samples times models from which a fit is long enough to get a thread of its own, for interrupts.
 const LONG: usize = 50_000;
 
-/// What a fit gave.
-enum Found {
-    Polynomials(Box<Identified<PolynomialFit>>),
-    GreyBox(Box<Identified<GreyBoxFit>>),
-    Change(Box<Identified<SigmoidFit>>),
-}
-
-type Work = Box<dyn FnOnce(&Arc<Standing>) -> Result<Found, AnalysisError> + Send>;
-
-/// Fits a model to records. The package has brought all options into plain form.
+/// Fits a model to records: the fit, and remarks on how it was asked for. The package has brought all options
+/// into the form of texts.
 #[pyfunction]
-#[pyo3(signature = (records, structure, *, orders, method, instruments, form, neuromuscular, prior, remnant_order, delay, individual, criterion, initial_state, start, fix,
-    bound, coefficient_prior, robust, focus, stable, search_method, max_iterations, tolerance, faults, decimate, progress))]
+#[pyo3(signature = (records, *, structure, method, options, faults, decimate, progress))]
 #[allow(clippy::too_many_arguments)]
 pub fn identify<'py>(
     py: Python<'py>,
     records: Vec<Bound<'py, PyAny>>,
-    structure: &str,
-    orders: BTreeMap<String, (usize, usize)>,
-    method: &str,
-    instruments: Option<String>,
-    form: Option<String>,
-    neuromuscular: bool,
-    prior: Option<PriorOfUser>,
-    remnant_order: Option<(usize, usize)>,
-    delay: Option<(f64, f64)>,
-    individual: Vec<String>,
-    criterion: &str,
-    initial_state: &str,
-    start: Option<BTreeMap<String, f64>>,
-    fix: BTreeMap<String, f64>,
-    bound: BTreeMap<String, (f64, f64)>,
-    coefficient_prior: BTreeMap<String, (f64, f64)>,
-    robust: Option<f64>,
-    focus: &str,
-    stable: bool,
-    search_method: &str,
-    max_iterations: Option<usize>,
-    tolerance: Option<f64>,
+    structure: Option<String>,
+    method: String,
+    options: BTreeMap<String, String>,
     faults: &str,
     decimate: &str,
     progress: Option<Bound<'py, PyAny>>,
-) -> Outcome<Bound<'py, PyAny>> {
-    let kind = names::kind(structure)?;
+) -> Outcome<(Bound<'py, PyAny>, Vec<String>)> {
     let records = arrays::records(&records, Wanted::All)?;
-    let step = names::search_method(search_method)?;
-    let search = |usual: SearchOptions| SearchOptions {
-        method: step,
-        max_iterations: max_iterations.unwrap_or(usual.max_iterations),
-        tolerance: tolerance.unwrap_or(usual.tolerance),
+    let request = Request {
+        structure,
+        method: Some(method),
+        options,
+        faults: names::choice::<FaultHandling>("faults", faults)?,
+        rate: files::decimation(decimate)?,
     };
-    let initial_state = names::initial_state(initial_state)?;
-    let constraints = names::constraints(fix, bound)?;
-    let handling = (
-        names::choice::<FaultHandling>("faults", faults)?,
-        files::decimation(decimate)?,
-    );
-    let samples: usize = records.iter().map(Record::len).sum();
-
-    /// How it is done, for a thread of its own.
-    fn work<E: BatchEstimator + Send + 'static>(
-        estimator: E,
-        (faults, rate): (FaultHandling, Decimation),
-        records: Vec<Record>,
-        found: impl FnOnce(Box<Identified<E::Fit>>) -> Found + Send + 'static,
-    ) -> Work {
-        let how = Identification {
-            faults,
-            rate,
-            ..Identification::of(estimator)
-        };
-        Box::new(move |standing| {
-            let run = || how.run(Recordings::of_records(records));
-            Ok(found(Box::new(interrupt::told(standing, run)?)))
-        })
-    }
-
-    let (work, models): (Work, usize) = match kind {
-        Kind::Polynomial(structure) => {
-            let usual = Polynomials::new(structure);
-            let estimator = Polynomials {
-                template: Estimator {
-                    initial_state,
-                    search: search(usual.template.search),
-                    constraints,
-                    priors: names::priors(coefficient_prior)?,
-                    loss: robust.map_or(Loss::Quadratic, |threshold| Loss::Huber { threshold }),
-                    focus: names::focus(focus)?,
-                    stable,
-                    ..usual.template
-                },
-                orders: names::named_orders(&orders)?,
-                delay_s: delay,
-                criterion: names::criterion(criterion)?,
-                start,
-                method: names::fit_method(method)?,
-                instruments: instruments.as_deref().map(Instruments::of_text),
-                ..usual
-            };
-            let models = estimator.ranges(records[0].sample_time())?.combinations()?.len();
-            (work(estimator, handling, records, Found::Polynomials), models)
+    let (asked, notes) = request.asked()?;
+    let progress = progress.as_ref();
+    let fit = match asked {
+        Asked::Operator(how) => {
+            let found = run(py, how.clone(), records, 1, progress)?;
+            Bound::new(py, PyOperatorFit::new(found, how))?.into_any()
         }
-        Kind::GreyBox => {
-            let usual = GreyBox::new(names::range("remnant_order", remnant_order.unwrap_or((1, 4)))?);
-            let estimator = GreyBox {
-                delay_range_s: delay.unwrap_or(usual.delay_range_s),
-                constraints,
-                individual,
-                initial_state: initial_state.unwrap_or_default(),
-                search: search(usual.search),
-                ..usual
-            };
-            (work(estimator, handling, records, Found::GreyBox), 10)
-        }
-        Kind::TimeVarying => {
-            if initial_state.is_some_and(|rule| rule != InitialState::Estimate) {
-                return Err(bad_option(
-                    "initial_state: the time-varying fit estimates the initial states; \
-                     give \"auto\" or \"estimate\"",
-                ));
-            }
-            let usual = SigmoidChange::default().with_noise_orders(&names::named_orders(&orders)?)?;
-            let estimator = SigmoidChange {
-                form: match form.as_deref() {
-                    None | Some("auto") => usual.form,
-                    Some(name) => names::choice("form", name)?,
-                },
-                neuromuscular,
-                prior: prior.map_or(Ok(usual.prior.clone()), PriorOfUser::prior)?,
-                delay_range_s: delay.unwrap_or(usual.delay_range_s),
-                constraints,
-                search: search(usual.search),
-                ..usual
-            };
-            (work(estimator, handling, records, Found::Change), 10)
+        Asked::Remnant(how) => Bound::new(py, PyFit::of_grey_box(run(py, how, records, 10, progress)?))?.into_any(),
+        Asked::Change(how) => Bound::new(py, PyTimeVaryingFit::new(run(py, how, records, 10, progress)?))?.into_any(),
+        Asked::Polynomials(how) => {
+            let models = how.estimator.ranges(records[0].sample_time())?.combinations()?.len();
+            Bound::new(py, PyFit::of_polynomials(run(py, how, records, models, progress)?))?.into_any()
         }
     };
-    let found = if samples * models < LONG && progress.is_none() {
-        py.detach(|| work(&Arc::default())).map_err(Failure::from)?
-    } else {
-        interrupt::run(py, models as u64, progress.as_ref(), false, work)?
-    };
-    Ok(match found {
-        Found::Polynomials(found) => Bound::new(py, PyFit::of_polynomials(*found))?.into_any(),
-        Found::GreyBox(found) => Bound::new(py, PyFit::of_grey_box(*found))?.into_any(),
-        Found::Change(found) => Bound::new(py, PyTimeVaryingFit::new(*found))?.into_any(),
-    })
+    Ok((fit, notes))
 }
 
-/// Name of each batch estimator, the structures that it serves, and the keywords that it takes.
+/// The identification without the interpreter, in a thread of its own where it is long.
+fn run<E>(
+    py: Python<'_>,
+    how: Identification<E>,
+    records: Vec<Record>,
+    models: usize,
+    progress: Option<&Bound<'_, PyAny>>,
+) -> Outcome<Identified<E::Fit>>
+where
+    E: BatchEstimator + Send + Sync + 'static,
+    E::Fit: Send + 'static,
+{
+    let samples: usize = records.iter().map(Record::len).sum();
+    let work = move |standing: &Arc<Standing>| -> Result<_, AnalysisError> {
+        interrupt::told(standing, || how.run(Recordings::of_records(records)))
+    };
+    if samples * models < LONG && progress.is_none() {
+        py.detach(|| work(&Arc::default())).map_err(Failure::from)
+    } else {
+        interrupt::run(py, models as u64, progress, false, work)
+    }
+}
+
+/// The type of a value, as the package asks for it.
+fn kind(setting: &Setting) -> &'static str {
+    match setting.kind {
+        Kind::Flag => "flag",
+        Kind::Choice(_) => "choice",
+        Kind::Counts | Kind::Delay => "counts",
+        Kind::Names => "names",
+        Kind::Element => "element",
+        Kind::Prior => "prior",
+        Kind::Named(Kind::Guess) => "guesses",
+        _ => "text",
+    }
+}
+
+/// Name of each batch estimator, the structures that it serves, and the keywords that it takes with the type of
+/// each.
 #[pyfunction]
-pub fn batch_estimators() -> Vec<(&'static str, Vec<&'static str>, Vec<&'static str>)> {
+pub fn batch_estimators() -> Vec<(&'static str, Vec<&'static str>, BTreeMap<&'static str, &'static str>)> {
     let structures = |spec: &MethodSpec| spec.structures.iter().map(|structure| structure.name()).collect();
-    let keywords = |spec: &MethodSpec| spec.settings.iter().map(|setting| setting.name).collect();
+    let keywords = |spec: &MethodSpec| {
+        spec.settings
+            .iter()
+            .map(|setting| (setting.name, kind(setting)))
+            .collect()
+    };
     let of = |spec: &MethodSpec| (spec.name, structures(spec), keywords(spec));
     estimators().iter().map(of).collect()
 }

@@ -60,7 +60,6 @@ fn _pyhoid(module: &Bound<'_, PyModule>) -> PyResult<()> {
     for function in [
         wrap_pyfunction!(describing::describe, module)?,
         wrap_pyfunction!(describing::describing_function, module)?,
-        wrap_pyfunction!(family::identify_operator, module)?,
         wrap_pyfunction!(files::check_record, module)?,
         wrap_pyfunction!(files::decimated, module)?,
         wrap_pyfunction!(files::decimation_is_auto, module)?,

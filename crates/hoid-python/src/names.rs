@@ -2,9 +2,7 @@
 
 use std::{collections::BTreeMap, ops::RangeInclusive};
 
-use hoid_ident::{
-    Constraint, Focus, InitialState, IvMethod, NamedOrders, Prior, SearchMethod, order_selection::Criterion,
-};
+use hoid_ident::{NamedOrders, order_selection::Criterion};
 use hoid_io::QualityIssueKind;
 use hoid_model::{
     Detrend, NamedChoice, SampleTime, Structure, discretise, remnant::RemnantDiscretisation,
@@ -48,54 +46,12 @@ pub fn quality_issue_kind(found: &str) -> Outcome<QualityIssueKind> {
     word("mask", found, &kinds.map(|kind| (kind.name(), kind)))
 }
 
-/// What `identify` fits.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Kind {
-    Polynomial(Structure),
-    GreyBox,
-    TimeVarying,
-}
-
-/// The structures by name.
-fn structures() -> impl Iterator<Item = (&'static str, Structure)> {
-    Structure::ALL
-        .into_iter()
-        .map(|structure| (structure.name(), structure))
-}
-
 pub fn structure(found: &str) -> Outcome<Structure> {
     choice("structure", found)
 }
 
-pub fn kind(found: &str) -> Outcome<Kind> {
-    let mut all: Vec<(&str, Kind)> = structures().map(|(w, s)| (w, Kind::Polynomial(s))).collect();
-    all.extend([("grey-box", Kind::GreyBox), ("time-varying", Kind::TimeVarying)]);
-    word("structure", found, &all)
-}
-
-/// None is the prediction error method.
-pub fn fit_method(found: &str) -> Outcome<Option<IvMethod>> {
-    let instruments = IvMethod::ALL.map(|method| (method.name(), Some(method)));
-    let words: Vec<_> = [("pem", None)].into_iter().chain(instruments).collect();
-    word("method", found, &words)
-}
-
-pub fn focus(found: &str) -> Outcome<Focus> {
-    choice("focus", found)
-}
-
-pub fn search_method(found: &str) -> Outcome<SearchMethod> {
-    choice("search_method", found)
-}
-
 pub fn criterion(found: &str) -> Outcome<Criterion> {
     choice("criterion", found)
-}
-
-pub fn initial_state(found: &str) -> Outcome<Option<InitialState>> {
-    let rules = InitialState::ALL.map(|rule| (rule.name(), Some(rule)));
-    let words: Vec<_> = [("auto", None)].into_iter().chain(rules).collect();
-    word("initial_state", found, &words)
 }
 
 pub fn detrend(found: &str) -> Outcome<Detrend> {
@@ -176,46 +132,6 @@ pub fn with_delay(
 pub fn named_orders(orders: &BTreeMap<String, (usize, usize)>) -> Outcome<NamedOrders> {
     let one = |(name, ends): (&String, &(usize, usize))| Ok((name.clone(), range(name, *ends)?));
     orders.iter().map(one).collect()
-}
-
-/// Fixed values and bounds, by name.
-pub fn constraints(
-    fixed: BTreeMap<String, f64>,
-    bounds: BTreeMap<String, (f64, f64)>,
-) -> Outcome<BTreeMap<String, Constraint>> {
-    let mut all: BTreeMap<String, Constraint> = BTreeMap::new();
-    for (name, value) in fixed {
-        if !value.is_finite() {
-            return Err(bad_option(format!("fix: {name} is {value}, expected a finite number")));
-        }
-        all.insert(name, Constraint::Fixed(value));
-    }
-    for (name, (low, high)) in bounds {
-        if low.is_nan() || high.is_nan() || low > high {
-            return Err(bad_option(format!(
-                "bound: {name} is {low} to {high}, expected the lower bound first"
-            )));
-        }
-        if all.insert(name.clone(), Constraint::Between(low, high)).is_some() {
-            return Err(bad_option(format!("{name} is both fixed and bounded; drop one")));
-        }
-    }
-    Ok(all)
-}
-
-/// Guesses with their weights, by name.
-pub fn priors(guesses: BTreeMap<String, (f64, f64)>) -> Outcome<BTreeMap<String, Prior>> {
-    let one = |(name, (value, weight)): (String, (f64, f64))| {
-        if value.is_finite() && weight.is_finite() && weight >= 0.0 {
-            Ok((name, Prior { value, weight }))
-        } else {
-            Err(bad_option(format!(
-                "coefficient_prior: {name} is {value} with the weight {weight}, \
-                 expected finite numbers and a weight of zero or more"
-            )))
-        }
-    };
-    guesses.into_iter().map(one).collect()
 }
 
 /// Theta of a model with these names: every coefficient, each once.

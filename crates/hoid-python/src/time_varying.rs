@@ -19,6 +19,7 @@ pub struct PyTimeVaryingFit {
     fit: SigmoidFit,
     found: Verdict,
     data: Recordings,
+    settings: Vec<(String, String)>,
 }
 
 impl PyTimeVaryingFit {
@@ -27,6 +28,7 @@ impl PyTimeVaryingFit {
             fit: found.fit,
             found: found.verdict,
             data: found.data,
+            settings: figures::settings(found.settings),
         }
     }
 }
@@ -49,6 +51,12 @@ fn operator<'py>(py: Python<'py>, of: &ChangedOperator) -> PyResult<Option<Bound
 
 #[pymethods]
 impl PyTimeVaryingFit {
+    /// The settings that were used.
+    #[getter]
+    fn settings(&self) -> Vec<(String, String)> {
+        self.settings.clone()
+    }
+
     #[getter]
     fn form(&self) -> &'static str {
         self.fit.form().name()

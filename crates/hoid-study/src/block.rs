@@ -1,6 +1,6 @@
 //! One block of a study: some replications of a cell, with all estimators of the cell.
 
-use hoid_analysis::{AnalysisError, Recordings};
+use hoid_analysis::{AnalysisError, Asked, Recordings};
 use hoid_ident::{Fit, IdentError};
 use hoid_model::Record;
 use hoid_sim::{RunSeed, Simulator};
@@ -10,7 +10,7 @@ use crate::{
     batch_fits::BatchFits,
     columns::Schemas,
     estimate_rows::{BlockTables, EstimateRows},
-    plan::{Analysis, EstimatorCell, Plan, Task},
+    plan::{EstimatorCell, Plan, Task},
     prepared::Preparation,
 };
 
@@ -176,7 +176,7 @@ impl<'a> CellRun<'a> {
                 self.rows.fit_row(estimator, grey.polynomial_fit(0), record, operator)?;
                 self.rows.termination(grey.termination());
             }
-            Task::Analysis(analysis) => self.analyse(analysis, record, estimator)?,
+            Task::Analysis(asked) => self.analyse(asked, record, estimator)?,
             Task::Track(options) => {
                 let kept = self.plan.trace_every.unwrap_or(ERRORS_EVERY);
                 let every = greatest_common_divisor(kept, ERRORS_EVERY);
@@ -193,29 +193,37 @@ impl<'a> CellRun<'a> {
     }
 
     /// As `hoid identify` does it with the recording.
-    fn analyse(&mut self, analysis: &Analysis, record: &Record, estimator: &'a EstimatorCell) -> Result<(), String> {
+    fn analyse(&mut self, asked: &Asked, record: &Record, estimator: &'a EstimatorCell) -> Result<(), String> {
         let text = |error: AnalysisError| error.to_string();
         let recording = Recordings::of_records([record.clone()]);
-        match analysis {
-            Analysis::Operator(how) => {
+        match asked {
+            Asked::Operator(how) => {
                 let found = how.run(recording).map_err(text)?;
                 self.rows.operator_row(&found)?;
                 self.rows.verdict(&found.verdict);
             }
-            Analysis::Change(how) => {
+            Asked::Change(how) => {
                 let found = how.run(recording).map_err(text)?;
                 self.rows.change_row(&found)?;
                 self.rows.verdict(&found.verdict);
             }
-            Analysis::Instrumental(how) => {
+            Asked::Remnant(how) => {
                 let found = how.run(recording).map_err(text)?;
-                let fit = &found.fit.fit;
-                let operator = fit.operator().map_err(|reason| reason.to_string());
-                self.rows.fit_row(estimator, fit, &found.data.records[0], operator)?;
+                self.polynomial_row(estimator, found.fit.polynomial_fit(0), &found.data.records[0])?;
+                self.rows.verdict(&found.verdict);
+            }
+            Asked::Polynomials(how) => {
+                let found = how.run(recording).map_err(text)?;
+                self.polynomial_row(estimator, &found.fit.fit, &found.data.records[0])?;
                 self.rows.verdict(&found.verdict);
             }
         }
         Ok(())
+    }
+
+    fn polynomial_row(&mut self, estimator: &'a EstimatorCell, fit: &Fit, record: &Record) -> Result<(), String> {
+        let operator = fit.operator().map_err(|reason| reason.to_string());
+        self.rows.fit_row(estimator, fit, record, operator)
     }
 
     fn fail_all(&mut self, replication: u64, reason: &str, done: &(dyn Fn(u64) + Sync)) {

@@ -11,9 +11,10 @@
 
 use std::collections::BTreeMap;
 
+use hoid_analysis::Asked;
 use hoid_io::{ColumnKind, ColumnSchema, ColumnValues, OutputColumn, OutputTable, TableSchema};
 
-use crate::plan::{Analysis, Plan, Task};
+use crate::plan::{Plan, Task, analysis};
 
 /// The operator's parameters, in the order of all tables.
 pub const OPERATOR: [&str; 5] = ["K_e", "T_L", "K_e_dot", "omega_nm", "zeta_nm"];
@@ -223,7 +224,7 @@ fn fits(plan: &Plan, theta: &[String], comments: Vec<String>) -> TableSchema {
     c.add(Whole, &["decimate"]);
     c.add(Real, &["from_s", "to_s"]);
     c.add(Text, &["status", "reason", "termination"]);
-    let analyses: Vec<&Analysis> = plan.estimators.iter().filter_map(|e| e.task.analysis()).collect();
+    let analyses: Vec<&Asked> = plan.estimators.iter().filter_map(|e| e.task.analysis()).collect();
     if !analyses.is_empty() {
         c.add(Text, &["verdict", "findings", "form"]);
     }
@@ -235,7 +236,7 @@ fn fits(plan: &Plan, theta: &[String], comments: Vec<String>) -> TableSchema {
     let mut estimated: Vec<&str> = theta.iter().map(String::as_str).collect();
     estimated.extend(OPERATOR);
     estimated.extend(["tau_e", "T_n", "K_n"]);
-    let of_analyses: Vec<String> = analyses.iter().flat_map(|analysis| analysis.parameters()).collect();
+    let of_analyses: Vec<String> = analyses.iter().flat_map(|asked| analysis::parameters(asked)).collect();
     for name in &of_analyses {
         if !estimated.contains(&name.as_str()) {
             estimated.push(name);
@@ -248,7 +249,7 @@ fn fits(plan: &Plan, theta: &[String], comments: Vec<String>) -> TableSchema {
         }
     }
     c.add(Real, &["T_n_backward_euler", "K_n_backward_euler"]);
-    if analyses.iter().any(|analysis| matches!(analysis, Analysis::Change(_))) {
+    if analyses.iter().any(|asked| matches!(asked, Asked::Change(_))) {
         c.add(Real, &["change_found"]);
     }
     if plan.estimators.iter().any(|e| matches!(e.task, Task::Track(_))) {

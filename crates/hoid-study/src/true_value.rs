@@ -1,5 +1,6 @@
 //! The true values of what is estimated.
 
+use hoid_analysis::Asked;
 use hoid_model::{
     remnant::{RemnantDiscretisation, RemnantFilter},
     schedule::Schedule,
@@ -7,7 +8,7 @@ use hoid_model::{
 
 use crate::{
     columns::OPERATOR,
-    plan::{Analysis, Cell, EstimatorCell, Task},
+    plan::{Cell, EstimatorCell, Task},
 };
 
 /// True value of a column of the table of fits, where it is known and does not change within the
@@ -19,7 +20,7 @@ pub fn true_value(cell: &Cell, estimator: &EstimatorCell, name: &str) -> f64 {
         Task::Track(_) => (scenario.measurement_s, scenario.measurement_s),
         _ => estimator.span_s.unwrap_or((0.0, scenario.measurement_s)),
     };
-    if let Some(Analysis::Change(_)) = estimator.task.analysis() {
+    if let Some(Asked::Change(_)) = estimator.task.analysis() {
         return of_change(cell, name);
     }
     let [first, last] = [from, to].map(|t| cell.resolved.parameters_at(t).operator);
@@ -84,7 +85,7 @@ fn of_change(cell: &Cell, name: &str) -> f64 {
 fn of_noise_model(cell: &Cell, estimator: &EstimatorCell, k_n: f64, name: &str) -> f64 {
     let remnant = cell.resolved.scenario().remnant;
     let by_polynomials =
-        matches!(estimator.task, Task::Fit(_)) || matches!(estimator.task.analysis(), Some(Analysis::Instrumental(_)));
+        matches!(estimator.task, Task::Fit(_)) || matches!(estimator.task.analysis(), Some(Asked::Polynomials(_)));
     if estimator.decimate > 1 || !by_polynomials {
         return f64::NAN;
     }

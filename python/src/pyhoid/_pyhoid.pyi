@@ -47,7 +47,6 @@ __all__ = [
     "group",
     "group_manifest",
     "identify",
-    "identify_operator",
     "info",
     "margins",
     "merge_shards",
@@ -96,6 +95,8 @@ class Description:
 
 @final
 class Fit:
+    @property
+    def settings(self) -> list[tuple[str, str]]: ...
     @property
     def structure(self) -> str: ...
     @property
@@ -154,6 +155,8 @@ class Fit:
 
 @final
 class OperatorFit:
+    @property
+    def settings(self) -> list[tuple[str, str]]: ...
     @property
     def form(self) -> tuple[str, bool]: ...
     @property
@@ -241,6 +244,8 @@ class Plan:
 
 @final
 class TimeVaryingFit:
+    @property
+    def settings(self) -> list[tuple[str, str]]: ...
     @property
     def form(self) -> str: ...
     @property
@@ -441,61 +446,14 @@ def group(
 def group_manifest(directory: _Path, pattern: str) -> tuple[str, list[str]]: ...
 def identify(
     records: Sequence[Record],
-    structure: str,
     *,
-    orders: dict[str, _Ends],
+    structure: str | None,
     method: str,
-    instruments: str | None,
-    form: str | None,
-    neuromuscular: bool,
-    prior: str
-    | list[tuple[str, float, float, str]]
-    | tuple[list[tuple[str, float | None, float | None, bool]], str]
-    | None,
-    remnant_order: _Ends | None,
-    delay: tuple[float, float] | None,
-    individual: list[str],
-    criterion: str,
-    initial_state: str,
-    start: dict[str, float] | None,
-    fix: dict[str, float],
-    bound: dict[str, tuple[float, float]],
-    coefficient_prior: dict[str, tuple[float, float]],
-    robust: float | None,
-    focus: str,
-    stable: bool,
-    search_method: str,
-    max_iterations: int | None,
-    tolerance: float | None,
+    options: dict[str, str],
     faults: str,
     decimate: str,
     progress: _Progress,
-) -> Fit | TimeVaryingFit: ...
-def identify_operator(
-    records: Sequence[Record],
-    *,
-    form: str,
-    neuromuscular: bool,
-    prior: str
-    | list[tuple[str, float, float, str]]
-    | tuple[list[tuple[str, float | None, float | None, bool]], str],
-    excitation: str | None,
-    period: float | None,
-    controlled_element: str | tuple[list[float], list[float]] | None,
-    individual: list[str],
-    delay: tuple[float, float] | None,
-    nc: _Ends,
-    nd: _Ends | None,
-    run_to_run: float | None,
-    initial_state: str,
-    search_method: str,
-    max_iterations: int | None,
-    tolerance: float | None,
-    faults: str,
-    decimate: str,
-    criterion: str,
-    progress: _Progress,
-) -> OperatorFit: ...
+) -> tuple[OperatorFit | Fit | TimeVaryingFit, list[str]]: ...
 def even_times(times: npt.NDArray[np.float64]) -> tuple[float | None, int]: ...
 def info(
     path: _Path,
@@ -589,7 +547,7 @@ def simulate_people(
     seed: int,
     trouble: list[str],
 ) -> int: ...
-def batch_estimators() -> list[tuple[str, list[str], list[str]]]: ...
+def batch_estimators() -> list[tuple[str, list[str], dict[str, str]]]: ...
 def recursive_methods() -> list[tuple[str, str, str, list[str]]]: ...
 def renamed_method(name: str) -> tuple[str, str] | None: ...
 def track(

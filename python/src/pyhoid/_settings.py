@@ -1,18 +1,26 @@
-"""The recursive methods and their options, made from the registry of the library.
+"""The estimators and recursive methods and their options, made from the registries of the library.
 
 `HOID_UPDATE_DOCS=1 cargo test -p hoid-cli` renews this file; it is not edited by hand.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from os import PathLike
 from typing import TYPE_CHECKING, Literal, TypedDict
 
 if TYPE_CHECKING:
     from .operator_fit import OperatorFit
 
-__all__ = ["METHODS", "SETTINGS", "MethodSettings", "RecursiveMethod", "Structure"]
+__all__ = [
+    "BATCH_SETTINGS",
+    "METHODS",
+    "SETTINGS",
+    "BatchSettings",
+    "MethodSettings",
+    "RecursiveMethod",
+    "Structure",
+]
 
 #: A recursive method.
 RecursiveMethod = Literal[
@@ -141,6 +149,119 @@ class MethodSettings(TypedDict, total=False):
     prior: str | PathLike[str] | Mapping[str, tuple[float, float]] | OperatorFit | None
 
 
+class BatchSettings(TypedDict, total=False):
+    """Options of the batch estimators."""
+
+    # Noise of the operator: ar an autoregression, arma with a moving average (nc), remnant the
+    # remnant of order m. For operators.
+    noise: Literal["ar", "arma", "remnant"] | None
+
+    # Whether the operator changes: not at all, or its gains once, by a sigmoid. For operators.
+    change: Literal["none", "sigmoid"] | None
+
+    # Form of the operator; auto: the simplest that held-out runs do not refute, of one that
+    # changes lead. For operator, change="sigmoid".
+    form: (
+        Literal[
+            "auto",
+            "gain",
+            "lead",
+            "lead2",
+            "lag",
+            "lead-lag",
+            "lead2-lag",
+            "quadratic-integral",
+            "lead-droop",
+        ]
+        | None
+    )
+
+    # With neuromuscular dynamics omega_nm, zeta_nm. For operator, change="sigmoid".
+    neuromuscular: Literal["yes", "no"] | None
+
+    # What is known of the person before the data: population (published people), none, a JSON
+    # result of another fit, or NAME=CENTRE:SPREAD of omega_nm, zeta_nm, tau_e, T_L, T_I, as
+    # omega_nm=10.5:0.3 (the spread is relative). For operator, change="sigmoid".
+    prior: str | PathLike[str] | Mapping[str, tuple[float, float]] | OperatorFit | None
+
+    # Column of the recorded disturbance or target, for the fit at its lines; none for no such
+    # fit. For operator.
+    excitation: str | None
+
+    # Period of the excitation. For operator.
+    period: float | None
+
+    # Controlled element in s, as 90/(s(s+6)), or NUM/DEN by descending powers of s, as
+    # 90/1,6,0: adds crossover frequency and margins. For polynomials, operator,
+    # noise="remnant".
+    controlled_element: str | tuple[Sequence[float], Sequence[float]] | None
+
+    # Delay tau_e, or the shortest and the longest; of polynomials in place of nk = tau_e/Ts +
+    # 1.
+    delay: float | tuple[float, float] | None
+
+    # Parameters that each record has for itself, as K,T_L. For operator, noise="remnant".
+    individual: Sequence[str] | None
+
+    # What a person's gain varies by from run to run, as a part of it: in the error bars of
+    # fewer than five records. For operator.
+    run_to_run: float | None
+
+    # Initial states of each record; auto: estimate, and backcast for an output alone (ar, ma,
+    # arma). For operators, pem.
+    initial_state: Literal["auto", "zero", "estimate", "backcast"] | None
+
+    # How the search steps: gn Gauss-Newton, lm Levenberg-Marquardt, grad steepest descent. For
+    # operators, pem.
+    search_method: Literal["auto", "gn", "lm", "grad"] | None
+
+    # Largest number of search steps from each start.
+    max_iterations: int | None
+
+    # Relative decrease of the loss below which the search has converged.
+    tolerance: float | None
+
+    # Order m of the remnant, a number or a range to search. For noise="remnant".
+    remnant_order: int | tuple[int, int] | range | None
+
+    # Parameters held at a value, as d1=-0.85,f1=-1.9. For noise="remnant", change="sigmoid",
+    # pem.
+    fix: Mapping[str, float] | None
+
+    # Bounds of parameters, as b0=0..0.2,f2=..0.99; an end may be left open. For
+    # noise="remnant", change="sigmoid", pem.
+    bound: Mapping[str, tuple[float | None, float | None]] | None
+
+    # Delay of b0 in samples (29), or dead time in s (0.28s); a number or a range (20..40,
+    # 0.1s..0.4s) to search. For polynomials.
+    nk: int | tuple[int, int] | range | str | None
+
+    # What decides between candidates when something is searched. For polynomials.
+    criterion: Literal["loss", "aic", "aicc", "bic", "fpe", "mdl", "yic"] | None
+
+    # Start of the search, all coefficients as f1=-1.9,f2=.92,b0=.04,.... For pem.
+    start: Mapping[str, float] | None
+
+    # Guesses of coefficients with a weight W, as f1=-1.9:0.5: the loss grows by W (f1 + 1.9)^2.
+    # For pem.
+    coefficient_prior: Mapping[str, tuple[float, float]] | None
+
+    # Loss of Huber instead of squares: residuals beyond so many standard deviations count
+    # linearly; of no number 1.345. For pem.
+    robust: float | bool | None
+
+    # What the model is to be good at: one-step prediction, or simulation from the input alone.
+    # For pem.
+    focus: Literal["prediction", "simulation"] | None
+
+    # Take only models that are stable from e to u (C and F always are stable). For pem.
+    stable: bool | None
+
+    # Instruments: a channel that the noise does not reach, or `simulated` from the input, for
+    # an open loop. For iv4, sriv, rivbj.
+    instruments: str | None
+
+
 #: The methods, as the documentation of `track` lists them.
 METHODS = """``"rls"``: recursive least squares;
         ``"rpem"``: recursive prediction-error method, for every structure;
@@ -220,3 +341,76 @@ SETTINGS = """covariance : float
             What is known of the person before the first sample: population, none,
             NAME=CENTRE:SPREAD of omega_nm, zeta_nm, tau_e, T_I (the spread is relative), or an
             earlier fit of them, a file that hoid identify --json has printed. For adaptive."""
+
+#: The options, as the documentation of `identify` lists them.
+BATCH_SETTINGS = """noise : Literal['ar', 'arma', 'remnant']
+            Noise of the operator: ar an autoregression, arma with a moving average (nc),
+            remnant the remnant of order m. For operators.
+        change : Literal['none', 'sigmoid']
+            Whether the operator changes: not at all, or its gains once, by a sigmoid. For
+            operators.
+        form : Literal['auto', 'gain', 'lead', 'lead2', 'lag', 'lead-lag', 'lead2-lag', 'quadratic-integral', 'lead-droop']
+            Form of the operator; auto: the simplest that held-out runs do not refute, of one
+            that changes lead. For operator, change="sigmoid".
+        neuromuscular : Literal['yes', 'no']
+            With neuromuscular dynamics omega_nm, zeta_nm. For operator, change="sigmoid".
+        prior : str | PathLike[str] | Mapping[str, tuple[float, float]] | OperatorFit
+            What is known of the person before the data: population (published people), none, a
+            JSON result of another fit, or NAME=CENTRE:SPREAD of omega_nm, zeta_nm, tau_e, T_L,
+            T_I, as omega_nm=10.5:0.3 (the spread is relative). For operator, change="sigmoid".
+        excitation : str
+            Column of the recorded disturbance or target, for the fit at its lines; none for no
+            such fit. For operator.
+        period : float
+            Period of the excitation. For operator.
+        controlled_element : str | tuple[Sequence[float], Sequence[float]]
+            Controlled element in s, as 90/(s(s+6)), or NUM/DEN by descending powers of s, as
+            90/1,6,0: adds crossover frequency and margins. For polynomials, operator,
+            noise="remnant".
+        delay : float | tuple[float, float]
+            Delay tau_e, or the shortest and the longest; of polynomials in place of nk =
+            tau_e/Ts + 1.
+        individual : Sequence[str]
+            Parameters that each record has for itself, as K,T_L. For operator, noise="remnant".
+        run_to_run : float
+            What a person's gain varies by from run to run, as a part of it: in the error bars
+            of fewer than five records. For operator.
+        initial_state : Literal['auto', 'zero', 'estimate', 'backcast']
+            Initial states of each record; auto: estimate, and backcast for an output alone (ar,
+            ma, arma). For operators, pem.
+        search_method : Literal['auto', 'gn', 'lm', 'grad']
+            How the search steps: gn Gauss-Newton, lm Levenberg-Marquardt, grad steepest
+            descent. For operators, pem.
+        max_iterations : int
+            Largest number of search steps from each start.
+        tolerance : float
+            Relative decrease of the loss below which the search has converged.
+        remnant_order : int | tuple[int, int] | range
+            Order m of the remnant, a number or a range to search. For noise="remnant".
+        fix : Mapping[str, float]
+            Parameters held at a value, as d1=-0.85,f1=-1.9. For noise="remnant",
+            change="sigmoid", pem.
+        bound : Mapping[str, tuple[float | None, float | None]]
+            Bounds of parameters, as b0=0..0.2,f2=..0.99; an end may be left open. For
+            noise="remnant", change="sigmoid", pem.
+        nk : int | tuple[int, int] | range | str
+            Delay of b0 in samples (29), or dead time in s (0.28s); a number or a range (20..40,
+            0.1s..0.4s) to search. For polynomials.
+        criterion : Literal['loss', 'aic', 'aicc', 'bic', 'fpe', 'mdl', 'yic']
+            What decides between candidates when something is searched. For polynomials.
+        start : Mapping[str, float]
+            Start of the search, all coefficients as f1=-1.9,f2=.92,b0=.04,.... For pem.
+        coefficient_prior : Mapping[str, tuple[float, float]]
+            Guesses of coefficients with a weight W, as f1=-1.9:0.5: the loss grows by W (f1 +
+            1.9)^2. For pem.
+        robust : float | bool
+            Loss of Huber instead of squares: residuals beyond so many standard deviations count
+            linearly; of no number 1.345. For pem.
+        focus : Literal['prediction', 'simulation']
+            What the model is to be good at: one-step prediction, or simulation from the input
+            alone. For pem.
+        stable : bool
+            Take only models that are stable from e to u (C and F always are stable). For pem.
+        instruments : str
+            Instruments: a channel that the noise does not reach, or `simulated` from the input,
+            for an open loop. For iv4, sriv, rivbj."""

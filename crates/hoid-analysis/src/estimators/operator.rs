@@ -35,6 +35,12 @@ impl BatchEstimator for FamilyEstimator {
         let estimator = Self {
             excitation: channel,
             period_s: with.period_s,
+            // What was asked for in reading has been done.
+            detrend: if data.were_detrended() {
+                Detrend::None
+            } else {
+                with.estimator.detrend
+            },
             ..with.estimator.clone()
         };
         let fit = estimator.fit_beside(&data.records, of_lines(&described, &with.excitation))?;

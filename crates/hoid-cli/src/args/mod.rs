@@ -45,14 +45,14 @@ pub use describe::DescribeArgs;
 pub use fmu::{FmuArgs, OperatorChoice};
 pub use group::{GroupArgs, GroupCommand, GroupInitArgs, GroupRunArgs, SimulateGroupArgs};
 pub use help::command;
-pub use identify::{IdentifyArgs, ModelKind, estimators_with};
+pub use identify::IdentifyArgs;
 pub use lab::LabArgs;
 pub use parse::parse_span;
 pub use reading::{MaskArgs, ReadArgs};
 pub use recursion::{RecursionArgs, StreamArgs, TrackArgs};
 #[cfg(test)]
 pub use settings::with_settings;
-pub use settings::{flag, methods_with};
+pub use settings::{flag, in_words, methods_with};
 pub use shell::{CompletionsArgs, ManArgs};
 pub use simulate::{DemoArgs, MarginsArgs, ScenarioChoice, SimulateArgs, StateName};
 pub use study::{ReproduceArgs, StudyCommand, StudyMergeArgs, StudyRunArgs};

@@ -23,6 +23,15 @@ pub fn parse_width(text: &str) -> Result<f64, String> {
         .ok_or_else(|| format!("{text:?} is no width; write one from 10mm to 2000mm, as 85mm, 17cm or 3.3in"))
 }
 
+/// Most samples ahead of a prediction that is judged.
+const MOST_AHEAD: usize = 1_000_000;
+
+/// A number of samples ahead.
+pub fn parse_horizon(text: &str) -> Result<usize, String> {
+    let samples = text.trim().parse().ok().filter(|k| (1..=MOST_AHEAD).contains(k));
+    samples.ok_or_else(|| format!("{text:?} is no number of samples ahead; write 1 to {MOST_AHEAD}"))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

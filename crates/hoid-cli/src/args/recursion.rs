@@ -6,7 +6,10 @@ use clap::{
     Args,
     builder::{PossibleValue, PossibleValuesParser, TypedValueParser},
 };
-use hoid::ident::{order_selection::Criterion, settings::MethodSpec};
+use hoid::ident::{
+    order_selection::Criterion,
+    settings::{DelayRange, MethodSpec, OneOrSpan},
+};
 use hoid::io::{Scaling, readable_endings, writable_endings};
 use hoid::model::{ContinuousTransferFunction, Structure};
 use hoid::track::Method;
@@ -15,7 +18,6 @@ use super::{
     ReadArgs, choices::choice_of, figure::FigureArgs, parse_span, reading::DecimateArgs, settings::SettingArgs,
     show::ShowArgs, udp::UdpPlaces,
 };
-use crate::orders::{DelayRange, parse_delay, parse_seconds};
 
 /// What is tracked, and how.
 #[derive(Debug, Args)]
@@ -34,11 +36,11 @@ pub struct RecursionArgs {
     /// Delay of b0 in samples (29), or dead time in s (0.28s); a number or a range (20..40,
     /// 0.1s..0.4s) to search on the start span [default: 0.05 to 0.6 s; adaptive begins at 0.2 s and
     /// follows the delay]
-    #[arg(long, value_name = "N|Ss|LO..HI", value_parser = parse_delay)]
+    #[arg(long, value_name = "N|Ss|LO..HI")]
     pub nk: Option<DelayRange>,
     /// Dead time tau_e in s in place of --nk: .28, or a range (0.1..0.4) to search on the start span
-    #[arg(long, value_name = "S|LO..HI", value_parser = parse_seconds, conflicts_with = "nk")]
-    pub delay: Option<(f64, f64)>,
+    #[arg(long, value_name = "S|LO..HI", conflicts_with = "nk")]
+    pub delay: Option<OneOrSpan>,
     /// What decides between candidates when something is searched
     #[arg(long, value_name = "NAME", default_value = "bic", value_parser = choice_of(&Criterion::ALL))]
     pub criterion: Criterion,

@@ -1,30 +1,86 @@
-//! The options of the recursive methods as flags, made from the registry of the library: nothing is
-//! listed here.
+//! The options of recursive methods and batch estimators as flags, made from the registries of the library:
+//! nothing is listed here.
 
-use std::collections::BTreeSet;
+use std::{collections::BTreeSet, marker::PhantomData};
 
 use clap::{Arg, ArgAction, ArgMatches, Args, Command, FromArgMatches};
-use hoid::ident::settings::{Kind, MethodSpec, Setting};
+use hoid::ident::{
+    IvMethod, estimators,
+    registry::{CHANGE, OPERATOR, PEM, REMNANT},
+    settings::{Kind, MethodSpec, Setting},
+};
 use hoid::track::Method;
 
 use super::choices::by_name;
 
-/// What was typed: name and text, in the order of the registry.
-#[derive(Debug, Clone, Default)]
-pub struct SettingArgs {
-    given: Vec<(&'static str, String)>,
+/// The options of the recursive methods.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Recursive;
+
+/// The options of the batch estimators.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Batch;
+
+/// Who has options.
+pub trait Registry {
+    /// What there is, in the order of help.
+    fn specs() -> Vec<MethodSpec>;
 }
 
-impl SettingArgs {
+impl Registry for Recursive {
+    fn specs() -> Vec<MethodSpec> {
+        Method::registry()
+    }
+}
+
+impl Registry for Batch {
+    fn specs() -> Vec<MethodSpec> {
+        estimators()
+    }
+}
+
+/// What was typed: name and text, in the order of the registry.
+#[derive(Debug, Clone, Default)]
+pub struct SettingArgs<R = Recursive> {
+    given: Vec<(&'static str, String)>,
+    of: PhantomData<R>,
+}
+
+impl<R> SettingArgs<R> {
     /// Name and text of each.
     pub fn given(&self) -> impl Iterator<Item = (&'static str, &str)> {
         self.given.iter().map(|(name, text)| (*name, text.as_str()))
+    }
+
+    /// The text of one.
+    pub fn text(&self, name: &str) -> Option<&str> {
+        self.given().find(|(given, _)| *given == name).map(|(_, text)| text)
     }
 }
 
 /// The flag of an option.
 pub fn flag(name: &str) -> String {
     name.replace('_', "-")
+}
+
+/// Estimators and methods as help names them, groups by one word.
+pub fn in_words(names: &[&str]) -> String {
+    let operators = [OPERATOR, REMNANT, CHANGE];
+    let polynomials: Vec<&str> = [PEM].into_iter().chain(IvMethod::ALL.map(IvMethod::name)).collect();
+    let mut words: Vec<String> = Vec::new();
+    let mut left = names.to_vec();
+    for (group, word) in [(&operators[..], "operators"), (&polynomials[..], "polynomials")] {
+        if group.iter().all(|name| left.contains(name)) {
+            left.retain(|name| !group.contains(name));
+            words.push(word.to_owned());
+        }
+    }
+    words.extend(left.into_iter().map(|name| match name {
+        REMNANT => "--noise remnant".to_owned(),
+        CHANGE => "--change sigmoid".to_owned(),
+        name => name.to_owned(),
+    }));
+    words.join(", ")
 }
 
 /// The methods that have an option.
@@ -48,7 +104,7 @@ fn argument(setting: &Setting, methods: &[MethodSpec]) -> Arg {
     let arg = Arg::new(setting.name)
         .long(flag(setting.name))
         .help(help(setting, methods))
-        .allow_hyphen_values(setting.kind != Kind::Flag);
+        .allow_hyphen_values(!matches!(setting.kind, Kind::Flag | Kind::NumberOrUsual(_)));
     match setting.kind {
         Kind::Flag => arg.action(ArgAction::SetTrue),
         Kind::Choice(words) => {
@@ -56,6 +112,13 @@ fn argument(setting: &Setting, methods: &[MethodSpec]) -> Arg {
             arg.value_name("NAME").value_parser(by_name(words))
         }
         Kind::Count => arg.value_name("N"),
+        Kind::Counts => arg.value_name("N|LO..HI"),
+        Kind::NumberOrUsual(_) => arg.value_name("X").num_args(0..=1).default_missing_value("true"),
+        Kind::NumberOrSpan => arg.value_name("X|LO..HI"),
+        Kind::Delay => arg.value_name("N|Ss|LO..HI"),
+        Kind::Names => arg.value_name("NAMES"),
+        Kind::Guess => arg.value_name("VALUE:WEIGHT"),
+        Kind::Element => arg.value_name("ELEMENT"),
         Kind::Number => arg.value_name("X"),
         Kind::Memory => arg.value_name("N|Ss|inf"),
         Kind::NumberOrOff => arg.value_name("X|off"),
@@ -75,7 +138,7 @@ fn help(setting: &Setting, methods: &[MethodSpec]) -> String {
     }
     let of = methods_with(setting.name, methods);
     if of.len() < methods.len() {
-        text.push_str(&format!(" [for {}]", of.join(", ")));
+        text.push_str(&format!(" [for {}]", in_words(&of)));
     }
     let mut defaults: Vec<(&str, Vec<&str>)> = Vec::new();
     for spec in methods {
@@ -92,7 +155,8 @@ fn help(setting: &Setting, methods: &[MethodSpec]) -> String {
         several => {
             let each = several
                 .iter()
-                .map(|(default, names)| format!("{} {default}", names.join(", ")));
+                .filter(|(default, _)| !default.is_empty())
+                .map(|(default, names)| format!("{default} for {}", in_words(names)));
             each.collect::<Vec<_>>().join("; ")
         }
     };
@@ -102,9 +166,9 @@ fn help(setting: &Setting, methods: &[MethodSpec]) -> String {
     text
 }
 
-impl Args for SettingArgs {
+impl<R: Registry> Args for SettingArgs<R> {
     fn augment_args(command: Command) -> Command {
-        with_settings(command, &Method::registry())
+        with_settings(command, &R::specs())
     }
 
     fn augment_args_for_update(command: Command) -> Command {
@@ -112,16 +176,19 @@ impl Args for SettingArgs {
     }
 }
 
-impl FromArgMatches for SettingArgs {
+impl<R: Registry> FromArgMatches for SettingArgs<R> {
     fn from_arg_matches(matches: &ArgMatches) -> Result<Self, clap::Error> {
-        let mut args = Self::default();
+        let mut args = Self {
+            given: Vec::new(),
+            of: PhantomData,
+        };
         args.update_from_arg_matches(matches)?;
         Ok(args)
     }
 
     fn update_from_arg_matches(&mut self, matches: &ArgMatches) -> Result<(), clap::Error> {
         let mut done = BTreeSet::new();
-        for setting in Method::registry().into_iter().flat_map(|spec| spec.settings) {
+        for setting in R::specs().into_iter().flat_map(|spec| spec.settings) {
             if !done.insert(setting.name) {
                 continue;
             }

@@ -15,14 +15,28 @@ pub enum Kind {
     Memory,
     /// A number, or `off`.
     NumberOrOff,
+    /// A number, or the word alone for this one.
+    NumberOrUsual(&'static str),
+    /// A transfer function of s, as `90/(s(s+6))`.
+    Element,
     /// `LO..HI`, two finite numbers in order.
     Span,
     /// `LO..HI`, of which either end may be left out.
     OpenSpan,
+    /// A whole number, or `LO..HI` to search.
+    Counts,
+    /// A number, or `LO..HI`.
+    NumberOrSpan,
+    /// A delay: samples (`29`, `20..40`) or seconds (`0.28s`, `0.1s..0.4s`).
+    Delay,
+    /// A guess and its weight, `VALUE:WEIGHT`.
+    Guess,
     /// One of these words.
     Choice(&'static [&'static str]),
-    /// Name of a channel.
+    /// A text, as the name of a channel.
     Channel,
+    /// Names, as `K,T_L`.
+    Names,
     /// What is known of a person: `population`, `none`, `NAME=CENTRE:SPREAD,..`, or a file of a fit.
     Prior,
     /// Values of a type by name, as `b0=256,f=inf`.
@@ -34,6 +48,8 @@ pub enum Kind {
 pub enum Bounds {
     /// Any number.
     Any,
+    /// Any finite number.
+    Finite,
     /// More than zero, finite or not.
     Positive,
     /// More than zero and finite.
@@ -53,6 +69,7 @@ impl Bounds {
     pub fn hold(self, x: f64) -> bool {
         match self {
             Self::Any => !x.is_nan(),
+            Self::Finite => x.is_finite(),
             Self::Positive => x > 0.0,
             Self::PositiveFinite => x > 0.0 && x.is_finite(),
             Self::NonNegative => x >= 0.0 && x.is_finite(),
@@ -67,6 +84,7 @@ impl fmt::Display for Bounds {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Any => f.write_str("a number"),
+            Self::Finite => f.write_str("a finite number"),
             Self::Positive => f.write_str("a positive number, or inf"),
             Self::PositiveFinite => f.write_str("a positive finite number"),
             Self::NonNegative => f.write_str("a finite number of zero or more"),

@@ -33,10 +33,12 @@
 
 mod declare;
 mod kind;
+mod range;
 mod setting;
 mod value;
 
 pub use kind::{Bounds, Kind};
+pub use range::{DelayRange, OneOrSpan};
 pub use setting::{MethodSpec, Setting};
 pub use value::{Value, named_pairs};
 

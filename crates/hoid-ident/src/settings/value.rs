@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use hoid_core::{predictor::Regressor, recursion::Stable};
 
 use super::kind::Kind;
-use crate::Constraint;
+use crate::{Constraint, Prior};
 
 /// A type of values: its name, how it is read and written.
 pub trait Value: Sized {
@@ -148,6 +148,42 @@ impl Value for Constraint {
     }
 }
 
+/// A guess and its weight, `VALUE:WEIGHT`.
+impl Value for Prior {
+    const KIND: Kind = Kind::Guess;
+
+    fn read(text: &str) -> Result<Self, String> {
+        let number = |part: &str| part.trim().parse::<f64>().ok().filter(|x| x.is_finite());
+        let parts = text.split_once(':');
+        parts
+            .and_then(|(value, weight)| Some((number(value)?, number(weight)?)))
+            .filter(|(_, weight)| *weight >= 0.0)
+            .map(|(value, weight)| Self { value, weight })
+            .ok_or_else(|| "VALUE:WEIGHT with a weight that is not negative".to_owned())
+    }
+
+    fn text(&self) -> Option<String> {
+        Some(format!("{}:{}", self.value, self.weight))
+    }
+}
+
+/// Names behind each other, as `K,T_L`.
+impl Value for Vec<String> {
+    const KIND: Kind = Kind::Names;
+
+    fn read(text: &str) -> Result<Self, String> {
+        let names: Self = text.split(',').map(|name| name.trim().to_owned()).collect();
+        match names.iter().any(String::is_empty) {
+            true => Err("NAME,NAME,...".to_owned()),
+            false => Ok(names),
+        }
+    }
+
+    fn text(&self) -> Option<String> {
+        (!self.is_empty()).then(|| self.join(","))
+    }
+}
+
 /// `NAME=VALUE,NAME=VALUE`, each name once.
 ///
 /// # Errors
@@ -248,6 +284,14 @@ mod tests {
         returns("-3..4.5", (-3.0, 4.5));
         returns("5..", Constraint::Between(5.0, f64::INFINITY));
         returns("..0.99", Constraint::Between(f64::NEG_INFINITY, 0.99));
+        returns(
+            "-1.9:0.5",
+            Prior {
+                value: -1.9,
+                weight: 0.5,
+            },
+        );
+        returns("K, T_L", vec!["K".to_owned(), "T_L".to_owned()]);
         returns("noise", Stable::PredictorAndNoise);
         returns(
             "K_e=0.01, f1=2",
@@ -263,6 +307,10 @@ mod tests {
         assert!(bool::read("yes").is_err() && usize::read("-1").is_err() && f64::read("nan").is_err());
         assert!(<(f64, f64)>::read("3..1").is_err() && <(f64, f64)>::read("1").is_err());
         assert!(Constraint::read("5").is_err() && Constraint::read("5..1").is_err());
+        for bad in ["-1.9", "-1.9:-1", ":1", "1:inf"] {
+            assert!(Prior::read(bad).is_err(), "{bad}");
+        }
+        assert!(Vec::<String>::read("K,,T_L").is_err());
         assert_eq!(Stable::read("all"), Err("one of predictor, noise".to_owned()));
         let named = |text| BTreeMap::<String, f64>::read(text);
         assert!(named("").is_err() && named("b0").is_err() && named("b0=1,b0=2").is_err());

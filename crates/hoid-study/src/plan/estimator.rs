@@ -14,12 +14,13 @@
 
 use std::collections::BTreeMap;
 
+use hoid_analysis::Asked;
 use hoid_ident::{Estimator, GreyBox, IdentError};
 use hoid_model::{Detrend, Orders, SampleTime, Structure, scenario::ResolvedScenario};
 use hoid_track::{Method, StartAt, TrackOptions};
 
 use super::{
-    analysis::Analysis,
+    analysis,
     estimator_table::{
         EstimatorTable, FIT, GREY_BOX, OfScenario, Order, OrdersTable, RECORD, StartValue, what_is_done,
     },
@@ -64,16 +65,16 @@ pub enum Task {
     /// The operator's parameters are fitted.
     GreyBox(Box<GreyBox>),
     /// What is done as `hoid identify` does it, verdict included.
-    Analysis(Box<Analysis>),
+    Analysis(Box<Asked>),
     /// The operator is tracked.
     Track(Box<TrackOptions>),
 }
 
 impl Task {
     /// What is done as `hoid identify` does it; none of the others.
-    pub(crate) fn analysis(&self) -> Option<&Analysis> {
+    pub(crate) fn analysis(&self) -> Option<&Asked> {
         match self {
-            Self::Analysis(analysis) => Some(analysis),
+            Self::Analysis(asked) => Some(asked),
             _ => None,
         }
     }
@@ -86,10 +87,10 @@ impl EstimatorCell {
             line: variant.line_of_key(key).or_else(|| variant.lines.first().copied()),
             reason: format!("{key} {reason}"),
         };
-        let analysis = table.analysis(&at)?;
+        let asked = table.asked(&at)?;
         let method = match table.method.as_str() {
             FIT | GREY_BOX | RECORD => None,
-            _ if analysis.is_some() => None,
+            _ if asked.is_some() => None,
             name => Some(name.parse::<Method>().map_err(|_| at("method", unknown_method(name)))?),
         };
         let structure = match &table.structure {
@@ -98,7 +99,7 @@ impl EstimatorCell {
                 .parse::<Structure>()
                 .map_err(|error| at("structure", format!("is wrong: {error}")))?,
         };
-        if analysis.is_none() {
+        if asked.is_none() {
             table.check_placement(method.as_ref(), None, &at)?;
         }
         if table.method == FIT && table.structure.is_none() {
@@ -139,7 +140,7 @@ impl EstimatorCell {
         let task = match (table.method.as_str(), method) {
             (RECORD, _) => Task::Describe,
             (GREY_BOX, _) => Task::GreyBox(Box::new(table.grey_box(&at)?)),
-            _ if let Some(analysis) = analysis => Task::Analysis(Box::new(analysis)),
+            _ if let Some(asked) = asked => Task::Analysis(Box::new(asked)),
             (_, Some(method)) => Task::Track(Box::new(table.track(method, structure, &at)?)),
             _ => Task::Fit(Box::new(table.fit(structure))),
         };
@@ -175,7 +176,7 @@ impl EstimatorCell {
             Task::Describe => None,
             Task::Fit(estimator) => Some(estimator.structure),
             Task::GreyBox(_) => Some(Structure::BoxJenkins),
-            Task::Analysis(analysis) => analysis.structure(),
+            Task::Analysis(asked) => asked.structure(),
             Task::Track(options) => Some(options.structure),
         }
     }
@@ -186,7 +187,7 @@ impl EstimatorCell {
             Task::Describe => RECORD,
             Task::Fit(_) => FIT,
             Task::GreyBox(_) => GREY_BOX,
-            Task::Analysis(analysis) => analysis.name(),
+            Task::Analysis(asked) => analysis::name(asked),
             Task::Track(options) => options.method.name(),
         }
     }
@@ -247,10 +248,10 @@ impl EstimatorCell {
                 estimator.start = self.theta(&orders);
             }
             Task::GreyBox(grey) => grey.order = orders.nd..=orders.nd,
-            Task::Analysis(analysis) => {
+            Task::Analysis(asked) => {
                 // Checked with the plan.
-                if let Ok(of_scenario) = self.with_orders(analysis, scenario) {
-                    **analysis = of_scenario;
+                if let Ok(of_scenario) = self.with_orders(asked, scenario) {
+                    **asked = of_scenario;
                 }
             }
             Task::Track(options) => {
@@ -263,9 +264,9 @@ impl EstimatorCell {
         task
     }
 
-    fn with_orders(&self, analysis: &Analysis, scenario: &ResolvedScenario) -> Result<Analysis, IdentError> {
+    fn with_orders(&self, asked: &Asked, scenario: &ResolvedScenario) -> Result<Asked, IdentError> {
         let noise = self.orders.of_noise(scenario.scenario().remnant.order);
-        analysis.clone().with_orders(&noise, &self.orders(scenario))
+        analysis::with_orders(asked.clone(), &noise, &self.orders(scenario))
     }
 
     /// Checks orders, start and options against a scenario: the key and what is wrong with it.
@@ -274,11 +275,11 @@ impl EstimatorCell {
         if let Some(structure) = self.structure() {
             orders.check(structure).map_err(|error| ("orders", error.to_string()))?;
         }
-        if let Task::Analysis(analysis) = &self.task {
-            let analysis = self
-                .with_orders(analysis, scenario)
+        if let Task::Analysis(asked) = &self.task {
+            let asked = self
+                .with_orders(asked, scenario)
                 .map_err(|error| ("orders", error.to_string()))?;
-            if let Some((name, known)) = analysis.unknown_parameter() {
+            if let Some((name, known)) = analysis::unknown_parameter(&asked) {
                 let reason = format!("fix or bound has {name}, expected one of {}", known.join(", "));
                 return Err(("fix", reason));
             }

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use hoid_analysis::AnalysisError;
+use hoid_analysis::{AnalysisError, Asked};
 use hoid_ident::{
     Estimator, GreyBox, IdentError, InitialState, NamedOrders, SearchOptions, estimator_setting,
     settings::{Kind, MethodSpec, Setting},
@@ -12,7 +12,7 @@ use hoid_track::{Method, StartAt, TrackOptions};
 use schemars::JsonSchema;
 use serde::{Deserialize, Deserializer, de::Error as _};
 
-use super::{analysis, analysis::Analysis, problem::PlanProblem};
+use super::{analysis, problem::PlanProblem};
 
 /// Keys that want a list or a table as it stands.
 pub fn whole_keys() -> Vec<String> {
@@ -192,11 +192,11 @@ impl EstimatorTable {
     pub(super) fn check_placement(
         &self,
         method: Option<&Method>,
-        analysis: Option<&Analysis>,
+        asked: Option<&Asked>,
         at: &impl Fn(&str, String) -> PlanProblem,
     ) -> Result<(), PlanProblem> {
         let (fits, grey_box) = (self.method == FIT, self.method == GREY_BOX);
-        let operator = analysis.is_some_and(|analysis| analysis.structure().is_none());
+        let operator = asked.is_some_and(|asked| asked.structure().is_none());
         let tracks = method.is_some();
         // A window is no recursion that starts from coefficients or waits.
         let moves = method.is_some_and(|method| !matches!(method, Method::Window(_)));
@@ -251,7 +251,7 @@ impl EstimatorTable {
                 "and memory are both given: leave one of them out".to_owned(),
             ));
         }
-        if let (None, None, Some(key)) = (method, analysis, self.settings.keys().next()) {
+        if let (None, None, Some(key)) = (method, asked, self.settings.keys().next()) {
             return Err(at(key, misplaced(key)));
         }
         if self.method == analysis::TIME_VARYING && self.change == Some(Change::None) {
@@ -308,15 +308,15 @@ impl EstimatorTable {
 
     /// What is run as `hoid identify` runs it, with the options of the table but its orders; `None` for another
     /// method.
-    pub(super) fn analysis(&self, at: &impl Fn(&str, String) -> PlanProblem) -> Result<Option<Analysis>, PlanProblem> {
+    pub(super) fn asked(&self, at: &impl Fn(&str, String) -> PlanProblem) -> Result<Option<Asked>, PlanProblem> {
         let changes = self.change == Some(Change::Sigmoid);
-        let Some(mut analysis) = Analysis::of_method(&self.method, changes) else {
+        let Some(mut asked) = analysis::of_method(&self.method, changes) else {
             return Ok(None);
         };
-        self.check_placement(None, Some(&analysis), at)?;
+        self.check_placement(None, Some(&asked), at)?;
         let settings = analysis::methods()
             .into_iter()
-            .find(|spec| spec.name == analysis.name());
+            .find(|spec| spec.name == analysis::name(&asked));
         let mut left = self.settings.clone();
         let mut given: Vec<(Setting, String, String)> = Vec::new();
         for setting in settings.into_iter().flat_map(|spec| spec.settings) {
@@ -350,17 +350,19 @@ impl EstimatorTable {
             given.extend(setting.map(|(setting, text)| (setting, key.to_owned(), text)));
         }
         for (setting, key, text) in given {
-            let set = analysis.set(&setting, &text);
+            let set = asked.set(&setting, &text);
             let known = set.map_err(|error| match error {
                 AnalysisError::Ident(error) => at(&key, in_plan(&error)),
-                AnalysisError::Prior { reason } => at(&key, format!("is wrong: {reason}")),
+                AnalysisError::Prior { reason } | AnalysisError::Option { reason, .. } => {
+                    at(&key, format!("is wrong: {reason}"))
+                }
                 other => at(&key, format!("is wrong: {other}")),
             })?;
             if !known {
                 return Err(at(&key, misplaced(&key)));
             }
         }
-        Ok(Some(analysis))
+        Ok(Some(asked))
     }
 
     /// The method with the options of the table.
@@ -420,7 +422,7 @@ fn structure_names() -> Vec<&'static str> {
 /// Key of an option: its name, and its unit where the value has none of its own.
 pub(super) fn plan_key(setting: &Setting) -> String {
     match (setting.kind, setting.unit) {
-        (Kind::Span | Kind::Number, "s") => format!("{}_s", setting.name),
+        (Kind::Span | Kind::NumberOrSpan | Kind::Number, "s") => format!("{}_s", setting.name),
         _ => setting.name.to_owned(),
     }
 }
@@ -437,10 +439,12 @@ fn text_of(value: &toml::Value, kind: Kind) -> Result<String, String> {
         (toml::Value::Integer(n), _) => n.to_string(),
         (toml::Value::Float(x), _) => x.to_string(),
         (toml::Value::Boolean(b), _) => b.to_string(),
-        (toml::Value::Array(ends), Kind::Span | Kind::OpenSpan) => match ends.as_slice() {
-            [low, high] => format!("{}..{}", text_of(low, Kind::Number)?, text_of(high, Kind::Number)?),
-            _ => return Err(wrong()),
-        },
+        (toml::Value::Array(ends), Kind::Span | Kind::OpenSpan | Kind::NumberOrSpan | Kind::Counts) => {
+            match ends.as_slice() {
+                [low, high] => format!("{}..{}", text_of(low, Kind::Number)?, text_of(high, Kind::Number)?),
+                _ => return Err(wrong()),
+            }
+        }
         (toml::Value::Table(values), Kind::Named(of)) => {
             // `name` labels the table.
             let named = values.iter().filter(|(name, _)| *name != "name");
@@ -458,10 +462,14 @@ fn in_words(kind: Kind) -> &'static str {
         Kind::Flag => "true or false",
         Kind::Count => "a whole number",
         Kind::Number => "a number",
+        Kind::NumberOrUsual(_) => "a number, or true",
+        Kind::Counts => "a whole number, or two",
+        Kind::NumberOrSpan => "a number, or two",
+        Kind::Delay => "a whole number of samples, or a text such as \"0.28s\"",
         Kind::Memory => "a number of samples, or a text such as \"2.56s\" or \"inf\"",
         Kind::NumberOrOff => "a number, or the text \"off\"",
         Kind::Span | Kind::OpenSpan => "two numbers",
-        Kind::Choice(_) | Kind::Channel | Kind::Prior => "a text",
+        Kind::Choice(_) | Kind::Channel | Kind::Names | Kind::Guess | Kind::Element | Kind::Prior => "a text",
         Kind::Named(_) => "a table of values by name",
     }
 }

@@ -24,7 +24,7 @@
 //! axis slowest. The remnant of replication r in cell c is the random stream (seed, c, r), the same
 //! for all estimators. A cell without remnant is run once: all its replications are the same.
 
-mod analysis;
+pub(crate) mod analysis;
 mod document;
 mod estimator;
 mod estimator_table;
@@ -33,7 +33,6 @@ mod head;
 mod problem;
 mod schema;
 
-pub use analysis::Analysis;
 pub use document::{Cell, Plan};
 pub use estimator::{EstimatorCell, Task};
 pub use grid::Axis;

@@ -80,10 +80,15 @@ fn of_kind(kind: Kind) -> Value {
         Kind::Flag => json!({ "type": "boolean" }),
         Kind::Count => json!({ "type": "integer", "minimum": 0 }),
         Kind::Number => json!({ "type": "number" }),
+        Kind::NumberOrUsual(_) => json!({ "type": ["number", "boolean"] }),
+        Kind::Counts | Kind::Delay => json!({ "type": ["integer", "string"] }),
+        Kind::NumberOrSpan => json!({ "type": ["number", "array"], "items": { "type": "number" } }),
         Kind::Memory => json!({ "type": ["number", "string"] }),
         Kind::NumberOrOff => json!({ "anyOf": [{ "type": "number" }, { "enum": ["off"] }] }),
         Kind::Span => json!({ "type": "array", "items": { "type": "number" }, "minItems": 2, "maxItems": 2 }),
-        Kind::OpenSpan | Kind::Channel | Kind::Prior => json!({ "type": "string" }),
+        Kind::OpenSpan | Kind::Channel | Kind::Names | Kind::Guess | Kind::Element | Kind::Prior => {
+            json!({ "type": "string" })
+        }
         Kind::Choice(words) => json!({ "enum": words }),
         Kind::Named(of) => {
             // `name` labels a table among others.

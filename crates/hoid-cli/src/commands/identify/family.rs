@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use hoid::analysis::{Identified, Recordings};
+use hoid::analysis::{Identification, Identified, Recordings};
 use hoid::ident::frequency::Description;
 use hoid::report::{
     ModelSection, Picture, Report,
@@ -10,11 +10,7 @@ use hoid::report::{
     write_report,
 };
 
-use super::{
-    estimate::{self, identification},
-    family_form::Found,
-    picture::of_polynomials,
-};
+use super::{family_form::Found, picture::of_polynomials};
 use crate::{
     args::IdentifyArgs,
     commands::{figure, reading},
@@ -22,8 +18,12 @@ use crate::{
     json, output,
 };
 
-pub fn run(args: &IdentifyArgs, read: Recordings, other: Option<Recordings>) -> Result<(), CliError> {
-    let identification = identification(args, estimate::operator(args)?);
+pub fn run(
+    args: &IdentifyArgs,
+    identification: &Identification,
+    read: Recordings,
+    other: Option<Recordings>,
+) -> Result<(), CliError> {
     let identified = output::watched("fitting", || identification.run(read))?;
     let model = &identified.fit.operator(0).polynomial_fit;
     let validation = other.map(|other| identified.validated(model, other)).transpose()?;
@@ -39,7 +39,7 @@ pub fn run(args: &IdentifyArgs, read: Recordings, other: Option<Recordings>) -> 
         files: &data.names,
         records: &data.records,
         accounts: &data.accounts,
-        element: args.controlled_element.as_ref(),
+        element: identification.controlled_element.as_ref(),
         validation: validation.as_ref().map(|v| (v.name.as_str(), v.quality)),
         settings: &reading::rows(settings),
     };

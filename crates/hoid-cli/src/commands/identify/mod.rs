@@ -1,9 +1,9 @@
 //! `hoid identify`: records to a model and the operator's parameters.
 
-mod estimate;
 mod family;
 mod family_form;
 mod picture;
+mod request;
 mod run;
 mod sigmoid;
 

@@ -13,8 +13,7 @@ use crate::args::IdentifyArgs;
 
 /// The describing function of the records, where they have a recorded excitation.
 pub fn description(args: &IdentifyArgs, data: &Recordings) -> Option<Description> {
-    let excitation = Excitation::of_text(args.excitation.as_deref());
-    data.described(&excitation, args.period, args.faults.faults)
+    data.described(&Excitation::default(), None, args.faults.faults)
         .ok()
         .flatten()
 }

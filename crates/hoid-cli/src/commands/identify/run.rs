@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use hoid::analysis::Recordings;
+use hoid::analysis::{Asked, Recordings};
 use hoid::ident::{
     Choice, Fit, GreyBoxFit, MarginEstimates,
     validation::{GoodnessOfFit, nrmse_fit, vaf},
@@ -11,13 +11,12 @@ use hoid::model::{ContinuousTransferFunction, GainUnit, NotConvertible, Record, 
 use hoid::report::{Answer, ModelSection, Report, known_operator, write_report};
 
 use super::{
-    estimate::{self, identification},
     family,
     picture::{description, for_page, of_polynomials},
-    sigmoid,
+    request, sigmoid,
 };
 use crate::{
-    args::{IdentifyArgs, ModelKind},
+    args::IdentifyArgs,
     commands::{figure, places, reading},
     error::CliError,
     family_operator::{self, Converted},
@@ -26,36 +25,53 @@ use crate::{
 };
 
 pub fn run(args: &IdentifyArgs) -> Result<(), CliError> {
-    let kind = estimate::kind(args)?;
+    let asked = request::asked(args)?;
     check_places(args)?;
     if let Some(path) = &args.picture.figure {
         figure::check(path)?;
     }
-    let with_input = match kind {
-        ModelKind::Polynomial(structure) => structure.has_input(),
-        ModelKind::Family | ModelKind::GreyBox | ModelKind::TimeVarying => true,
-    };
-    let reading = reading::of(&args.read, Some(&args.mask), with_input)?;
+    let reading = reading::of(&args.read, Some(&args.mask), asked.has_input())?;
     let read = reading.files(&args.records, reading::told)?;
-    let (rate, counts) = (args.read.prepare.rate.decimate, kind.counts_samples());
+    let (rate, counts) = (args.read.prepare.rate.decimate, asked.counts_samples());
     reading::say_kept(read.kept_rate(rate, counts));
     // Read before anything is written: a bad validation file leaves nothing behind.
     let other = args.validate.as_deref();
     let other = other.map(|path| reading.file(path, reading::told)).transpose()?;
-    match kind {
-        ModelKind::TimeVarying => sigmoid::run(args, read),
-        ModelKind::GreyBox => {
-            let identification = identification(args, estimate::remnant(args)?);
+    match asked {
+        Asked::Operator(identification) => family::run(args, &identification, read, other),
+        Asked::Change(identification) => sigmoid::run(args, &identification, read),
+        Asked::Remnant(identification) => {
+            let element = identification.controlled_element.as_ref();
             let found = output::watched("fitting", || identification.run(read))?;
-            show(args, &found, found.fit.polynomial_fit(0), None, Some(&found.fit), other)
+            let beside = Beside {
+                choice: None,
+                grey_box: Some(&found.fit),
+                element,
+            };
+            show(args, &found, found.fit.polynomial_fit(0), beside, other)
         }
-        ModelKind::Polynomial(structure) => {
-            let identification = identification(args, estimate::polynomials(args, structure)?);
+        Asked::Polynomials(identification) => {
+            let element = identification.controlled_element.as_ref();
             let found = output::watched("fitting", || identification.run(read))?;
-            show(args, &found, &found.fit.fit, found.fit.choice.as_ref(), None, other)
+            let beside = Beside {
+                choice: found.fit.choice.as_ref(),
+                grey_box: None,
+                element,
+            };
+            show(args, &found, &found.fit.fit, beside, other)
         }
-        ModelKind::Family => family::run(args, read, other),
     }
+}
+
+/// What is shown with a fit of polynomials.
+#[derive(Clone, Copy)]
+struct Beside<'a> {
+    /// The table that it was chosen from.
+    choice: Option<&'a Choice>,
+    /// The fit in physical parameters that it is written from.
+    grey_box: Option<&'a GreyBoxFit>,
+    /// What the person controls.
+    element: Option<&'a ContinuousTransferFunction>,
 }
 
 /// Writes and prints a fit of polynomials.
@@ -63,8 +79,11 @@ fn show<F>(
     args: &IdentifyArgs,
     found: &hoid::analysis::Identified<F>,
     fit: &Fit,
-    choice: Option<&Choice>,
-    grey_box: Option<&GreyBoxFit>,
+    Beside {
+        choice,
+        grey_box,
+        element,
+    }: Beside<'_>,
     other: Option<Recordings>,
 ) -> Result<(), CliError> {
     let (data, verdict) = (&found.data, &found.verdict);
@@ -78,10 +97,7 @@ fn show<F>(
         _ => None,
     };
     let remnant = (fit.orders().nd > 0).then(|| fit.remnant(args.remnant_discretisation));
-    let margins = args
-        .controlled_element
-        .as_ref()
-        .map(|element| loop_margins(fit, element));
+    let margins = element.map(|element| loop_margins(fit, element));
     let validations = records.iter().map(|r| fit.validate(r)).collect::<Result<Vec<_>, _>>()?;
     let ahead = args.horizon.map(|k| prediction_ahead(fit, records, k)).transpose()?;
     let identified = Identified {
@@ -156,7 +172,7 @@ fn show<F>(
 fn check_places(args: &IdentifyArgs) -> Result<(), CliError> {
     let mut inputs: Vec<&Path> = args.records.iter().map(PathBuf::as_path).collect();
     inputs.extend(args.validate.as_deref());
-    inputs.extend(args.prior.as_deref().map(Path::new));
+    inputs.extend(args.options.text("prior").map(Path::new));
     places::check(
         &inputs,
         &[args.picture.figure.as_deref(), args.trace.as_deref()],

@@ -1,8 +1,8 @@
-//! `hoid identify --structure time-varying`: the operator whose gains change once.
+//! `hoid identify --change sigmoid`: the operator whose gains change once.
 
-use hoid::analysis::{Account, Identified, Recordings};
+use hoid::analysis::{Account, Identification, Identified, Recordings};
 use hoid::ident::{
-    ChangedOperator, SigmoidFit,
+    ChangedOperator, SigmoidChange, SigmoidFit,
     validation::{LjungBox, whiteness},
 };
 use hoid::io::write_record;
@@ -10,7 +10,6 @@ use hoid::model::{Channel, Form, GainUnit, Record, Verdict};
 use hoid::report::numbers;
 use serde_json::{Map, Value, json};
 
-use super::estimate::{self, identification};
 use crate::{
     args::IdentifyArgs,
     commands::reading,
@@ -19,8 +18,11 @@ use crate::{
     output, text,
 };
 
-pub fn run(args: &IdentifyArgs, read: Recordings) -> Result<(), CliError> {
-    let identification = identification(args, estimate::sigmoid(args)?);
+pub fn run(
+    args: &IdentifyArgs,
+    identification: &Identification<SigmoidChange>,
+    read: Recordings,
+) -> Result<(), CliError> {
     let Identified {
         fit,
         verdict,

@@ -1,0 +1,298 @@
+//! What is to be identified, as users ask for it: a structure, a method, and options by their names.
+//!
+//! | structure | estimator |
+//! |---|---|
+//! | none, `operator` | the operator of a person; with `noise=remnant` a gain with a lead and its remnant of order m, with `change=sigmoid` one whose gains change once |
+//! | `arx` ... `general` | polynomials, by `method` pem or instrumental variables |
+//!
+//! Without a structure options that polynomials alone have, as nk, ask for `bj`.
+
+use std::collections::BTreeMap;
+
+use hoid_ident::{
+    GreyBox, IvMethod, SigmoidChange, estimators,
+    family::FamilyEstimator,
+    registry::{CHANGE, OPERATOR, PEM, REMNANT},
+    settings::{MethodSpec, Setting},
+};
+use hoid_model::{Decimation, FaultHandling, Structure};
+
+use crate::{
+    AnalysisError,
+    estimators::{BatchEstimator, Polynomials},
+    identification::Identification,
+    options::Options,
+};
+
+/// What is to be identified, by names and texts.
+#[derive(Debug, Clone, Default)]
+pub struct Request {
+    /// What is fitted.
+    pub structure: Option<String>,
+    /// How: `pem`, or a method of instrumental variables.
+    pub method: Option<String>,
+    /// Options by their names in the registry.
+    pub options: BTreeMap<String, String>,
+    /// What is done about faults of the recordings.
+    pub faults: FaultHandling,
+    /// Whether a high rate is lowered.
+    pub rate: Decimation,
+}
+
+/// An identification that can be run.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Asked {
+    /// The operator of a person, its form by evidence.
+    Operator(Identification),
+    /// A gain with a lead, and its remnant of order m.
+    Remnant(Identification<GreyBox>),
+    /// An operator whose gains change once.
+    Change(Identification<SigmoidChange>),
+    /// A polynomial structure.
+    Polynomials(Identification<Polynomials>),
+}
+
+/// The same with each kind of identification.
+macro_rules! each {
+    ($asked:expr, $how:ident => $what:expr) => {
+        match $asked {
+            Asked::Operator($how) => $what,
+            Asked::Remnant($how) => $what,
+            Asked::Change($how) => $what,
+            Asked::Polynomials($how) => $what,
+        }
+    };
+}
+
+impl Asked {
+    /// The estimator of a name in the registry, with its defaults; `None` for another name.
+    pub fn of_estimator(name: &str, structure: Structure) -> Option<Self> {
+        let polynomials = |structure: Structure, method: Option<IvMethod>| {
+            Self::Polynomials(Identification::of(Polynomials {
+                method,
+                ..Polynomials::new(structure)
+            }))
+        };
+        Some(match name {
+            OPERATOR => Self::Operator(Identification::of(FamilyEstimator::default())),
+            REMNANT => Self::Remnant(Identification::of(GreyBox::new(1..=4))),
+            CHANGE => Self::Change(Identification::of(SigmoidChange::default())),
+            PEM => polynomials(structure, None),
+            name => {
+                let method = IvMethod::ALL.into_iter().find(|method| method.name() == name)?;
+                polynomials(method.structure(), Some(method))
+            }
+        })
+    }
+
+    /// Its estimator in the registry.
+    pub fn estimator(&self) -> &'static str {
+        match self {
+            Self::Operator(_) => OPERATOR,
+            Self::Remnant(_) => REMNANT,
+            Self::Change(_) => CHANGE,
+            Self::Polynomials(how) => how.estimator.method.map_or(PEM, IvMethod::name),
+        }
+    }
+
+    /// The structure of a polynomial model.
+    pub fn structure(&self) -> Option<Structure> {
+        match self {
+            Self::Polynomials(how) => Some(how.estimator.template.structure),
+            _ => None,
+        }
+    }
+
+    /// Whether orders and delay are numbers of samples.
+    pub fn counts_samples(&self) -> bool {
+        each!(self, how => how.estimator.counts_samples())
+    }
+
+    /// Whether it looks for the response to an input.
+    pub fn has_input(&self) -> bool {
+        self.structure().is_none_or(Structure::has_input)
+    }
+
+    /// Sets an option by its name; false where it is none of its own.
+    ///
+    /// # Errors
+    /// [`AnalysisError`] for a text that is no value of it.
+    pub fn set(&mut self, option: &Setting, text: &str) -> Result<bool, AnalysisError> {
+        each!(self, how => how.set(option, text))
+    }
+}
+
+impl Request {
+    /// What is asked for, and remarks on names of before and on what follows from an option.
+    ///
+    /// # Errors
+    /// [`AnalysisError`] for options that contradict each other or have no such value.
+    pub fn asked(&self) -> Result<(Asked, Vec<String>), AnalysisError> {
+        let mut notes = Vec::new();
+        let mut asked = self.kind(&mut notes)?;
+        let all = estimators();
+        let own = all.iter().find(|spec| spec.name == asked.estimator());
+        let own = own.map(|spec| spec.settings.as_slice()).unwrap_or_default();
+        for name in self.options.keys() {
+            if !own.iter().any(|setting| setting.name == name) {
+                return Err(misplaced(name, &all));
+            }
+        }
+        // In the order of the registry: what an option makes of others comes before them.
+        for setting in own {
+            if let Some(text) = self.options.get(setting.name) {
+                asked.set(setting, text)?;
+            }
+        }
+        if !asked.has_input()
+            && let Some(setting) = own.iter().find(|setting| setting.name == "controlled_element")
+            && self.options.contains_key(setting.name)
+        {
+            return Err(AnalysisError::Option {
+                name: setting.name,
+                reason: "it belongs to a structure with an input".to_owned(),
+            });
+        }
+        each!(&mut asked, how => {
+            how.faults = self.faults;
+            how.rate = self.rate;
+        });
+        Ok((asked, notes))
+    }
+
+    fn has(&self, names: &[&str]) -> bool {
+        names.iter().any(|name| self.options.contains_key(*name))
+    }
+
+    /// What is fitted, with its defaults.
+    fn kind(&self, notes: &mut Vec<String>) -> Result<Asked, AnalysisError> {
+        let options = |reason: String| AnalysisError::Options { reason };
+        let typed = self
+            .structure
+            .as_ref()
+            .map(|name| name.trim().to_ascii_lowercase().replace('_', "-"));
+        let method = self.method.as_ref().map(|name| name.trim().to_ascii_lowercase());
+        let polynomial = match typed.as_deref() {
+            None | Some("operator" | "family" | "grey-box" | "time-varying") => None,
+            Some(name) => {
+                let known = name.parse::<Structure>();
+                Some(known.map_err(|error| options(format!("{error}, or operator")))?)
+            }
+        };
+        let method = match method.as_deref() {
+            None | Some(PEM) => None,
+            Some(name) => {
+                let known = IvMethod::ALL.into_iter().find(|method| method.name() == name);
+                Some(known.ok_or_else(|| options(unknown_method(name)))?)
+            }
+        };
+        let estimator = if let Some(method) = method {
+            let own = method.structure();
+            if typed.is_some() && polynomial != Some(own) {
+                return Err(options(format!(
+                    "method {method} fits the structure {}; drop the structure, or take the method pem",
+                    own.name()
+                )));
+            }
+            method.name()
+        } else if polynomial.is_some() || (typed.is_none() && self.is_polynomial()) {
+            PEM
+        } else {
+            self.operator(typed.as_deref(), notes)?
+        };
+        Asked::of_estimator(estimator, polynomial.unwrap_or(Structure::BoxJenkins))
+            .ok_or_else(|| options(unknown_method(estimator)))
+    }
+
+    /// True with an option that only a polynomial model has.
+    fn is_polynomial(&self) -> bool {
+        let asks_for_operator = self.has(&["noise", "change", "remnant_order"]);
+        let of_polynomials = |text: &String| {
+            let names = text.split(',').filter_map(|part| part.split('=').next());
+            names.map(str::trim).any(|name| !matches!(name, "nc" | "nd"))
+        };
+        !asks_for_operator
+            && (self.options.get("orders").is_some_and(of_polynomials)
+                || self.has(&[
+                    "nk",
+                    "start",
+                    "fix",
+                    "bound",
+                    "coefficient_prior",
+                    "robust",
+                    "focus",
+                    "stable",
+                    "criterion",
+                ]))
+    }
+
+    /// Which of the operators.
+    fn operator(&self, typed: Option<&str>, notes: &mut Vec<String>) -> Result<&'static str, AnalysisError> {
+        let said = |name: &str| self.options.get(name).map(String::as_str);
+        let was = match typed {
+            Some(name @ ("family" | "grey-box")) => Some((name, "")),
+            Some(name @ "time-varying") => Some((name, " with change sigmoid")),
+            _ => None,
+        };
+        if let Some((name, with)) = was {
+            notes.push(format!("structure {name} is called operator{with} now"));
+        }
+        let changes = typed == Some("time-varying") || said("change") == Some("sigmoid");
+        let individual = self.options.get("individual").map(String::as_str).unwrap_or_default();
+        let of_remnant = self.options.contains_key("remnant_order")
+            || individual
+                .split(',')
+                .any(|name| matches!(name.trim(), "K_e_dot" | "T_n"))
+            || (self.has(&["fix", "bound"]) && !changes);
+        let noise = said("noise");
+        match (changes, noise) {
+            (true, Some("arma" | "remnant")) => Err(AnalysisError::Option {
+                name: "noise",
+                reason: format!(
+                    "found {}; an operator that changes has the noise ar alone",
+                    noise.unwrap_or_default()
+                ),
+            }),
+            (true, _) => Ok(CHANGE),
+            (false, Some("remnant")) => Ok(REMNANT),
+            (false, None) if of_remnant => {
+                notes.push("the options ask for the operator with noise remnant, which is taken".to_owned());
+                Ok(REMNANT)
+            }
+            _ => Ok(OPERATOR),
+        }
+    }
+}
+
+/// An option of other estimators, with those that have it and what to give in its place.
+fn misplaced(name: &str, all: &[MethodSpec]) -> AnalysisError {
+    let has = |spec: &&MethodSpec| spec.settings.iter().any(|setting| setting.name == name);
+    let of: Vec<&'static str> = all.iter().filter(has).map(|spec| spec.name).collect();
+    let setting = all
+        .iter()
+        .flat_map(|spec| &spec.settings)
+        .find(|setting| setting.name == name);
+    let Some(setting) = setting else {
+        let known: Vec<&str> = all
+            .iter()
+            .flat_map(|spec| &spec.settings)
+            .map(|setting| setting.name)
+            .collect();
+        return AnalysisError::Options {
+            reason: format!("there is no option {name}; expected one of {}", known.join(", ")),
+        };
+    };
+    AnalysisError::Misplaced {
+        name: setting.name,
+        of,
+        instead: match name {
+            "nk" => "; else give delay in s",
+            _ => "",
+        },
+    }
+}
+
+fn unknown_method(found: &str) -> String {
+    let known = IvMethod::ALL.map(IvMethod::name).join(", ");
+    format!("method is {found}, expected one of {PEM}, {known}")
+}
