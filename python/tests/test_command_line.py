@@ -78,8 +78,8 @@ def test_simulate(run: Path) -> None:
             ["--method", "rivbj", "--nk", 29, "--orders", "nd=1"],
         ),
         (
-            {"structure": "grey-box", "remnant_order": 1},
-            ["--structure", "grey-box", "--remnant-order", 1],
+            {"noise": "remnant", "remnant_order": 1},
+            ["--noise", "remnant", "--remnant-order", 1],
         ),
         (
             {
@@ -104,8 +104,8 @@ def test_identify(run: Path, cli: Any, keywords: dict[str, Any], options: list[A
 
 
 def test_identify_a_change(run: Path, cli: Any) -> None:
-    fit = pyhoid.identify(pyhoid.read(run), "time-varying", delay=(0.27, 0.29))
-    found = cli.json("identify", run, "--structure", "time-varying", "--delay", "0.27..0.29")
+    fit = pyhoid.identify(pyhoid.read(run), change="sigmoid", delay=(0.27, 0.29))
+    found = cli.json("identify", run, "--change", "sigmoid", "--delay", "0.27..0.29")
     assert isinstance(fit, pyhoid.TimeVaryingFit)
     for p in found["parameters"]:
         same(fit.estimates[p["name"]], p)

@@ -189,7 +189,7 @@ def test_several_records_share_a_model(c1: pyhoid.Record) -> None:
     ratio = both.standard_errors["f1"] / one.standard_errors["f1"]  # type: ignore[operator]
     assert ratio == pytest.approx(1 / np.sqrt(2), rel=0.15)
     grey = pyhoid.identify(
-        [c1, other], "grey-box", remnant_order=1, delay=(0.28, 0.28), individual=["K_e"]
+        [c1, other], noise="remnant", remnant_order=1, delay=(0.28, 0.28), individual=["K_e"]
     )
     operators = grey.operators
     assert len(operators) == 2
@@ -274,7 +274,7 @@ def test_fits_and_traces_say_what_they_are_worth(c1: pyhoid.Record, c4: pyhoid.R
     assert repr(fit.verdict) == "Verdict: trustworthy"
     poor = pyhoid.identify(c1, "oe", nk=29).verdict
     assert poor.level == "doubtful" and any("noise model" in reason for reason in poor.reasons)
-    change = pyhoid.identify(c1, "time-varying").verdict
+    change = pyhoid.identify(c1, change="sigmoid").verdict
     assert change.level == "trustworthy" and any("no change" in note for note in change.notes)
     trace = pyhoid.track(c4, "physical", nk=29, nd=1)
     assert trace.verdict.level == "trustworthy", trace.verdict

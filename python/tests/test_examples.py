@@ -58,7 +58,7 @@ def test_every_method_has_an_example_that_runs(
         "fit": fit,
         "described": pyhoid.describing_function([c1, pyhoid.simulate("C1", seed=2)]),
         "person": pyhoid.identify_operator(c1, form="lead"),
-        "change": pyhoid.identify(c4, "time-varying"),
+        "change": pyhoid.identify(c4, change="sigmoid"),
         "trace": pyhoid.track(c4, "physical", nk=29, nd=1, every=64),
         "tracker": pyhoid.Tracker("physical", nk=29, nd=1, record=c1),
         "results": pyhoid.study("noise-level", "study", replications=1),

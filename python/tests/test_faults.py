@@ -46,7 +46,7 @@ def test_a_level_of_u_is_found_and_moves_nothing() -> None:
     e, u = np.array(clean.e), np.array(clean.u)
     bare = pyhoid.Record(e=e, u=u, sample_time=clean.sample_time)
     moved = pyhoid.Record(e=e, u=u + 0.5, sample_time=clean.sample_time)
-    for structure, options in (("bj", {"nk": 29, "nd": 1}), ("time-varying", {"delay": (0.27, 0.29)})):
+    for structure, options in (("bj", {"nk": 29, "nd": 1}), (None, {"change": "sigmoid", "delay": (0.27, 0.29)})):
         before = pyhoid.identify(bare, structure, **options)
         found = pyhoid.identify(moved, structure, **options)
         for name, value in found.parameters.items():

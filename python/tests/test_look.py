@@ -30,9 +30,11 @@ def test_what_a_file_looks_like_is_how_it_is_read(path: Path) -> None:
     assert look["read"] == {"input": "r-y", "output": "u", "start": 3.0, "stop": 43.0}
     assert look["input"]["certain"] and look["excitation"]["column"] == "r"
     assert look["excitation"]["period_s"] == pytest.approx(20)
-    assert len(pyhoid.read(path, **look["read"])) == 2400
+    with pytest.warns(UserWarning, match="time is taken as t, in s"):
+        assert len(pyhoid.read(path, **look["read"])) == 2400
     # Whole periods are kept under an offset.
-    assert len(pyhoid.read(path, **look["read"], offset={"u": 1})) == 2400
+    with pytest.warns(UserWarning, match="time is taken as t, in s"):
+        assert len(pyhoid.read(path, **look["read"], offset={"u": 1})) == 2400
     known = pyhoid.info(path, excitation="none", controlled_element="1/s")["look"]
     assert known["excitation"]["column"] is None and known["lateness"]["samples"] is None
     assert "start" not in known["read"]

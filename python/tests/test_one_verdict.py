@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -91,8 +92,8 @@ OTHERS: dict[str, tuple[dict[str, Any], list[str]]] = {
         ["--structure", "bj", "--nk", "29", "--orders", "nd=1"],
     ),
     "sriv": ({"method": "sriv", "nk": 29}, ["--method", "sriv", "--nk", "29"]),
-    "remnant": ({"remnant_order": 1}, ["--remnant-order", "1"]),
-    "sigmoid": ({"structure": "time-varying"}, ["--structure", "time-varying"]),
+    "remnant": ({"noise": "remnant", "remnant_order": 1}, ["--noise", "remnant", "--remnant-order", "1"]),
+    "sigmoid": ({"change": "sigmoid"}, ["--change", "sigmoid"]),
 }
 
 
@@ -160,9 +161,12 @@ def test_what_is_fitted_is_told_from_the_options(runs: list[pyhoid.Record]) -> N
     assert isinstance(pyhoid.identify(record, nk=29, nd=1), pyhoid.Fit)
     assert isinstance(pyhoid.identify(record, method="sriv", nk=29), pyhoid.Fit)
     for name in ("operator", "family", "grey-box", "grey_box"):
-        person = pyhoid.identify(record, name, form="lead", nd=2)
+        earlier = pytest.warns(DeprecationWarning, match="operator now")
+        with nullcontext() if name == "operator" else earlier:
+            person = pyhoid.identify(record, name, form="lead", nd=2)
         assert isinstance(person, pyhoid.OperatorFit) and person.form == "lead"
-    remnant = pyhoid.identify(record, "grey-box", remnant_order=1)
+    with pytest.warns(DeprecationWarning, match="noise remnant"):
+        remnant = pyhoid.identify(record, remnant_order=1)
     assert isinstance(remnant, pyhoid.Fit) and remnant.structure == "grey-box"
     with pytest.raises(pyhoid.OptionError, match="nk belongs to"):
         pyhoid.identify(record, "operator", nk=29)

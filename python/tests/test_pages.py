@@ -18,8 +18,8 @@ def test_the_page_of_a_fit(fit: pyhoid.Fit, tmp_path: Path) -> None:
     page = fit.report(tmp_path / "fit", controlled_element=([10.0], [1.0, 0.2, 0.0]))
     text = page.read_text()
     assert page.name == "report.html" and "<svg" in text and "phase margin" in text
-    # The settings of the call, and the truth of a simulated run.
-    assert "search_method" in text and "true" in text.lower()
+    # The settings that were used, and the truth of a simulated run.
+    assert "largest number of steps" in text and "true" in text.lower()
     assert (
         fit.report(tmp_path / "again", controlled_element=([10.0], [1.0, 0.2, 0.0])).read_bytes()
         == page.read_bytes()

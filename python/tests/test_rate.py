@@ -48,7 +48,7 @@ def test_what_counts_samples_keeps_them(fast: pyhoid.Record) -> None:
     assert fit.records[0].sample_time == 0.001
     fit = pyhoid.identify(fast, "arx", na=2, nb=2, nk=29, decimate=10)
     assert fit.records[0].sample_time == 0.01
-    assert pyhoid.identify(fast, "grey-box").records[0].sample_time == 0.01
+    assert pyhoid.identify(fast, "operator").records[0].sample_time == 0.01
     trace = pyhoid.track(fast.span(0, 30), nk=281, every=1000)
     assert trace.record.sample_time == 0.001
 

@@ -176,7 +176,8 @@ impl Request {
             None | Some("operator" | "family" | "grey-box" | "time-varying") => None,
             Some(name) => {
                 let known = name.parse::<Structure>();
-                Some(known.map_err(|error| options(format!("{error}, or operator")))?)
+                let all = Structure::ALL.map(Structure::name).join(", ");
+                Some(known.map_err(|_| options(format!("structure is {name:?}, expected one of {OPERATOR}, {all}")))?)
             }
         };
         let method = match method.as_deref() {

@@ -236,7 +236,7 @@ method = "sriv"
         good(at, &simulate.split(' ').collect::<Vec<_>>());
         for (name, options) in [
             ("operator", "--prior none"),
-            ("change", "--structure time-varying"),
+            ("change", "--change sigmoid"),
             ("SRIV", "--method sriv --nk 29"),
         ] {
             let call = format!("identify run.csv --json {options}");

@@ -259,10 +259,13 @@ def _prior(prior: Any) -> str:
         return "none"
     if isinstance(prior, OperatorFit):
         return prior.to_json()
-    if isinstance(prior, Mapping):
-        return _guesses("prior", prior) or "none"
     if isinstance(prior, (str, PathLike)):
         return fspath(prior)
+    if isinstance(prior, Mapping):
+        try:
+            return _guesses("prior", prior) or "none"
+        except OptionError:
+            pass
     raise OptionError(
         f'prior is {prior!r}, expected "population", "none", text such as "omega_nm=10.5:0.3", '
         "(centre, spread) by name, a JSON result, or an OperatorFit"

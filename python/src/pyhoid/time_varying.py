@@ -39,11 +39,11 @@ _ANSWERS = (
 class TimeVaryingFit:
     """A fitted operator whose gains change once, along a sigmoid.
 
-    `identify` makes it with ``structure="time-varying"``.
+    `identify` makes it with ``change="sigmoid"``.
 
     Examples
     --------
-    >>> fit = pyhoid.identify(record, "time-varying", nd=2)
+    >>> fit = pyhoid.identify(record, change="sigmoid", nd=2)
     >>> fit.change, fit.initial, fit.last
     """
 

@@ -62,7 +62,7 @@ fn negative_lead(negative: &[String]) -> Option<Finding> {
             "negative-lead",
             format!(
                 "{} below zero, by two standard errors of K_e and of K_e_dot: a gain and a lead are not the form of this \
-                 person, who may have a lag; only the response is theirs (--structure grey-box finds the form)",
+                 person, who may have a lag; only the response is theirs (--structure operator finds the form)",
                 negative.join(", ")
             ),
         )

@@ -103,7 +103,7 @@ impl Constancy<'_> {
             Finding::doubt(
                 "not-constant",
                 format!(
-                    "the person is not constant: {}; fit the parts apart, or take --structure time-varying or a tracker",
+                    "the person is not constant: {}; fit the parts apart, or take --change sigmoid or a tracker",
                     words.join(", and ")
                 ),
             )
