@@ -1,7 +1,7 @@
 //! The default tracker beside what came before it in the conditions of the reference text: errors, coverage
 //! and changes of each cell, and the ratio of the errors to those of the best of the others.
 //!
-//! `cargo run --release -p hoid-track --example conditions_evidence -- [RUNS] [M,..] [LEVEL,..] [METHOD,..]`
+//! `cargo run --release -p hoid-track --example conditions_evidence -- [RUNS] [M,..] [LEVEL,..] [METHOD,..] [CONDITION,..]`
 //!
 //! Methods: `adaptive` is told nothing; `multiple-model`, `rls` and `rpem` are told the delay and start from a fit
 //! of the first 30.72 s (RLS and RPEM by the settings of the text). Their first rows are therefore not causal:
@@ -133,9 +133,13 @@ fn main() {
         numbers(of(2, "0.1")),
         of(3, "multiple-model,rls,rpem,adaptive"),
     );
+    let conditions: Vec<Condition> = match arguments.get(4) {
+        Some(list) => list.split(',').map(|name| name.parse().unwrap()).collect(),
+        None => Condition::ALL.to_vec(),
+    };
     let mut cells = Vec::new();
     for level in levels {
-        for condition in Condition::ALL {
+        for condition in conditions.clone() {
             for order in &orders {
                 for realisation in [Realisation::Output, Realisation::Input] {
                     cells.push(Cell {
