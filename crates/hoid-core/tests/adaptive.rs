@@ -163,6 +163,49 @@ fn bands_cover_and_precision_grows() {
     assert!(ratio < 0.5, "{ratio}");
 }
 
+/// A remnant of so many poles at -1/.06 s, of the power .04: its samples, and the variance of its innovations.
+fn steep(poles: usize, samples: usize, seed: u64) -> (Vec<f64>, f64) {
+    let (pole, mut stream, mut state) = ((-TS / 0.06).exp(), Stream(seed), vec![0.0; poles]);
+    let mut sample = || {
+        state.iter_mut().fold(stream.normal(), |input, v| {
+            *v = pole * *v + input;
+            *v
+        })
+    };
+    let mut v: Vec<f64> = (0..samples + 200).map(|_| sample()).collect();
+    v.drain(..200);
+    let variance = 0.04 * samples as f64 / v.iter().map(|v| v * v).sum::<f64>();
+    v.iter_mut().for_each(|v| *v *= variance.sqrt());
+    (v, variance)
+}
+
+#[test]
+fn a_steep_remnant_is_no_harder_than_a_flat_one() {
+    let mut precision = Vec::new();
+    for poles in [1, 4] {
+        let (v, variance) = steep(poles, 5000, 7);
+        let (mut person, mut filter) = (Person::new(3), filter(1e9));
+        for (k, v) in v.iter().enumerate() {
+            let [e, u] = person.sample(GAINS_OF_A_PERSON, 0.0);
+            filter.step(e, u + v);
+            if k == 1000 {
+                // Innovations of .1 to 60 thousandths of the power of u: the scale is that of the data, at once.
+                let ratio = filter.variance() / variance;
+                assert!((0.7..1.5).contains(&ratio), "{poles} poles: {ratio}");
+            }
+        }
+        let truth = response(&basis(usual()), GAINS_OF_A_PERSON, 2.0);
+        let (value, variance) = estimate(&filter, 2.0);
+        for part in 0..2 {
+            let z = (value[part] - truth[part]) / variance[part].sqrt();
+            assert!(z.abs() < 4.0, "{poles} poles: {z}");
+        }
+        precision.push((variance[0] + variance[1]).sqrt());
+    }
+    // Of the same power, with less of it where the response is.
+    assert!(precision[1] < 2.0 * precision[0], "{precision:?}");
+}
+
 #[test]
 fn neuromuscular_system_and_delay_are_found() {
     // So far from what is usual that the basis has to move.

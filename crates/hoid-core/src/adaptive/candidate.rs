@@ -68,7 +68,9 @@ pub(super) struct Candidate {
     outputs: [f64; LARGEST_ORDER],
     d: [f64; LARGEST_ORDER],
     pub noise: NoiseModel,
-    moments: Moments,
+    /// The block so far: samples as many as D reaches back, and those behind them.
+    early: Moments,
+    late: Moments,
     block: u64,
     pub mixture: Mixture,
     pub scales: NoiseScales,
@@ -95,7 +97,8 @@ impl State for Candidate {
                 &mut self.outputs,
                 &mut self.d,
                 &mut self.noise,
-                &mut self.moments,
+                &mut self.early,
+                &mut self.late,
                 &mut self.mixture,
                 &mut self.scales,
                 &mut self.guide,
@@ -134,14 +137,15 @@ impl Candidate {
             outputs: [0.0; LARGEST_ORDER],
             d: padded,
             noise: empty,
-            moments: Moments::NONE,
+            early: Moments::NONE,
+            late: Moments::NONE,
             block: block as u64,
             mixture,
             scales,
             guide: Segments::NONE,
             skipped: 0,
             volatility: Volatility::new(libm::round(BURST_S / (block * scales.sample_time)).max(1.0) as u64),
-            level: [0.02 * scales.size * scales.size, 20.0],
+            level: [scales.innovations, 20.0],
             evidence: 0.0,
             samples: 0,
             predicted: 0,
@@ -238,8 +242,12 @@ impl Candidate {
         let row = self.row(white, innovation, prior.look);
         self.blocks.take(&row);
         let y = self.limited(white.y, innovation, prior.limit);
-        self.moments.add(&white.signals, white.level, y);
-        if self.moments.samples as u64 >= self.block {
+        let part = match self.early.samples < order as f64 {
+            true => &mut self.early,
+            false => &mut self.late,
+        };
+        part.add(&white.signals, white.level, y);
+        if (self.early.samples + self.late.samples) as u64 >= self.block {
             self.end_of_block(prior);
         }
         true
@@ -302,11 +310,12 @@ impl Candidate {
         // What is not the noise's, as the seconds after a change, counts no more than it would if it were.
         let eps = v[0] + self.d.iter().zip(&v[1..]).map(|(d, v)| d * v).sum::<f64>();
         let excess = eps * eps / (CLIPPED * self.level[0]);
-        self.noise.update(&v, 1.0 / excess.max(1.0));
+        self.noise.update(&v, eps, 1.0 / excess.max(1.0));
     }
 
     fn end_of_block(&mut self, prior: &ChangePrior) {
-        let moments = core::mem::replace(&mut self.moments, Moments::NONE);
+        let [early, late] = [&mut self.early, &mut self.late].map(|part| core::mem::replace(part, Moments::NONE));
+        let moments = early.with(&late);
         let (n, ts) = (moments.samples, self.scales.sample_time);
         let least = LEAST * self.scales.size * self.scales.size;
         let energy = moments.energy(&self.basis, self.mixture.mean()).max(n * least);
@@ -318,7 +327,7 @@ impl Candidate {
         }
         *rests_on = (*rests_on + n).min(LEVEL_S / ts).max(n);
         *level = (*level + n / *rests_on * (energy / n - *level)).max(least);
-        let left = self.mixture.update(&moments, &self.basis, prior, &self.scales);
+        let left = self.mixture.update([&early, &late], &self.basis, prior, &self.scales);
         if settled {
             self.volatility.take(left, n);
         }

@@ -54,7 +54,9 @@ pub struct AdaptiveFilter<E> {
     detector: Detector,
     history: History<E>,
     saturation: Saturation,
-    powers: [f64; 2],
+    /// Sums of the squares of e, of u, and of u behind the noise model that is supposed, which no estimate leaves
+    /// more of than that of no response at all.
+    powers: [f64; 3],
     restarts: u64,
     age: u64,
     /// Samples in which neither signal has moved.
@@ -102,6 +104,7 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         let scales = NoiseScales {
             unit: 1.0,
             size: 1.0,
+            innovations: 1.0,
             sample_time: ts,
             dispersion: 1.0,
         };
@@ -130,7 +133,7 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
             detector,
             history: History::new(memory),
             saturation: Saturation::new(),
-            powers: [0.0; 2],
+            powers: [0.0; 3],
             restarts: 0,
             age: 0,
             still: 0,
@@ -151,11 +154,16 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
 
     /// Scales by the data so far.
     fn scales(&self, dispersion: f64) -> NoiseScales {
-        let [e, u] = self.powers;
+        let [e, u, y] = self.powers;
         let samples = self.history.samples().max(1) as f64;
         let measured = NoiseScales {
             unit: libm::sqrt(u / e),
             size: libm::sqrt(u / samples),
+            innovations: match (self.began, &self.known) {
+                (true, _) => self.live.mixture.variance(),
+                (false, Some(known)) => known.variance,
+                (false, None) => y / samples,
+            },
             sample_time: self.prior.sample_time,
             dispersion,
         };
@@ -229,6 +237,11 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         self.powers[0] += e * e;
         self.powers[1] += u * u;
         if !self.began {
+            // Before that the whitening filter is not full.
+            if self.history.samples() > self.prior.order as u64 {
+                let y = self.live.whitened(u).y;
+                self.powers[2] += y * y;
+            }
             self.keep(u);
             self.begin();
             return Step {
@@ -340,7 +353,7 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         self.history.clear();
         self.detector.pass_over();
         self.saturation = Saturation::new();
-        (self.powers, self.stage, self.age, self.replays) = ([0.0; 2], 0, 0, 0);
+        (self.powers, self.stage, self.age, self.replays) = ([0.0; 3], 0, 0, 0);
         self.alternatives = Alternatives::NONE;
         self.restarts += 1;
         self.began = false;

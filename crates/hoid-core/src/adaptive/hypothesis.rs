@@ -56,6 +56,8 @@ crate::state!([] Hypothesis { state, covariance, variance, residuals, log_weight
 pub(super) struct Left {
     /// Sum of the squares that are left after the update, those of the prediction's error included.
     pub energy: f64,
+    /// Samples of the block that were not taken, and the part of that sum which is set for them.
+    pub passed: [f64; 2],
     /// `ln det(I + P A/sigma^2)`.
     log_determinant: f64,
 }
@@ -63,6 +65,7 @@ pub(super) struct Left {
 impl Left {
     pub const NOTHING: Self = Self {
         energy: 0.0,
+        passed: [0.0; 2],
         log_determinant: 0.0,
     };
 }
@@ -148,6 +151,7 @@ impl Hypothesis {
         Left {
             energy: (about.energy - explained).max(0.0),
             log_determinant,
+            ..Left::NOTHING
         }
     }
 
@@ -162,7 +166,9 @@ impl Hypothesis {
             - 0.5 * (nu + n) * libm::log1p(over / nu)
             - 0.5 * left.log_determinant
             - 0.5 * (left.energy - common) / (self.variance * dispersion);
-        self.variance = (nu * self.variance + left.energy / dispersion) / (nu + n);
+        let [passed, of_them] = left.passed;
+        let n = n - passed / dispersion;
+        self.variance = (nu * self.variance + (left.energy - of_them) / dispersion) / (nu + n);
         self.residuals = (nu + n).min(memory / dispersion);
     }
 }

@@ -42,7 +42,7 @@ impl Known {
     /// Puts the remnant into a noise model; false for numbers that make no sense.
     pub(super) fn place_in(&self, noise: &mut NoiseModel, sample_time: f64) -> bool {
         match &self.remnant {
-            Some((lags, seconds)) => noise.suppose(lags, seconds / sample_time),
+            Some((lags, seconds)) => noise.suppose(lags, self.variance, seconds / sample_time),
             None => true,
         }
     }

@@ -1,7 +1,10 @@
 //! When did the operator last change? A mixture over the answers.
 //!
-//! After each block the likeliest hypotheses have children that say that the operator changes now: the
-//! covariance of a change is added to that of the gains. A child starts with the prior probability of a
+//! After each block the likeliest hypotheses have children that say that the operator changed in it: they are what
+//! their parents were before it, and the covariance of a change is added to that of the gains. A whitening filter
+//! D of order p has D(theta x) for D theta x while it reaches back to before the change: where the noise is steep,
+//! the step of the response is then hundreds of innovations, which no gains explain. So a child takes nothing of
+//! that block, and of the next one the samples behind the first p. A child starts with the prior probability of a
 //! change in the time since the last birth, and its probability follows its likelihood. When there is no
 //! room, the least likely of those that are old enough is pruned. So between changes the estimate rests on
 //! all data since the last one, and after a change it is that of the child that was born there (P.
@@ -77,8 +80,6 @@ const HANDED_ON: f64 = 0.3;
 const LEAST: f64 = -60.0;
 /// Size of the gains before anything is known, in units of the ratio of u to e.
 const WIDE: f64 = 2.0;
-/// Share of the power of u that the innovation variance starts at.
-const INNOVATIONS: f64 = 0.02;
 
 /// Scales of the signals.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -86,12 +87,14 @@ pub(super) struct NoiseScales {
     /// Ratio of u to e, and the root mean square of u.
     pub unit: f64,
     pub size: f64,
+    /// Innovation variance to begin with.
+    pub innovations: f64,
     pub sample_time: f64,
     /// Samples that count for one.
     pub dispersion: f64,
 }
 
-crate::state!([] NoiseScales { unit, size, sample_time, dispersion });
+crate::state!([] NoiseScales { unit, size, innovations, sample_time, dispersion });
 
 /// The hypotheses.
 #[derive(Debug, Clone, PartialEq)]
@@ -112,11 +115,10 @@ impl Mixture {
         for (j, variance) in held.into_iter().enumerate() {
             p[LINEAR + j][LINEAR + j] = variance;
         }
-        let variance = INNOVATIONS * scales.size * scales.size;
         Self::of(prior, |class| {
             let mut p = p;
             open_gains(&mut p, basis, class, [WIDE * scales.unit; 2]);
-            ([0.0; STATES], p, variance)
+            ([0.0; STATES], p, scales.innovations)
         })
     }
 
@@ -152,12 +154,22 @@ impl Mixture {
         &mut self.hypotheses[..self.count.min(HYPOTHESES)]
     }
 
-    /// Takes a block; the least energy that any hypothesis left.
-    pub fn update(&mut self, moments: &Moments, basis: &Basis, prior: &ChangePrior, scales: &NoiseScales) -> f64 {
+    /// Takes a block, its first samples as many as the whitening filter reaches back, and those behind them;
+    /// the least energy that any hypothesis left.
+    pub fn update(
+        &mut self,
+        [early, late]: [&Moments; 2],
+        basis: &Basis,
+        prior: &ChangePrior,
+        scales: &NoiseScales,
+    ) -> f64 {
         self.blocks += 1;
+        let moments = &early.with(late);
         let (blocks, seconds) = (self.blocks, moments.samples * scales.sample_time);
+        let newborn = |h: &Hypothesis| h.born > 0 && h.born + 1 == blocks;
+        let parents = self.best_of_classes().map(|best| best.map(|i| self.hypotheses[i]));
         let mut left = [Left::NOTHING; HYPOTHESES];
-        let mut common = f64::INFINITY;
+        let (mut common, mut best) = (f64::INFINITY, self.mean);
         for (h, left) in self.all_mut().iter_mut().zip(&mut left) {
             let age = (blocks - h.born.min(blocks)) as f64 * seconds;
             let mut drift = prior.drift[h.class % 2] * prior.drift[h.class % 2];
@@ -169,7 +181,20 @@ impl Mixture {
             open_gains(&mut h.covariance, basis, h.class, [step; 2]);
             let level = prior.level * scales.size;
             h.covariance[GAINS][GAINS] += level * level * seconds;
+            if newborn(h) {
+                *left = h.update(late, basis, scales.dispersion);
+                continue;
+            }
             *left = h.update(moments, basis, scales.dispersion);
+            if left.energy < common {
+                (common, best) = (left.energy, h.state);
+            }
+        }
+        // The samples that a newborn does not take are nothing by which it is better or worse.
+        let of_early = early.energy(basis, &best);
+        for (_, left) in self.all().iter().zip(&mut left).filter(|(h, _)| newborn(h)) {
+            left.passed = [early.samples, of_early];
+            left.energy += of_early;
             common = common.min(left.energy);
         }
         // Half of the time since the start: its errors, which are large, do not stay.
@@ -184,7 +209,7 @@ impl Mixture {
         self.normalise();
         self.average();
         if blocks as f64 * seconds >= FIRST_BIRTH_S {
-            self.births(basis, prior, scales, seconds);
+            self.births(&parents, basis, prior, scales, seconds);
         }
         common
     }
@@ -239,8 +264,20 @@ impl Mixture {
             .sum()
     }
 
-    /// The children of a block. Those who wander have theirs every second block.
-    fn births(&mut self, basis: &Basis, prior: &ChangePrior, scales: &NoiseScales, seconds: f64) {
+    /// The likeliest of each class.
+    fn best_of_classes(&self) -> [Option<usize>; CLASSES] {
+        core::array::from_fn(|class| self.likeliest(|h| h.class == class))
+    }
+
+    /// The children of a block, of the parents of before it. Those who wander have theirs every second block.
+    fn births(
+        &mut self,
+        parents: &[Option<Hypothesis>; CLASSES],
+        basis: &Basis,
+        prior: &ChangePrior,
+        scales: &NoiseScales,
+        seconds: f64,
+    ) {
         for class in 0..CLASSES {
             let (wanders, any) = (class % 2 == 1, class >= 2);
             let turn = self.blocks + u64::from(any);
@@ -253,13 +290,13 @@ impl Mixture {
             } else {
                 0.0
             };
-            let (parent, share) = match self.likeliest(|h| h.class == class) {
+            let (parent, share) = match &parents[class] {
                 Some(parent) if own >= other => (Some(parent), own),
-                _ if any && prior.any > 0.0 => (self.likeliest(|h| h.class == class - 2), other),
-                found => (found, own),
+                _ if any && prior.any > 0.0 => (parents[class - 2].as_ref(), other),
+                found => (found.as_ref(), own),
             };
             let Some(parent) = parent else { continue };
-            let mut child = self.hypotheses[parent].child(self.blocks);
+            let mut child = parent.child(self.blocks);
             let every = if wanders { 2.0 } else { 1.0 };
             child.class = class;
             child.log_weight = libm::log(share.max(1e-12) * (every * seconds / prior.between).min(0.5));
@@ -285,7 +322,7 @@ impl Mixture {
             self.count += 1;
             return Some(self.count - 1);
         }
-        let best: [Option<usize>; CLASSES] = core::array::from_fn(|class| self.likeliest(|h| h.class == class));
+        let best = self.best_of_classes();
         let old = |i: &usize| self.blocks >= self.hypotheses[*i].born + prior.protected;
         (0..HYPOTHESES)
             .filter(|i| old(i) && !best.contains(&Some(*i)))
@@ -441,5 +478,92 @@ fn open_gains(p: &mut Covariance, basis: &Basis, class: usize, [gain, lead]: [f6
                 p[i][j] += size * size * direction[i] * direction[j];
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+    use crate::adaptive::{basis::Point, sizes::SIGNALS, usual::Usual};
+
+    /// The sample of the change: two before the end of block 56.
+    const CHANGE: usize = 32 * 56 - 2;
+
+    /// How far the gains are after so many blocks from those of an operator that has changed, over the change, with a
+    /// remnant of four poles; of each block so many samples are its first.
+    fn off(first: usize, blocks: usize) -> f64 {
+        let point = Point {
+            tau: 0.2,
+            omega: 11.0,
+            zeta: 0.3,
+            lag: 3.0,
+        };
+        let (mut basis, prior) = (
+            Basis::new(point, 0.01).unwrap(),
+            Usual::with_delay(0.2).prior(0.01).changes,
+        );
+        let scales = NoiseScales {
+            unit: 1.0,
+            size: 1.0,
+            innovations: 1e-8,
+            sample_time: 0.01,
+            dispersion: 1.0,
+        };
+        let mut mixture = Mixture::new(&prior, &basis, &scales, [1e-6, 1e-8, 1e-8]);
+        let gains = [[0.2, 0.6, 0.3], [0.2, 1.0, 0.5]];
+        let a: f64 = 0.85;
+        let d = [-4.0 * a, 6.0 * a * a, -4.0 * a.powi(3), a.powi(4)];
+        let (mut past, mut v, mut seed) = ([([0.0; SIGNALS], 0.0); 4], [0.0; 4], 5_u64);
+        for block in 0..blocks {
+            let mut parts = [Moments::NONE; 2];
+            for k in 0..32 {
+                seed = seed
+                    .wrapping_mul(6_364_136_223_846_793_005)
+                    .wrapping_add(1_442_695_040_888_963_407);
+                let eps = 2e-4 * ((seed >> 11) as f64 / (1_u64 << 53) as f64 - 0.5);
+                let t = (32 * block + k) as f64;
+                let e = |age: f64| {
+                    libm::sin(0.031 * (t - age)) + libm::cos(0.012 * (t - age)) + libm::sin(0.07 * (t - age))
+                };
+                let z = basis.step([e(0.0), e(1.0), e(2.0)]);
+                let mut state = [0.0; STATES];
+                state[..GAINS].copy_from_slice(&gains[usize::from(32 * block + k >= CHANGE)]);
+                let noise = eps - d.iter().zip(v).map(|(d, v)| d * v).sum::<f64>();
+                let u = noise + basis.weights(&state).iter().zip(z).map(|(w, z)| w * z).sum::<f64>();
+                let (mut white, mut y) = (z, u);
+                for (d, (z, u)) in d.iter().zip(past) {
+                    y += d * u;
+                    white.iter_mut().zip(z).for_each(|(w, z)| *w += d * z);
+                }
+                parts[usize::from(k >= first)].add(&white, 1.0 + d.iter().sum::<f64>(), y);
+                past.rotate_right(1);
+                v.rotate_right(1);
+                (past[0], v[0]) = ((z, u), noise);
+            }
+            let [early, late] = &parts;
+            mixture.update([early, late], &basis, &prior, &scales);
+        }
+        let [before, after] = gains.map(|g| response(&basis, &g));
+        let now = response(&basis, &mixture.mean()[..GAINS]);
+        libm::hypot(now[0] - after[0], now[1] - after[1]) / libm::hypot(after[0] - before[0], after[1] - before[1])
+    }
+
+    fn response(basis: &Basis, gains: &[f64]) -> [f64; 2] {
+        let h = basis.response(3.0, basis.point());
+        [0, 1].map(|part| gains.iter().zip(h).map(|(g, h)| g * h[part]).sum())
+    }
+
+    #[test]
+    fn a_child_does_not_take_the_step_of_a_change_for_its_response() {
+        let (with, without) = (off(4, 60), off(0, 60));
+        assert!(with < 0.05 && with < 0.5 * without, "{with} {without}");
+    }
+
+    #[test]
+    fn blocks_shorter_than_the_whitening_filter_do_no_harm() {
+        // None of the first block of a child is taken, and its variance is that of the next ones.
+        let all = off(32, 63);
+        assert!(all < 0.2, "{all}");
     }
 }

@@ -61,6 +61,14 @@ impl Moments {
         self.samples += 1.0;
     }
 
+    /// These samples and others.
+    pub fn with(&self, others: &Self) -> Self {
+        Self {
+            products: core::array::from_fn(|i| core::array::from_fn(|j| self.products[i][j] + others.products[i][j])),
+            samples: self.samples + others.samples,
+        }
+    }
+
     fn at(&self, i: usize, j: usize) -> f64 {
         self.products[i.min(j)][i.max(j)]
     }
