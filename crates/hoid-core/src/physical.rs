@@ -240,7 +240,8 @@ impl<S: Shape, const N: usize, const K: usize, const L: usize, A: Adaptation<N>>
         let (mut fraction, mut cut) = ([allowed; N], false);
         for i in 0..N {
             let [low, high] = self.model.bounds[i];
-            let within = eta[i].clamp(low, high);
+            // Not by `clamp`, which panics where a restored state has its bounds reversed.
+            let within = eta[i].max(low).min(high);
             if within != eta[i] {
                 cut = true;
                 fraction[i] = if step[i] == 0.0 {

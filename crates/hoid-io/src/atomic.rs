@@ -1,10 +1,11 @@
 //! Files that are whole or not there: written beside their place, then renamed into it.
 
 use std::fs;
-use std::io::{self, BufWriter, Write};
+use std::io::{self, BufWriter, Read as _, Write};
 use std::path::{Path, PathBuf};
 
 use crate::IoError;
+use crate::budget::longest_settings;
 use crate::part_file::Part;
 
 /// Writes a file through `write`. A file that exists is replaced only when everything is written
@@ -36,6 +37,32 @@ pub fn read_text(path: &Path) -> Result<String, IoError> {
         file: path.display().to_string(),
         source,
     })
+}
+
+/// The text of a file of settings, of a length that can be read in bounded memory.
+///
+/// # Errors
+/// [`IoError::Unreadable`] for what the system says, and for one that is too long.
+pub fn read_settings(path: &Path) -> Result<String, IoError> {
+    settings_text(path).map_err(|source| IoError::Unreadable {
+        file: path.display().to_string(),
+        source,
+    })
+}
+
+/// As [`read_settings`], with what the system would say.
+pub(crate) fn settings_text(path: &Path) -> io::Result<String> {
+    let longest = longest_settings();
+    let mut text = String::new();
+    fs::File::open(path)?.take(longest + 1).read_to_string(&mut text)?;
+    if text.len() as u64 <= longest {
+        return Ok(text);
+    }
+    Err(io::Error::other(format!(
+        "more than {} MB of settings; where it is meant to be so long, set HOID_MAX_UNPACKED_MB in the environment to 32 times \
+         its MB",
+        longest >> 20
+    )))
 }
 
 /// The bytes of a file.

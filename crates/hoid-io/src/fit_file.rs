@@ -8,7 +8,7 @@ use std::path::Path;
 use hoid_model::{FamilyOperator, FittedOperator, Form, NamedChoice, SampleTime, uncertainty::Estimate};
 use serde::Deserialize;
 
-use crate::{IoError, read_text};
+use crate::{IoError, read_settings};
 
 /// A parameter of a fit.
 #[derive(Debug, Clone, PartialEq)]
@@ -53,7 +53,7 @@ pub fn is_fit_file(name: &str) -> bool {
 /// # Errors
 /// [`IoError::Unreadable`]; [`IoError::NoFit`].
 pub fn read_fit(path: &Path) -> Result<FitFile, IoError> {
-    parse_fit(&read_text(path)?, &path.display().to_string())
+    parse_fit(&read_settings(path)?, &path.display().to_string())
 }
 
 /// Reads a fit from the text of its file.

@@ -44,6 +44,7 @@
 //! | `data_quality` | [`QualityIssue`]: what is wrong with the sampling and the values, where and how much |
 //! | `output_table` | [`OutputTable`]: columns of results |
 //! | `wording` | numbers and names in messages |
+//! | `budget` | how much memory a file may take |
 //! | `guarded` | panics of foreign readers as errors |
 //! | `atomic`, `part_file` | [`write_atomically`]: files that are whole or not there; what dead processes left |
 //! | `output_place`, `directory_lock` | [`check_output`]: no result in the place of an input; [`DirectoryLock`] |
@@ -52,6 +53,7 @@
 mod alignment;
 mod arrays;
 mod atomic;
+mod budget;
 mod column_expression;
 mod data_quality;
 mod directory_lock;
@@ -84,7 +86,7 @@ mod usual_names;
 mod wording;
 
 pub use alignment::read_aligned;
-pub use atomic::{file_names, make_directory, read_bytes, read_text, write_atomically};
+pub use atomic::{file_names, make_directory, read_bytes, read_settings, read_text, write_atomically};
 pub use column_expression::ColumnExpression;
 pub use data_quality::{Place, QualityIssue, QualityIssueKind, quality_of_record};
 pub use directory_lock::DirectoryLock;

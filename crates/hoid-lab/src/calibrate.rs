@@ -156,7 +156,7 @@ pub fn judge(out: &Path, record: &Record, logged: &Logged) -> Result<Calibration
         frame_jitter_ms: deviation(&frames),
     };
     let path = out.join("calibration.toml");
-    let mut kept: Kept = match hoid_io::read_text(&path) {
+    let mut kept: Kept = match hoid_io::read_settings(&path) {
         Ok(text) => toml::from_str(&text).map_err(|error| LabError::damaged(&path, error.message()))?,
         Err(_) => Kept::default(),
     };

@@ -244,7 +244,7 @@ impl Config {
     /// # Errors
     /// [`LabError::Config`] with the place, what was found and expected.
     pub fn read(path: &Path) -> Result<Self, LabError> {
-        let text = hoid_io::read_text(path)?;
+        let text = hoid_io::read_settings(path)?;
         let place = path.display().to_string();
         let mut config: Self = toml::from_str(&text).map_err(|error| {
             let line = error
@@ -330,7 +330,7 @@ impl Condition {
         }
         self.scenario_text = Some(match name.parse::<Reference>() {
             Ok(condition) => format!("condition = {:?}\n", condition.name()),
-            Err(_) => hoid_io::read_text(&directory.join(name))?,
+            Err(_) => hoid_io::read_settings(&directory.join(name))?,
         });
         Ok(())
     }

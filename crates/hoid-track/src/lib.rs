@@ -38,6 +38,7 @@
 //! | `tracker`, `outcome`, `saved` | [`Tracker`]: one sample at a time; a tracker as numbers, to go on elsewhere |
 //! | `live` | [`Live`]: the warm-up of a stream, then its tracker |
 //! | `guard` | samples and spans that no tracking makes, kept from the recursion |
+//! | `standing` | what a recursion without a guard does while nothing arrives |
 //! | `idle` | what was recorded before a run began |
 //! | `over_record`, `smoother` | [`track()`]: a record; the two-sided estimate of a recorded run |
 //! | `trace`, `columns`, `summary`, `in_words` | [`Trace`]: the estimate at every sample, as columns and in words |
@@ -89,6 +90,7 @@ mod seal;
 mod setup;
 mod shared_options;
 mod smoother;
+mod standing;
 mod start;
 mod start_noise;
 mod summary;

@@ -141,6 +141,11 @@ pub(crate) trait RecursiveMethod: Settings {
         false
     }
 
+    /// True where the samples were asked for as they come.
+    fn refuses_guard(&self) -> bool {
+        false
+    }
+
     /// Polynomials that are kept stable.
     fn stable(&self) -> Stable {
         Stable::Predictor

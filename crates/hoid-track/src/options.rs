@@ -10,6 +10,7 @@ use crate::{
     method::bad,
     methods::Method,
     setup::{Setup, StartAt, USUAL_DELAY_S, parameter_names, polynomial_orders},
+    start::check_sample_time,
 };
 
 /// Options of a recursive estimate: the method with its own, and what all methods share.
@@ -150,6 +151,19 @@ impl TrackOptions {
             track_delay_s: method.track_delay_s(),
             delay_parameter_s: self.delay_parameter_s(),
         })
+    }
+
+    /// As [`TrackOptions::check`], with what depends on the sample time.
+    ///
+    /// # Errors
+    /// [`IdentError`] with what is wrong.
+    pub(crate) fn check_at(&self, sample_time: SampleTime) -> Result<(), IdentError> {
+        check_sample_time(sample_time)?;
+        self.check()?;
+        match self.method.person_prior() {
+            Some(prior) => prior.check(sample_time, ["", ""]),
+            None => Ok(()),
+        }
     }
 
     /// Checks method, structure, orders and options against each other.

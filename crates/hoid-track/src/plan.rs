@@ -185,10 +185,7 @@ fn narrowed(
 
 /// What the recursion checks when it starts, before anything is read or searched.
 fn check(options: &TrackOptions, sample_time: SampleTime) -> Result<(), IdentError> {
-    options.check()?;
-    if let Some(prior) = options.method.person_prior() {
-        prior.check(sample_time, ["", ""])?;
-    }
+    options.check_at(sample_time)?;
     for memory in options.memories()? {
         memory.lambda(sample_time)?;
     }

@@ -12,7 +12,7 @@ use crate::{
     options::TrackOptions,
     seal::{opened, sealed},
     start::StartState,
-    tracker::guard_of,
+    tracker::{guard_of, standing_of},
 };
 use hoid_ident::IdentError;
 
@@ -38,6 +38,9 @@ impl State for Tracker {
                 ],
                 each,
             );
+        }
+        if let Some(standing) = &mut self.standing {
+            visit_all(&mut [&mut self.counts.held, &mut self.moved, &mut **standing], each);
         }
     }
 }
@@ -74,7 +77,7 @@ impl Tracker {
     /// [`IdentError::BadStart`] for numbers of another tracker, and for such that were changed or cut;
     /// those of [`Tracker::new`].
     pub fn restored(options: &TrackOptions, sample_time: SampleTime, numbers: &[f64]) -> Result<Self, IdentError> {
-        options.check()?;
+        options.check_at(sample_time)?;
         let wrong = || IdentError::BadStart {
             reason: "the numbers are those of a tracker with other options; save it again".to_owned(),
         };
@@ -101,6 +104,7 @@ impl Tracker {
         let mut recursion = options.method.inner().build(&options.setup()?, &start, sample_time)?;
         let mut tracker = Self {
             guard: guard_of(options, &mut *recursion, None, sample_time),
+            standing: standing_of(options, sample_time),
             moved: false,
             recursion,
             options: options.clone(),

@@ -28,8 +28,37 @@ const TYPICAL_NOISE_POLE: f64 = -0.8;
 const SLOWEST_OMEGA: f64 = 0.5;
 const FASTEST_SHARE: f64 = 0.5;
 const DAMPING: [f64; 2] = [0.02, 5.0];
+/// Longest sample time of a tracker, s: beyond it the fastest neuromuscular system that samples can show
+/// is slower than the slowest of people.
+const LONGEST_SAMPLE_TIME_S: f64 = FASTEST_SHARE * std::f64::consts::PI / SLOWEST_OMEGA;
 /// Factor by which the roots of an unstable noise model are drawn inside, until they are.
 const DRAWN_INSIDE: f64 = 0.99;
+
+/// Refuses a sample time with which no operator can be followed, whatever the method: memories, delays
+/// and bounds of all of them are those of people, in seconds.
+///
+/// # Errors
+/// [`IdentError::BadOption`] above [`LONGEST_SAMPLE_TIME_S`].
+pub(crate) fn check_sample_time(sample_time: SampleTime) -> Result<(), IdentError> {
+    let ts = sample_time.s();
+    if ts < LONGEST_SAMPLE_TIME_S {
+        return Ok(());
+    }
+    Err(IdentError::BadOption {
+        option: "the sample time of a tracker".to_owned(),
+        found: format!("{ts} s"),
+        expected: format!(
+            "less than {LONGEST_SAMPLE_TIME_S:.2} s, for a person cannot be followed with fewer samples; if the time is in ms, \
+             divide it by 1000 (a sample time of {} s) or name its unit",
+            ts / 1000.0
+        ),
+    })
+}
+
+/// The value within its bounds. Without a panic where they are reversed or no numbers, as `clamp` has.
+pub(crate) fn within(value: f64, [low, high]: [f64; 2]) -> f64 {
+    value.max(low).min(high)
+}
 
 /// The start in the coordinates of the recursion.
 #[derive(Debug, Clone, PartialEq)]
@@ -92,11 +121,11 @@ impl StartState {
             let first = if setup.delay_parameter_s.is_some() { 5 } else { 4 };
             values[..first].copy_from_slice(&TYPICAL_OPERATOR[..first]);
             if let Some((low, high)) = setup.delay_parameter_s {
-                values[4] = TYPICAL_OPERATOR[4].clamp(low.min(high), high.max(low));
+                values[4] = within(TYPICAL_OPERATOR[4], [low, high]);
             }
             let limits = bounds(setup, sample_time)?;
-            for (value, [low, high]) in values.iter_mut().zip(limits) {
-                *value = value.clamp(low, high);
+            for (value, limits) in values.iter_mut().zip(limits) {
+                *value = within(*value, limits);
             }
             if o.nd > 0 {
                 values[first + o.nc] = TYPICAL_NOISE_POLE;
@@ -184,6 +213,7 @@ pub(crate) fn bounds(setup: &Setup, sample_time: SampleTime) -> Result<Vec<[f64;
             available: names.join(", "),
         });
     }
+    check_sample_time(sample_time)?;
     let usual = |name: &str| match name {
         "omega_nm" => [SLOWEST_OMEGA, FASTEST_SHARE * sample_time.nyquist_rad_s()],
         "zeta_nm" => DAMPING,
@@ -381,13 +411,13 @@ fn from_grey_box(setup: &Setup, record: &Record) -> Result<Found, IdentError> {
         .map_or(found.innovation_variance(), |noise| noise.variance);
     let width = parameters.len();
     let (mut eta, mut rows) = (Vec::new(), Vec::new());
-    for (name, [low, high]) in PHYSICAL_NAMES[..operator].iter().zip(&limits) {
+    for (name, limits) in PHYSICAL_NAMES[..operator].iter().zip(&limits) {
         let Some(place) = value(name) else {
             return Err(IdentError::BadStart {
                 reason: format!("the grey box has no {name}"),
             });
         };
-        eta.push(parameters[place].1.value.clamp(*low, *high));
+        eta.push(within(parameters[place].1.value, *limits));
         rows.push(vec![(place, 1.0)]);
     }
     for i in 0..o.nc + o.nd {

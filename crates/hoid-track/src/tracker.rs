@@ -16,6 +16,7 @@ use crate::{
     recursion::{Recursion, Sample},
     response::Response,
     setup::StartAt,
+    standing::{Act, Standing},
     start::StartState,
     trace::operator_of,
 };
@@ -38,6 +39,7 @@ pub struct Tracker {
     pub(crate) sample_time: SampleTime,
     pub(crate) recursion: Box<dyn Recursion>,
     pub(crate) guard: Option<Box<Guard>>,
+    pub(crate) standing: Option<Box<Standing>>,
     /// True where the last sample moved the estimate.
     pub(crate) moved: bool,
     pub(crate) last_e: f64,
@@ -72,15 +74,13 @@ impl Tracker {
         known: Option<&Fit>,
         sample_time: SampleTime,
     ) -> Result<Self, IdentError> {
-        options.check()?;
-        if let Some(prior) = options.method.person_prior() {
-            prior.check(sample_time, ["", ""])?;
-        }
+        options.check_at(sample_time)?;
         let setup = options.setup()?;
         let start = StartState::new(&setup, span, known, sample_time)?;
         let mut recursion = options.method.inner().build(&setup, &start, sample_time)?;
         Ok(Self {
             guard: guard_of(options, &mut *recursion, span, sample_time),
+            standing: standing_of(options, sample_time),
             moved: false,
             recursion,
             options: options.clone(),
@@ -120,30 +120,29 @@ impl Tracker {
         };
         self.last_e = sample.e;
         let skipped = !(e_sound && u_sound);
-        if !u_sound {
-            self.recursion.bridge(sample);
-            self.moved = false;
-            self.counts.skipped += 1;
-            return Outcome {
-                innovation: None,
-                skipped,
-                held: false,
-                shortened: false,
-            };
-        }
-        let taken = if moves && !skipped {
-            self.recursion.step(sample)
-        } else {
-            self.recursion.follow(sample)
+        let act = match (u_sound, moves && e_sound) {
+            (false, _) => Act::Bridge,
+            (true, true) => Act::Step,
+            (true, false) => Act::Follow,
         };
+        let Guarded { outcome, held } = match &mut self.standing {
+            Some(standing) => standing.take(&mut *self.recursion, sample, act),
+            None => Guarded {
+                outcome: act.on(&mut *self.recursion, sample),
+                held: false,
+            },
+        };
+        self.moved = act == Act::Step && !held;
+        let taken = outcome.filter(|_| !skipped && !held);
+        let shortened = outcome.is_some_and(|outcome| outcome.shortened);
         self.counts.skipped += u64::from(skipped);
-        self.counts.shortened += u64::from(taken.shortened);
-        self.moved = moves && !skipped;
+        self.counts.held += u64::from(held && !skipped);
+        self.counts.shortened += u64::from(shortened);
         Outcome {
-            innovation: (!skipped).then_some(taken.innovation),
+            innovation: taken.map(|taken| taken.innovation),
             skipped,
-            held: false,
-            shortened: taken.shortened,
+            held: held && !skipped,
+            shortened,
         }
     }
 
@@ -166,12 +165,14 @@ impl Tracker {
 
     /// What the guard found or did at the last sample.
     pub fn event(&self) -> Option<GuardEvent> {
-        self.guard.as_ref().and_then(|guard| guard.event())
+        let of_guard = self.guard.as_ref().and_then(|guard| guard.event());
+        of_guard.or_else(|| self.standing.as_ref()?.event())
     }
 
-    /// True while the guard lets the estimate stand still.
+    /// True while the estimate stands still, for the guard or for nothing arrives.
     pub fn is_paused(&self) -> bool {
-        self.guard.as_ref().is_some_and(|guard| guard.is_paused())
+        let of_guard = self.guard.as_ref().is_some_and(|guard| guard.is_paused());
+        of_guard || self.standing.as_ref().is_some_and(|standing| standing.is_paused())
     }
 
     /// Seconds since the guard began the estimate again, where it has.
@@ -352,6 +353,21 @@ impl Tracker {
     }
 }
 
+fn largest_nk(options: &TrackOptions, sample_time: SampleTime) -> usize {
+    let tracked = options.method.track_delay_s();
+    let latest = tracked.map_or(0.0, |(_, high)| high / sample_time.s());
+    options.orders.nk.max((latest.ceil() as usize).saturating_add(1))
+}
+
+/// The watch of a recursion without a guard, but where that was asked for.
+pub(crate) fn standing_of(options: &TrackOptions, sample_time: SampleTime) -> Option<Box<Standing>> {
+    let method = options.method.inner();
+    if method.is_guarded() || method.refuses_guard() {
+        return None;
+    }
+    Standing::new(largest_nk(options, sample_time), sample_time).map(Box::new)
+}
+
 /// The guard of a recursion at its start, where the options ask for one.
 pub(crate) fn guard_of(
     options: &TrackOptions,
@@ -360,11 +376,10 @@ pub(crate) fn guard_of(
     sample_time: SampleTime,
 ) -> Option<Box<Guard>> {
     let method = options.method.inner();
-    let latest = method.track_delay_s().map_or(0.0, |(_, high)| high / sample_time.s());
-    let nk = options.orders.nk.max((latest.ceil() as usize).saturating_add(1));
     if !method.is_guarded() {
         return None;
     }
+    let nk = largest_nk(options, sample_time);
     let mut guard = Guard::new(recursion, nk, span, sample_time);
     let o = options.orders;
     if matches!(options.start, StartAt::Span(_))

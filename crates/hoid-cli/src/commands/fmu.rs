@@ -8,7 +8,7 @@ use std::{
 use hoid::io::{
     AnyScenario, IoError,
     fmu::{FmiVersion, FmuKind, FmuSettings, FmuStart, Library, write_fmu},
-    is_fit_file, parse_any_scenario, parse_fit, read_text,
+    is_fit_file, parse_any_scenario, parse_fit, read_settings,
 };
 use hoid::model::SampleTime;
 use hoid::sim::{FamilyOperatorRun, FamilySimulator, RunSeed, Simulator};
@@ -65,7 +65,7 @@ fn of_tracker(args: &FmuArgs) -> Result<Unit, CliError> {
     match &args.prior {
         None => {}
         Some(file) if is_fit_file(file) => {
-            let text = read_text(Path::new(file))?;
+            let text = read_settings(Path::new(file))?;
             // What could not begin with it is said here, not in a simulator.
             let fit = parse_fit(&text, file)?.operator()?;
             method.start_from(fit).map_err(|error| wrong(file, &error))?;
@@ -90,7 +90,7 @@ fn of_operator(operator: &OperatorChoice, seed: i32) -> Result<Unit, CliError> {
             condition.name().to_owned(),
             Vec::new(),
         ),
-        OperatorChoice::File(file) => (read_text(file)?, file.display().to_string(), vec![file.clone()]),
+        OperatorChoice::File(file) => (read_settings(file)?, file.display().to_string(), vec![file.clone()]),
     };
     // What could not begin is said here, not in a simulator.
     let step_s = match parse_any_scenario(&text, &source, &source)? {

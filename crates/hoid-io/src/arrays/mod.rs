@@ -11,10 +11,8 @@
 //! | `selection` | [`table_of`]: the columns of a record, and those beside them |
 //! | `clocks` | columns at the times of another |
 //! | `results` | [`output_table_of`]: all columns, as a table of results |
-//! | `budget` | [`Budget`]: how much a file may unpack to |
 
 mod array;
-mod budget;
 mod clocks;
 mod column_path;
 mod contents;
@@ -23,7 +21,6 @@ mod results;
 mod selection;
 
 pub(crate) use array::Array;
-pub(crate) use budget::{Budget, MOST_NESTED};
 pub(crate) use column_path::{ColumnPath, Holds};
 pub(crate) use contents::{COMMENTS, Contents, Entry, Indexing, OBJECT, Value};
 pub(crate) use numbers::{Kind, Numbers};

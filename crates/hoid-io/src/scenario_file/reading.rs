@@ -62,7 +62,7 @@ pub fn read_scenario(path: &Path) -> Result<Scenario, ScenarioFileError> {
 /// The text of a file, its path as it is shown, and its name.
 fn text_of(path: &Path) -> Result<(String, String, String), ScenarioFileError> {
     let shown = path.display().to_string();
-    let text = std::fs::read_to_string(path).map_err(|error| ScenarioFileError::Unreadable {
+    let text = crate::atomic::settings_text(path).map_err(|error| ScenarioFileError::Unreadable {
         path: shown.clone(),
         reason: error.to_string(),
     })?;

@@ -112,7 +112,7 @@ impl Manifest {
     /// [`StudyError::Plan`] with the file, the line where there is one, and the remedy;
     /// [`StudyError::Io`].
     pub fn read(path: &Path) -> Result<Self, StudyError> {
-        Self::parse(&hoid_io::read_text(path)?, &path.display().to_string())
+        Self::parse(&hoid_io::read_settings(path)?, &path.display().to_string())
     }
 
     /// A manifest from its text; `path` is for messages.

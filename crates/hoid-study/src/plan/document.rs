@@ -93,7 +93,7 @@ impl Plan {
     /// [`StudyError::Plan`] with the file, the line and the remedy; [`StudyError::Io`] for a file
     /// that cannot be read.
     pub fn read(path: &Path) -> Result<Self, StudyError> {
-        let text = hoid_io::read_text(path)?;
+        let text = hoid_io::read_settings(path)?;
         Self::parse(&text, &path.display().to_string())
     }
 

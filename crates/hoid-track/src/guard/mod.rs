@@ -67,12 +67,12 @@ use crate::recursion::{Recursion, Sample, StepOutcome};
 use compared::Reference;
 pub use event::{GuardAction, GuardChannel, GuardEvent, GuardKind, TrackFault};
 pub use options::{GuardChoice, GuardOptions};
-use snapshot::Snapshot;
+pub(crate) use snapshot::Snapshot;
 
 /// Longest run of samples that is held back, s.
 const LONGEST_S: f64 = 0.1;
 /// Settling time beyond the delay, s.
-const SETTLE_S: f64 = 2.0;
+pub(crate) const SETTLE_S: f64 = 2.0;
 /// Length of a block, s.
 const BLOCK_S: f64 = 1.0;
 /// Sound blocks between two snapshots, and the least age in blocks of one that is gone back to.

@@ -188,6 +188,10 @@ impl RecursiveMethod for MultipleModelOptions {
         self.guard.is_on(true)
     }
 
+    fn refuses_guard(&self) -> bool {
+        self.guard.is_refused()
+    }
+
     fn limit(&self) -> f64 {
         self.limit.unwrap_or(LIMIT)
     }

@@ -85,6 +85,10 @@ impl RecursiveMethod for PhysicalOptions {
         self.guard.is_on(true)
     }
 
+    fn refuses_guard(&self) -> bool {
+        self.guard.is_refused()
+    }
+
     fn limit(&self) -> f64 {
         self.gain.limit_or(LIMIT)
     }

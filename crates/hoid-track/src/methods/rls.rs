@@ -88,6 +88,10 @@ impl RecursiveMethod for RlsOptions {
         self.guard.is_on(false)
     }
 
+    fn refuses_guard(&self) -> bool {
+        self.guard.is_refused()
+    }
+
     /// None, as in the text.
     fn limit(&self) -> f64 {
         self.gain.limit_or(f64::INFINITY)

@@ -102,6 +102,10 @@ impl RecursiveMethod for RpemOptions {
         self.guard.is_on(false)
     }
 
+    fn refuses_guard(&self) -> bool {
+        self.guard.is_refused()
+    }
+
     fn limit(&self) -> f64 {
         self.gain.limit_or(LIMIT)
     }

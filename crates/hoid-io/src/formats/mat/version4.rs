@@ -2,7 +2,8 @@
 //! numbers each.
 
 use crate::IoError;
-use crate::arrays::{Array, Budget, Entry, Kind, Numbers, Value};
+use crate::arrays::{Array, Entry, Kind, Numbers, Value};
+use crate::budget::Budget;
 
 /// Bytes of the five numbers.
 const HEADER: usize = 20;

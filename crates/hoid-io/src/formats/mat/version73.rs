@@ -8,7 +8,8 @@ use hdf5_pure::{AttrValue, DType, Dataset, Error, File, Group, H5Element, Object
 
 use super::objects::object;
 use crate::IoError;
-use crate::arrays::{Array, Budget, Entry, Indexing, Kind, MOST_NESTED, Numbers, Value};
+use crate::arrays::{Array, Entry, Indexing, Kind, Numbers, Value};
+use crate::budget::{Budget, MOST_NESTED};
 use crate::guarded::guarded;
 use crate::wording::told;
 

@@ -12,7 +12,8 @@ use zip::{CompressionMethod, DateTime, ZipArchive, ZipWriter};
 
 use super::npy::{self, NpyError};
 use crate::IoError;
-use crate::arrays::{Budget, COMMENTS, Contents, Entry, Indexing};
+use crate::arrays::{COMMENTS, Contents, Entry, Indexing};
+use crate::budget::Budget;
 use crate::guarded::guarded;
 use crate::output_table::{TableSchema, Values};
 use crate::wording::{shown, told};

@@ -16,7 +16,9 @@ use parquet::schema::types::{ColumnDescPtr, ColumnDescriptor};
 
 use super::columns::{COMMENTS, Data, ReadColumn, ReadFile};
 use crate::IoError;
+use crate::budget::Budget;
 use crate::guarded::guarded;
+use crate::table::check_number;
 use crate::wording::{shown, told};
 
 /// The magic bytes at both ends.
@@ -24,6 +26,10 @@ const MAGIC: &[u8; 4] = b"PAR1";
 /// A month at 100 samples/s; more rows are taken for damage before they take all memory.
 const MOST_ROWS: usize = 1 << 28;
 const TIME: &str = "a date or time";
+/// What a value takes as a number and as its place among those that are none, and a text beside its
+/// letters, bytes.
+const VALUE: u64 = 16;
+const TEXT: u64 = 24;
 /// Values that are fetched together.
 const PART: usize = 1 << 16;
 
@@ -61,6 +67,7 @@ fn check_ends(bytes: &[u8], file: &str) -> Result<(), IoError> {
 }
 
 fn columns(bytes: Bytes, file: &str) -> Result<ReadFile, IoError> {
+    let size = bytes.len();
     let damaged = |found: String| IoError::Damaged {
         file: file.to_owned(),
         found,
@@ -76,6 +83,16 @@ fn columns(bytes: Bytes, file: &str) -> Result<ReadFile, IoError> {
             remedy: "write it in parts",
         });
     }
+    let leaves = footer.schema_descr().num_columns();
+    check_number(leaves, file)?;
+    let mut budget = Budget::of(size);
+    for group in reader.metadata().row_groups() {
+        for chunk in group.columns() {
+            budget.take(u64::try_from(chunk.uncompressed_size()).unwrap_or(u64::MAX), file)?;
+        }
+    }
+    // Every column becomes numbers, also one that is not read.
+    budget.take((rows as u64).saturating_mul(VALUE).saturating_mul(leaves as u64), file)?;
     let mut grouped = 0_usize;
     for group in reader.metadata().row_groups() {
         grouped = grouped.saturating_add(count(group.num_rows())?);
@@ -83,7 +100,7 @@ fn columns(bytes: Bytes, file: &str) -> Result<ReadFile, IoError> {
     if grouped != rows {
         return Err(damaged(format!("{rows} rows in all, {grouped} in the row groups")));
     }
-    let column = |(index, descriptor): (usize, &ColumnDescPtr)| {
+    let mut column = |(index, descriptor): (usize, &ColumnDescPtr)| {
         let parts: Vec<&str> = descriptor.path().parts().iter().map(|part| part.trim()).collect();
         let mut leaf = ColumnPath {
             reader: &reader,
@@ -91,6 +108,7 @@ fn columns(bytes: Bytes, file: &str) -> Result<ReadFile, IoError> {
             index,
             name: parts.join("."),
             nulls: Vec::new(),
+            budget: &mut budget,
         };
         Ok(ReadColumn {
             data: leaf.data(descriptor)?,
@@ -106,7 +124,7 @@ fn columns(bytes: Bytes, file: &str) -> Result<ReadFile, IoError> {
         .filter(|pair| pair.key == COMMENTS)
         .find_map(|pair| pair.value.as_ref());
     Ok(ReadFile {
-        columns: leaves.map(column).collect::<Result<_, IoError>>()?,
+        columns: leaves.map(&mut column).collect::<Result<_, IoError>>()?,
         rows,
         comments: comments.map_or_else(Vec::new, |text| text.split('\n').map(str::to_owned).collect()),
     })
@@ -119,6 +137,7 @@ struct ColumnPath<'a> {
     index: usize,
     name: String,
     nulls: Vec<usize>,
+    budget: &'a mut Budget,
 }
 
 impl ColumnPath<'_> {
@@ -163,7 +182,7 @@ impl ColumnPath<'_> {
     }
 
     /// One value a row; the rows without are noted.
-    fn values<T: DataType, V: Default>(&mut self, of: impl Fn(&T::T) -> V) -> Result<Vec<V>, IoError> {
+    fn values<T: DataType, V: Default + Weight>(&mut self, of: impl Fn(&T::T) -> V) -> Result<Vec<V>, IoError> {
         let mut values = Vec::new();
         for group in 0..self.reader.num_row_groups() {
             self.group::<T, V>(group, &of, &mut values)
@@ -172,7 +191,7 @@ impl ColumnPath<'_> {
         Ok(values)
     }
 
-    fn group<T: DataType, V: Default>(
+    fn group<T: DataType, V: Default + Weight>(
         &mut self,
         group: usize,
         of: &impl Fn(&T::T) -> V,
@@ -205,8 +224,10 @@ impl ColumnPath<'_> {
                 let missing = end - values.len() - rows;
                 return Err(ParquetError::EOF(format!("{missing} values are missing")));
             }
+            let first = values.len();
             if defined == 0 {
                 values.extend(stored.iter().map(of));
+                self.weigh(&values[first..])?;
                 continue;
             }
             let mut stored = stored.iter();
@@ -217,8 +238,16 @@ impl ColumnPath<'_> {
                 }
                 values.push(value.map_or_else(V::default, of));
             }
+            self.weigh(&values[first..])?;
         }
         Ok(())
+    }
+
+    /// Takes what values hold beside themselves.
+    fn weigh<V: Weight>(&mut self, values: &[V]) -> Result<(), ParquetError> {
+        let bytes = values.iter().map(Weight::bytes).sum();
+        let taken = self.budget.take(bytes, self.file);
+        taken.map_err(|error| ParquetError::External(Box::new(error)))
     }
 
     /// What the crate says, with the place.
@@ -231,11 +260,36 @@ impl ColumnPath<'_> {
                 found: format!("{place} {what}"),
                 remedy: "write it again as one file with Snappy compression, as pandas and DuckDB do by default",
             },
+            ParquetError::External(error) => match error.downcast::<IoError>() {
+                Ok(own) => *own,
+                Err(error) => IoError::Damaged {
+                    file,
+                    found: format!("{place}: {}", told(&error.to_string())),
+                },
+            },
             error => IoError::Damaged {
                 file,
                 found: format!("{place}: {}", told(&error.to_string())),
             },
         }
+    }
+}
+
+/// What a value holds beside itself.
+trait Weight {
+    /// Bytes.
+    fn bytes(&self) -> u64 {
+        0
+    }
+}
+
+impl Weight for f64 {}
+impl Weight for i64 {}
+impl Weight for u64 {}
+
+impl Weight for String {
+    fn bytes(&self) -> u64 {
+        TEXT + self.len() as u64
     }
 }
 

@@ -103,9 +103,9 @@ impl JointFilter {
             self.restarts += 1;
             return true;
         }
-        for (i, [low, high]) in self.bounds.into_iter().enumerate() {
+        for (i, bounds) in self.bounds.into_iter().enumerate() {
             let x = &mut self.belief.x[ETA + i];
-            let within = x.clamp(low, high);
+            let within = start::within(*x, bounds);
             cut |= within != *x;
             *x = within;
             let largest = LARGEST_VARIANCE * self.first.x[ETA + i].powi(2);
