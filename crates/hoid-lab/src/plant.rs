@@ -30,6 +30,12 @@ impl Plant {
         self.b.len()
     }
 
+    /// True where the matrices fit each other and there is room for the state.
+    pub fn is_sound(&self) -> bool {
+        let n = self.order();
+        n <= MOST_STATES && self.a.len() == n * n && self.c.len() == n
+    }
+
     /// y, of the state and v.
     pub fn output(&self, x: &[f64], v: f64) -> f64 {
         let mut y = 0.0;

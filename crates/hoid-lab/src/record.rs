@@ -15,7 +15,8 @@ use crate::{
 /// # Errors
 /// [`LabError::Model`] for a run without a sample.
 pub fn record(begun: &Begun, task: &Task, logged: &Logged) -> Result<Record, LabError> {
-    let n = logged.signals.e.len();
+    // A log that is longer than its run holds ticks that never were.
+    let n = logged.signals.e.len().min(logged.signals.u.len()).min(task.ticks);
     let every = |values: &[f64]| {
         values[..n]
             .iter()

@@ -11,19 +11,25 @@
 //! | a path that is none | 404 |
 //! | another method than GET | 405 |
 //! | a head of more than 16 KiB | 431 |
-//! | more than 32 connections at once | 503 |
+//! | more than 64 connections with the token at once | 503 |
+//!
+//! **Strangers.** A head has 5 s in all to come. Connections that have not shown the token yet are at
+//! most 32; where one more comes, the oldest of them is closed: who is slow gives way, and the page,
+//! whose head comes at once, is always heard. Where the system has no descriptor or thread left, the
+//! loop waits a moment and goes on.
 
 mod http;
 mod socket;
 
 use std::{
-    net::{Ipv4Addr, SocketAddr, TcpListener, TcpStream},
+    collections::VecDeque,
+    net::{Ipv4Addr, Shutdown, SocketAddr, TcpListener, TcpStream},
     sync::{
-        Arc,
+        Arc, Mutex, MutexGuard, PoisonError,
         atomic::{AtomicUsize, Ordering},
     },
     thread,
-    time::Duration,
+    time::{Duration, Instant},
 };
 
 use data_encoding::{BASE64, HEXLOWER};
@@ -32,10 +38,13 @@ use sha2::{Digest, Sha256};
 use crate::{LabError, lab::Lab};
 use http::{Reply, Request};
 
-/// Most connections at once.
-const CONNECTIONS: usize = 32;
-/// Longest time that a request may take to come.
+/// Most connections at once of those that have not shown the token, and of those that have.
+const STRANGERS: usize = 32;
+const KNOWN: usize = 64;
+/// Longest time that the head of a request may take to come, all of it.
 const PATIENCE: Duration = Duration::from_secs(5);
+/// Wait where the system gives no connection.
+const BACK_OFF: Duration = Duration::from_millis(50);
 
 /// The page, built of `page/` by `npm run build`.
 const PAGE: &str = include_str!("../page/dist/lab.html");
@@ -45,8 +54,67 @@ pub struct Server {
     listener: TcpListener,
     address: SocketAddr,
     token: String,
+    /// The token of [`Server::address_once`], until it is shown.
+    once: Mutex<Option<String>>,
     policy: String,
     lab: Arc<Lab>,
+    strangers: Strangers,
+    known: AtomicUsize,
+}
+
+/// Connections that have not shown the token, the oldest first.
+#[derive(Default)]
+struct Strangers(Mutex<VecDeque<(u64, TcpStream)>>);
+
+impl Strangers {
+    fn all(&self) -> MutexGuard<'_, VecDeque<(u64, TcpStream)>> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// One more; false where there is no descriptor for it.
+    fn enter(&self, number: u64, stream: &TcpStream) -> bool {
+        let Ok(own) = stream.try_clone() else {
+            self.give_way();
+            return false;
+        };
+        let mut all = self.all();
+        all.push_back((number, own));
+        let many = all.len() > STRANGERS;
+        drop(all);
+        if many {
+            self.give_way();
+        }
+        true
+    }
+
+    /// The oldest is closed.
+    fn give_way(&self) {
+        if let Some((_, oldest)) = self.all().pop_front() {
+            // It is gone already where this fails.
+            let _ = oldest.shutdown(Shutdown::Both);
+        }
+    }
+
+    /// It is over, or has shown the token.
+    fn leave(&self, number: u64) {
+        self.all().retain(|(known, _)| *known != number);
+    }
+}
+
+/// A connection that has shown the token, counted for as long as it is answered.
+struct Known<'a>(&'a AtomicUsize);
+
+impl<'a> Known<'a> {
+    fn enter(all: &'a AtomicUsize) -> Self {
+        all.fetch_add(1, Ordering::Relaxed);
+        Self(all)
+    }
+}
+
+impl Drop for Known<'_> {
+    fn drop(&mut self) {
+        self.0.fetch_sub(1, Ordering::Relaxed);
+    }
 }
 
 impl Server {
@@ -64,15 +132,15 @@ impl Server {
         let address = listener
             .local_addr()
             .map_err(|error| LabError::Server(error.to_string()))?;
-        let mut random = [0; 16];
-        getrandom::fill(&mut random)
-            .map_err(|error| LabError::Server(format!("the system gives no random numbers for the token: {error}")))?;
         Ok(Self {
             listener,
             address,
-            token: HEXLOWER.encode(&random),
+            token: random_token()?,
+            once: Mutex::new(None),
             policy: policy(PAGE),
             lab: Arc::new(lab),
+            strangers: Strangers::default(),
+            known: AtomicUsize::new(0),
         })
     }
 
@@ -81,34 +149,70 @@ impl Server {
         format!("http://{}/{}/", self.address, self.token)
     }
 
+    /// An address for a browser that is started with it, which others may read in the list of processes:
+    /// it leads to [`Server::address`] once, and then nowhere.
+    ///
+    /// # Errors
+    /// [`LabError::Server`] where the system gives no random numbers.
+    pub fn address_once(&self) -> Result<String, LabError> {
+        let token = random_token()?;
+        let address = format!("http://{}/{token}/", self.address);
+        *self.once.lock().unwrap_or_else(PoisonError::into_inner) = Some(token);
+        Ok(address)
+    }
+
+    /// True the first time that the token of [`Server::address_once`] is shown.
+    fn is_once(&self, token: &str) -> bool {
+        let mut once = self.once.lock().unwrap_or_else(PoisonError::into_inner);
+        once.take_if(|known| same(known, token)).is_some()
+    }
+
     /// Serves for as long as the program runs.
     pub fn serve(self) {
         let server = Arc::new(self);
-        let open = Arc::new(AtomicUsize::new(0));
-        for stream in server.listener.incoming().flatten() {
-            let (server, open) = (Arc::clone(&server), Arc::clone(&open));
-            thread::spawn(move || {
-                let many = open.fetch_add(1, Ordering::Relaxed) >= CONNECTIONS;
-                server.answer(stream, many);
-                open.fetch_sub(1, Ordering::Relaxed);
+        for (number, stream) in (0_u64..).zip(server.listener.incoming()) {
+            let Ok(stream) = stream else {
+                // No descriptor is left, or the peer is gone.
+                server.strangers.give_way();
+                thread::sleep(BACK_OFF);
+                continue;
+            };
+            if !server.strangers.enter(number, &stream) {
+                continue;
+            }
+            let own = Arc::clone(&server);
+            let made = thread::Builder::new().spawn(move || {
+                own.answer(stream, number);
+                own.strangers.leave(number);
             });
+            if made.is_err() {
+                server.strangers.leave(number);
+                thread::sleep(BACK_OFF);
+            }
         }
     }
 
-    fn answer(&self, mut stream: TcpStream, many: bool) {
+    fn answer(&self, mut stream: TcpStream, number: u64) {
         let timed = stream
             .set_read_timeout(Some(PATIENCE))
             .and(stream.set_write_timeout(Some(PATIENCE)));
         if timed.and(stream.set_nodelay(true)).is_err() {
             return;
         }
-        let reply = match Request::read(&mut stream) {
-            _ if many => Reply::refused(503, "too many connections"),
-            Ok(request) => match self.routed(&request) {
-                Ok(Route::Socket(key)) => return socket::run(stream, &key, &self.lab),
-                Ok(Route::Reply(reply)) | Err(reply) => reply,
-            },
-            Err(reply) => reply,
+        let request = Request::read(&mut stream, Instant::now() + PATIENCE);
+        let routed = request.and_then(|request| self.routed(&request));
+        let _known = match &routed {
+            Ok(_) => {
+                self.strangers.leave(number);
+                Some(Known::enter(&self.known))
+            }
+            Err(_) => None,
+        };
+        let many = self.known.load(Ordering::Relaxed) > KNOWN;
+        let reply = match routed {
+            Ok(_) if many => Reply::refused(503, "too many connections"),
+            Ok(Route::Socket(key)) => return socket::run(stream, &key, &self.lab),
+            Ok(Route::Reply(reply)) | Err(reply) => reply,
         };
         // A page that is gone needs no answer.
         let _ = reply.write(&mut stream);
@@ -131,6 +235,9 @@ impl Server {
             .trim_start_matches('/')
             .split_once('/')
             .unwrap_or((&request.path, ""));
+        if request.method == "GET" && rest.is_empty() && self.is_once(token) {
+            return Ok(Route::Reply(Reply::moved(&self.address())));
+        }
         if !same(token, &self.token) {
             return Err(Reply::refused(403, "no token: open the address that hoid lab printed"));
         }
@@ -160,6 +267,13 @@ impl Server {
 enum Route {
     Socket(String),
     Reply(Reply),
+}
+
+fn random_token() -> Result<String, LabError> {
+    let mut random = [0; 16];
+    getrandom::fill(&mut random)
+        .map_err(|error| LabError::Server(format!("the system gives no random numbers for the token: {error}")))?;
+    Ok(HEXLOWER.encode(&random))
 }
 
 /// Equal, in a time that does not tell where they differ.

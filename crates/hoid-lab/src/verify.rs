@@ -7,6 +7,7 @@
 //! | `lab-interrupted` | it did not reach its end |
 //! | `lab-task` | its tables are not those of its condition and seed |
 //! | `lab-ticks` | ticks are missing, twice or out of order |
+//! | `lab-log` | a file of the log is missing, cut or no log; it counts as far as it is whole |
 //! | `lab-input` | u at a tick is not that of the events |
 //! | `lab-tick` | e at a tick is not that of the plant, by a bit |
 //! | `lab-event` | an event was taken before its time stamp, or too late |
@@ -86,13 +87,25 @@ impl Checked {
 /// Checks a run of a session.
 ///
 /// # Errors
-/// [`LabError`] for files that cannot be read; what is wrong inside of them is a finding.
+/// [`LabError`] where nothing is known of the run (`run.json`) or the system refuses a file; what is wrong
+/// in the others is a finding.
 pub fn check(stem: &Stem) -> Result<Checked, LabError> {
     let begun = Begun::read(stem)?;
-    let task = begun.task(stem)?;
     let logged = Logged::read(stem)?;
-    let ended = Ended::read(stem)?;
-    let mut findings = Vec::new();
+    let ended = Ended::read(stem).unwrap_or_default();
+    let mut findings: Vec<Finding> = (logged.faults.iter())
+        .map(|words| Finding::doubt("lab-log", words.clone()))
+        .collect();
+    let task = match begun.task(stem) {
+        Ok(task) => task,
+        Err(error) => {
+            findings.push(Finding::doubt("lab-task", error.to_string()));
+            return Ok(Checked {
+                verdict: Verdict::of(findings),
+                measures: Measures::default(),
+            });
+        }
+    };
     findings.extend(end_of(&begun, ended.as_ref(), &logged));
     findings.extend(task_of(&begun, &task));
     findings.extend(ticks_of(&logged));
@@ -296,7 +309,7 @@ fn measures(begun: &Begun, task: &Task, logged: &Logged) -> Measures {
     };
     let missed = |interval: &f64| {
         if *interval > MISSED * usual {
-            (interval / usual).round() as usize - 1
+            ((interval / usual).round() as usize).saturating_sub(1)
         } else {
             0
         }
@@ -307,6 +320,8 @@ fn measures(begun: &Begun, task: &Task, logged: &Logged) -> Measures {
         .map(|event| event.handled_ms - event.stamp_ms)
         .collect();
     let e = &logged.signals.e;
+    // Ticks beyond the end of the run never were.
+    let e = &e[..e.len().min(task.ticks)];
     let measured = begun.run_in.min(e.len())..e.len();
     let rms_e = rms(&e[measured.clone()]);
     // What hands at rest would leave.
@@ -317,7 +332,7 @@ fn measures(begun: &Begun, task: &Task, logged: &Logged) -> Measures {
         frames: logged.frames.len(),
         frame_ms,
         longest_frame_ms: intervals.iter().copied().fold(0.0, f64::max),
-        missed_frames: intervals.iter().map(missed).sum(),
+        missed_frames: intervals.iter().map(missed).fold(0, usize::saturating_add),
         input_hz: logged.events.len() as f64 / (e.len().max(1) as f64 * crate::task::TICK_S),
         input_age_ms: median(&ages),
         rms_e,

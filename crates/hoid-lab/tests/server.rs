@@ -38,6 +38,10 @@ fn config() -> Config {
 
 fn served(out: &Path, mode: Mode) -> At {
     let server = Server::new(Lab::open(out, config(), mode, None).unwrap(), None).unwrap();
+    served_by(server)
+}
+
+fn served_by(server: Server) -> At {
     let address = server.address();
     thread::spawn(move || server.serve());
     let mut parts = address
@@ -307,4 +311,46 @@ fn one_experiment_has_one_server() {
     let _at = served(dir.path(), Mode::Sessions);
     let second = Lab::open(dir.path(), config(), Mode::Sessions, None);
     assert!(second.is_err_and(|error| error.to_string().contains("another process works on")));
+}
+
+/// Connections that send a byte now and then, as many as the system gives: they give way to the page.
+#[test]
+fn slow_strangers_do_not_shut_the_page_out() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = served(dir.path(), Mode::Sessions);
+    let mut slow = Vec::new();
+    for k in 0..400 {
+        let Ok(mut stream) = TcpStream::connect(&at.host) else {
+            continue;
+        };
+        let _ = stream.write_all(b"GET / HTTP/1.1\r\nX: ");
+        slow.push(stream);
+        if k % 50 == 49 {
+            let reply = at.get(&format!("/{}/", at.token), "");
+            assert_eq!(status(&reply), "200", "behind {k} slow ones");
+        }
+    }
+    for stream in &mut slow {
+        let _ = stream.write_all(b"y");
+    }
+    let reply = at.get(&format!("/{}/", at.token), "");
+    assert_eq!(status(&reply), "200");
+}
+
+/// What a browser is started with is read by others in the list of processes: it serves once.
+#[test]
+fn the_address_of_the_browser_leads_to_the_page_once() {
+    let dir = tempfile::tempdir().unwrap();
+    let server = Server::new(Lab::open(dir.path(), config(), Mode::Sessions, None).unwrap(), None).unwrap();
+    let once = server.address_once().unwrap();
+    let at = served_by(server);
+    assert!(!once.contains(&at.token), "{once}");
+    let path = once.strip_prefix(&format!("http://{}", at.host)).unwrap();
+    let reply = at.get(path, "");
+    assert_eq!(status(&reply), "303");
+    assert!(
+        reply.contains(&format!("Location: http://{}/{}/\r\n", at.host, at.token)),
+        "{reply}"
+    );
+    assert_eq!(status(&at.get(path, "")), "403");
 }

@@ -271,3 +271,111 @@ fn people_have_their_rows_and_pseudonyms_are_checked() {
         assert!(Session::begin(dir.path(), &config(), bad, false).is_err(), "{bad}");
     }
 }
+
+/// Files cut at any byte, flipped or deleted, as by power cuts and full disks: the session opens, its
+/// damaged runs are unverified, and it can go on.
+#[test]
+fn every_session_opens_whatever_was_cut_or_lost() {
+    let dir = tempfile::tempdir().unwrap();
+    let (mut session, ..) = finished(dir.path());
+    drop(run(&mut session, 777));
+    let folder = session.folder.clone();
+    let copy = tempfile::tempdir().unwrap();
+    let files: Vec<_> = hoid_io::file_names(&folder)
+        .unwrap()
+        .into_iter()
+        .filter(|name| name != "lab.toml")
+        .collect();
+    let mut state = 7_u64;
+    let mut random = move |below: usize| {
+        state = state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        ((state >> 33) as usize) % below.max(1)
+    };
+    for round in 0..1000 {
+        for name in hoid_io::file_names(&folder).unwrap() {
+            fs::copy(folder.join(&name), copy.path().join(&name)).unwrap();
+        }
+        let name = &files[random(files.len())];
+        let path = copy.path().join(name);
+        let mut bytes = fs::read(&path).unwrap();
+        let what = random(4);
+        match what {
+            0 => fs::remove_file(&path).unwrap(),
+            1 => {
+                let at = random(bytes.len());
+                bytes[at] ^= 1 << random(8);
+                fs::write(&path, &bytes).unwrap();
+            }
+            _ => fs::write(&path, &bytes[..random(bytes.len())]).unwrap(),
+        }
+        let mut opened = Session::open(copy.path()).unwrap_or_else(|error| panic!("{round}, {name}, {what}: {error}"));
+        for (_, stem) in Stem::all(copy.path()).unwrap() {
+            let checked = check(&stem);
+            let damaged = name.starts_with(stem.text()) && name.ends_with(".csv") && what != 1;
+            assert!(
+                !(damaged && checked.is_ok_and(|checked| checked.is_verified())),
+                "{round}, {name}, {what}"
+            );
+        }
+        if round % 100 == 0 {
+            let (stem, log) = run(&mut opened, usize::MAX);
+            drop(log);
+            assert!(opened.end(&stem, How::Finished, BTreeMap::new()).unwrap().is_verified());
+        }
+        for name in hoid_io::file_names(copy.path()).unwrap() {
+            fs::remove_file(copy.path().join(name)).unwrap();
+        }
+    }
+}
+
+/// What was logged twice, matrices that do not fit and a plan of another experiment: findings or words.
+#[test]
+fn numbers_of_files_are_no_places() {
+    let dir = tempfile::tempdir().unwrap();
+    let (session, stem, _) = finished(dir.path());
+    let ticks = stem.file("ticks.csv");
+    let text = fs::read_to_string(&ticks).unwrap();
+    let last = text.lines().last().unwrap().to_owned();
+    fs::write(&ticks, format!("{text}{last}\n{last}\n")).unwrap();
+    let checked = check(&stem).unwrap();
+    assert!(
+        checked.reasons().contains("tick 3999 stands in the place of tick 4000"),
+        "{}",
+        checked.reasons()
+    );
+    let json = stem.file("run.json");
+    let begun = fs::read_to_string(&json).unwrap();
+    let mut value: serde_json::Value = serde_json::from_str(&begun).unwrap();
+    value["phases"][0]["a"] = serde_json::json!([]);
+    fs::write(&json, value.to_string()).unwrap();
+    let said = check(&stem).unwrap().reasons();
+    assert!(said.contains("do not fit each other"), "{said}");
+    let toml = session.folder.join("lab.toml");
+    let facts = fs::read_to_string(&toml).unwrap();
+    let other = facts.replacen("condition = 0", "condition = 9", 1);
+    assert_ne!(facts, other);
+    fs::write(&toml, other).unwrap();
+    let said = Session::open(&session.folder).unwrap_err().to_string();
+    assert!(said.contains("condition 9 of 1"), "{said}");
+}
+
+/// `--replay` reads and does not write.
+#[test]
+fn reading_a_session_changes_no_file() {
+    let dir = tempfile::tempdir().unwrap();
+    let (session, ..) = finished(dir.path());
+    let runs = session.folder.join("runs.csv");
+    let cut = fs::read_to_string(&runs).unwrap() + "2,1,half a li";
+    fs::write(&runs, &cut).unwrap();
+    assert_eq!(Session::read(&session.folder).unwrap().done.len(), 1);
+    assert_eq!(fs::read_to_string(&runs).unwrap(), cut);
+    // The next line stands behind the last whole one.
+    let mut session = Session::open(&session.folder).unwrap();
+    let (stem, log) = run(&mut session, usize::MAX);
+    drop(log);
+    session.end(&stem, How::Finished, BTreeMap::new()).unwrap();
+    let text = fs::read_to_string(&runs).unwrap();
+    assert!(text.lines().count() == 3 && !text.contains("half"), "{text}");
+}

@@ -46,7 +46,13 @@ impl FromStr for UdpPlaces {
                 "{text:?}: nobody listens on port 0; name the port of the answers"
             ));
         }
-        if input == output {
+        // Whoever listens on 0.0.0.0 listens on every address of this computer, and 0.0.0.0 leads there too.
+        let is_here = |ip: IpAddr| ip.is_loopback() || ip.is_unspecified();
+        let heard = input.ip() == output.ip()
+            || (input.ip().is_unspecified() || output.ip().is_unspecified())
+                && is_here(input.ip())
+                && is_here(output.ip());
+        if input.port() == output.port() && heard {
             return Err(format!(
                 "{text:?}: answers would come back as samples; name another port for them"
             ));
@@ -79,6 +85,9 @@ mod tests {
             "5005",
             "5005:5005",
             "5005:0",
+            "0.0.0.0:5005:5005",
+            "0.0.0.0:5005:127.0.0.1:5005",
+            "5005:0.0.0.0:5005",
             "a:b",
             "1:70000",
             "1:2:3:4:5",

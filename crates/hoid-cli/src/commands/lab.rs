@@ -33,7 +33,7 @@ pub fn run(args: &LabArgs) -> Result<(), CliError> {
     let address = server.address();
     output::print(&format!("{address}\n"))?;
     if args.open
-        && let Err(error) = open(&address)
+        && let Err(error) = open(&server.address_once()?)
     {
         output::notice(
             "",

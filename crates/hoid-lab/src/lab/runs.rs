@@ -141,7 +141,20 @@ impl Shared {
             // An estimate that ended early is seen by the lines that lack.
             let _ = live.send(samples);
         }
-        run.log.append(batch)
+        let (file, source) = match run.log.append(batch) {
+            Err(LabError::File { file, source }) => (file, source),
+            other => return other,
+        };
+        // What the disk does not take cannot be verified: the run is over, and the session goes on.
+        let closed = self.end_run(state, How::Interrupted, BTreeMap::new());
+        let later = if closed.is_ok() {
+            ""
+        } else {
+            " (its files are closed when the session is opened again)"
+        };
+        Err(LabError::Order(format!(
+            "{file}: {source}. The run was ended and does not count{later}; make room on the disk and begin it again"
+        )))
     }
 
     /// Ends the run that goes on, if one does.

@@ -3,6 +3,7 @@
 use std::{
     io::{self, Read as _, Write as _},
     net::TcpStream,
+    time::Instant,
 };
 
 /// Longest head of a request, bytes.
@@ -23,14 +24,18 @@ pub struct Request {
 }
 
 impl Request {
-    /// Reads a head.
-    pub fn read(stream: &mut TcpStream) -> Result<Self, Reply> {
+    /// Reads a head, all of which comes until then.
+    pub fn read(stream: &mut TcpStream, until: Instant) -> Result<Self, Reply> {
         let bad = || Reply::refused(400, "not a request of HTTP");
         let mut head = Vec::new();
         let mut part = [0; 2048];
         while !head.windows(4).any(|four| four == b"\r\n\r\n") {
             if head.len() > LONGEST {
                 return Err(Reply::refused(431, "the head of the request is too long"));
+            }
+            let left = until.saturating_duration_since(Instant::now());
+            if left.is_zero() || stream.set_read_timeout(Some(left)).is_err() {
+                return Err(Reply::refused(408, "the request did not come in time"));
             }
             match stream.read(&mut part) {
                 Ok(n) if n > 0 => head.extend_from_slice(&part[..n]),
@@ -72,6 +77,8 @@ pub struct Reply {
     status: u16,
     kind: &'static str,
     policy: String,
+    /// Where else it is.
+    location: Option<String>,
     body: Vec<u8>,
 }
 
@@ -82,6 +89,7 @@ impl Reply {
             status: 200,
             kind: "text/html; charset=utf-8",
             policy: policy.to_owned(),
+            location: None,
             body: html.as_bytes().to_vec(),
         }
     }
@@ -93,6 +101,7 @@ impl Reply {
             kind,
             policy: "default-src 'none'; style-src 'unsafe-inline'; img-src 'self' data:; frame-ancestors 'none'"
                 .to_owned(),
+            location: None,
             body,
         }
     }
@@ -103,7 +112,16 @@ impl Reply {
             status,
             kind: "text/plain; charset=utf-8",
             policy: "default-src 'none'".to_owned(),
+            location: None,
             body: format!("{words}\n").into_bytes(),
+        }
+    }
+
+    /// It is elsewhere.
+    pub fn moved(address: &str) -> Self {
+        Self {
+            location: Some(address.to_owned()),
+            ..Self::refused(303, "see there")
         }
     }
 
@@ -111,17 +129,20 @@ impl Reply {
     pub fn write(&self, stream: &mut TcpStream) -> io::Result<()> {
         let reason = match self.status {
             200 => "OK",
+            303 => "See Other",
             400 => "Bad Request",
             403 => "Forbidden",
             404 => "Not Found",
             405 => "Method Not Allowed",
+            408 => "Request Timeout",
             431 => "Request Header Fields Too Large",
             503 => "Service Unavailable",
             _ => "Internal Server Error",
         };
+        let location = (self.location.as_ref()).map_or_else(String::new, |to| format!("Location: {to}\r\n"));
         // Isolation from other origins gives the page the fine clock.
         let head = format!(
-            "HTTP/1.1 {} {reason}\r\nContent-Type: {}\r\nContent-Length: {}\r\nConnection: close\r\n\
+            "HTTP/1.1 {} {reason}\r\n{location}Content-Type: {}\r\nContent-Length: {}\r\nConnection: close\r\n\
              Cache-Control: no-store\r\nContent-Security-Policy: {}\r\nCross-Origin-Opener-Policy: same-origin\r\n\
              Cross-Origin-Embedder-Policy: require-corp\r\nCross-Origin-Resource-Policy: same-origin\r\n\
              X-Content-Type-Options: nosniff\r\nReferrer-Policy: no-referrer\r\n\r\n",

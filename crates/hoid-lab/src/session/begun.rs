@@ -131,9 +131,15 @@ impl Begun {
         };
         let (target, mut disturbance) = (column("target")?, column("disturbance")?);
         disturbance.truncate(self.ticks);
-        if target.len() < self.ticks || disturbance.len() < self.ticks || self.phases.is_empty() {
+        if target.len() < self.ticks || disturbance.len() < self.ticks {
             let reason = format!("{} rows, expected {} ticks", target.len(), self.ticks);
             return Err(LabError::damaged(&path, reason));
+        }
+        let order = self.phases.first().map(|phase| phase.plant.order());
+        let fits = |phase: &Phase| phase.plant.is_sound() && Some(phase.plant.order()) == order;
+        if order.is_none() || !self.phases.iter().all(fits) {
+            let reason = "the matrices of its controlled element do not fit each other; it is not as hoid lab wrote it";
+            return Err(LabError::damaged(&stem.file("run.json"), reason));
         }
         Ok(Task {
             run_in: self.run_in,
@@ -166,14 +172,17 @@ impl Ended {
         read_json(&path).map(Some)
     }
 
-    /// The hashes of the files as they are.
+    /// The hashes of the files as they are; empty for one that is not there.
     ///
     /// # Errors
     /// [`LabError::Io`].
     pub fn hashes(stem: &Stem) -> Result<Vec<String>, LabError> {
         APPENDED
             .iter()
-            .map(|end| Ok(digest(&hoid_io::read_bytes(&stem.file(end))?)))
+            .map(|end| match stem.file(end) {
+                path if path.exists() => Ok(digest(&hoid_io::read_bytes(&path)?)),
+                _ => Ok(String::new()),
+            })
             .collect()
     }
 }

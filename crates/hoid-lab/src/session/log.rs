@@ -1,4 +1,9 @@
-//! What is appended while a run goes on.
+//! What is appended while a run goes on: a journal, of which each line is whole or not there.
+//!
+//! A line is whole with its end. A batch that cannot be written to its end is taken back: the files
+//! are cut to the last whole batch, and its ticks count only once all three have them. A disk that
+//! is full for a moment therefore leaves no half of a line in front of later ones; the run is ended,
+//! and *unverified*. What a power cut leaves is cut to the last whole line when it is read.
 //!
 //! A batch is handed to the system when it comes, so that a server that is killed loses nothing of
 //! it, and to the disk at least each second, so that a computer that stops loses no more. Numbers are
@@ -89,6 +94,8 @@ pub struct Batch {
 #[derive(Debug)]
 pub struct RunLog {
     files: [(PathBuf, File); 3],
+    /// Bytes of each file that are whole batches.
+    whole: [u64; 3],
     synced: Instant,
     logged: usize,
     planned: usize,
@@ -114,17 +121,18 @@ impl RunLog {
         };
         Ok(Self {
             files: [make(0)?, make(1)?, make(2)?],
+            whole: headers.map(|header| header.len() as u64),
             synced: Instant::now(),
             logged: 0,
             planned: ticks,
         })
     }
 
-    /// Appends a batch.
+    /// Appends a batch, all of it or nothing.
     ///
     /// # Errors
     /// [`LabError::Message`] for a batch that does not continue the last one or is beyond the end;
-    /// [`LabError::File`].
+    /// [`LabError::File`], behind which the files hold the batches before.
     pub fn append(&mut self, batch: &Batch) -> Result<(), LabError> {
         let end = batch.first.saturating_add(batch.u.len());
         if batch.first != self.logged || batch.u.len() != batch.e.len() || end > self.planned {
@@ -136,7 +144,6 @@ impl RunLog {
                 self.planned
             )));
         }
-        self.logged = end;
         let mut texts = [String::new(), String::new(), String::new()];
         for (k, (u, e)) in batch.u.iter().zip(&batch.e).enumerate() {
             texts[0].push_str(&format!("{},{u:?},{e:?}\n", batch.first + k));
@@ -150,13 +157,26 @@ impl RunLog {
         for f in &batch.frames {
             texts[2].push_str(&format!("{:?},{:?},{:?},{:?}\n", f.frame_ms, f.drawn_ms, f.tick, f.e));
         }
-        for ((path, file), text) in self.files.iter_mut().zip(&texts) {
-            append(path, file, text)?;
+        let written = (self.files.iter_mut().zip(&texts)).try_for_each(|((path, file), text)| append(path, file, text));
+        if let Err(error) = written {
+            self.take_back();
+            return Err(error);
         }
+        for (whole, text) in self.whole.iter_mut().zip(&texts) {
+            *whole += text.len() as u64;
+        }
+        self.logged = end;
         if self.synced.elapsed() > SYNC {
             self.sync()?;
         }
         Ok(())
+    }
+
+    /// Cuts the files to the last whole batch. What cannot be cut now is when the session is opened.
+    fn take_back(&self) {
+        for ((_, file), whole) in self.files.iter().zip(self.whole) {
+            let _ = file.set_len(whole);
+        }
     }
 
     /// Ticks that are logged.
@@ -180,4 +200,40 @@ impl RunLog {
 fn append(path: &Path, file: &mut File, text: &str) -> Result<(), LabError> {
     file.write_all(text.as_bytes())
         .map_err(|source| LabError::file(path, source))
+}
+
+#[cfg(all(test, target_os = "linux"))]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    /// The third file is on a disk that takes nothing: the batch is in none of them, and does not count.
+    #[test]
+    fn a_batch_that_a_full_disk_refuses_is_taken_back() {
+        let dir = tempfile::tempdir().unwrap();
+        let stem = Stem::new(dir.path(), "P01", 1, "rate", 1);
+        let mut log = RunLog::create(&stem, 100).unwrap();
+        let batch = |first: usize| Batch {
+            first,
+            u: vec![0.5; 10],
+            e: vec![0.25; 10],
+            events: Vec::new(),
+            frames: vec![Frame::from((1.0, 1.0, 1.0, 0.25))],
+        };
+        log.append(&batch(0)).unwrap();
+        let before = std::fs::read(stem.file("ticks.csv")).unwrap();
+        let frames = std::mem::replace(
+            &mut log.files[2].1,
+            OpenOptions::new().write(true).open("/dev/full").unwrap(),
+        );
+        assert!(log.append(&batch(10)).unwrap_err().to_string().contains("frames.csv"));
+        assert_eq!(log.ticks(), 10);
+        assert_eq!(std::fs::read(stem.file("ticks.csv")).unwrap(), before);
+        // Once there is room it goes on where it was.
+        log.files[2].1 = frames;
+        log.append(&batch(10)).unwrap();
+        assert_eq!(log.ticks(), 20);
+        let text = std::fs::read_to_string(stem.file("ticks.csv")).unwrap();
+        assert_eq!(text.lines().count(), 21);
+    }
 }

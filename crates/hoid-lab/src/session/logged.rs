@@ -19,35 +19,49 @@ pub struct Logged {
     pub events: Vec<Event>,
     /// Frames.
     pub frames: Vec<Frame>,
+    /// What is wrong with the files.
+    pub faults: Vec<String>,
 }
 
 impl Logged {
-    /// Reads it. A last line that is cut, of a server that was ended while it wrote, is left out.
+    /// Reads it, as far as it is whole: to the end of the last line, in the words of a line that is none,
+    /// and nothing of a file that is not there, which says so in `faults`.
     ///
     /// # Errors
-    /// [`LabError::Damaged`] with the line, [`LabError::Io`].
+    /// [`LabError::Io`] for what the system says of a file that is there.
     pub fn read(stem: &Stem) -> Result<Self, LabError> {
         let mut logged = Self::default();
-        rows(&stem.file("ticks.csv"), |[tick, u, e]| {
+        let mut faults = Vec::new();
+        faults.extend(rows(&stem.file("ticks.csv"), |[tick, u, e]| {
             logged.numbers.push(tick);
             logged.signals.u.push(u);
             logged.signals.e.push(e);
-        })?;
-        rows(&stem.file("events.csv"), |[tick, stamp, handled, raw]| {
+        })?);
+        faults.extend(rows(&stem.file("events.csv"), |[tick, stamp, handled, raw]| {
             logged.events.push(Event::from((tick, stamp, handled, raw)));
-        })?;
-        rows(&stem.file("frames.csv"), |[frame, drawn, tick, e]| {
+        })?);
+        faults.extend(rows(&stem.file("frames.csv"), |[frame, drawn, tick, e]| {
             logged.frames.push(Frame::from((frame, drawn, tick, e)));
-        })?;
+        })?);
+        logged.faults = faults;
         Ok(logged)
     }
 }
 
-/// Calls `each` with the numbers of every whole line behind the header.
-fn rows<const N: usize>(path: &Path, mut each: impl FnMut([f64; N])) -> Result<(), LabError> {
-    let text = hoid_io::read_text(path)?;
-    let whole = text.rfind('\n').map_or(0, |end| end + 1);
-    for (k, line) in text[..whole].lines().enumerate().skip(1) {
+/// Calls `each` with the numbers of every whole line behind the header, up to one that is none; what is
+/// wrong with the file, if something is.
+fn rows<const N: usize>(path: &Path, mut each: impl FnMut([f64; N])) -> Result<Option<String>, LabError> {
+    let name = || {
+        path.file_name()
+            .map_or_else(String::new, |name| name.to_string_lossy().into_owned())
+    };
+    if !path.exists() {
+        return Ok(Some(format!("{} is not there", name())));
+    }
+    let bytes = hoid_io::read_bytes(path)?;
+    let whole = bytes.iter().rposition(|byte| *byte == b'\n').map_or(0, |end| end + 1);
+    let text = String::from_utf8_lossy(&bytes[..whole]);
+    for (k, line) in text.lines().enumerate().skip(1) {
         let mut numbers = [0.0; N];
         let mut cells = line.split(',');
         let read = numbers.iter_mut().all(|number| match cells.next().map(str::parse) {
@@ -59,12 +73,11 @@ fn rows<const N: usize>(path: &Path, mut each: impl FnMut([f64; N])) -> Result<(
         });
         if !read || cells.next().is_some() {
             let found = hoid_io::printable(line);
-            return Err(LabError::damaged(
-                path,
-                format!("line {}: {found:?}, expected {N} numbers", k + 1),
-            ));
+            let words = format!("line {} of {} is {found:?}, expected {N} numbers", k + 1, name());
+            return Ok(Some(words));
         }
         each(numbers);
     }
-    Ok(())
+    let cut = whole < bytes.len() || whole == 0;
+    Ok(cut.then(|| format!("{} is cut", name())))
 }

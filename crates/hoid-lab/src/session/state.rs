@@ -3,13 +3,14 @@
 use std::{
     collections::BTreeMap,
     fs::OpenOptions,
+    io::Write as _,
     path::{Path, PathBuf},
 };
 
 use serde::{Deserialize, Serialize};
 
 use super::{
-    begun::{Begun, Ended, How},
+    begun::{APPENDED, Begun, Ended, How},
     folder::{Stem, check_subject, session_folder},
     log::RunLog,
 };
@@ -124,20 +125,23 @@ impl Session {
         Ok(begun)
     }
 
-    /// Opens a session; runs that were interrupted by the end of a server are closed.
+    /// Opens a session; runs that were interrupted by the end of a server, or of which files are missing or
+    /// cut, are closed as unverified.
     ///
     /// # Errors
-    /// [`LabError::Damaged`] for a folder that holds no session.
+    /// [`LabError::Damaged`] for a folder that holds no session; those of files that cannot be written.
     pub fn open(folder: &Path) -> Result<Self, LabError> {
         let mut session = Self::read(folder)?;
         for (number, stem) in Stem::all(folder)? {
             if session.done.iter().any(|done| done.number == number) {
                 continue;
             }
-            if Ended::read(&stem)?.is_none() {
-                session.end(&stem, How::Interrupted, BTreeMap::new())?;
-            } else {
+            if Begun::read(&stem).is_err() {
+                session.lost(number, &stem)?;
+            } else if Ended::read(&stem).is_ok_and(|ended| ended.is_some()) {
                 session.note(&stem, &check(&stem)?)?;
+            } else {
+                session.end(&stem, How::Interrupted, BTreeMap::new())?;
             }
         }
         Ok(session)
@@ -149,9 +153,17 @@ impl Session {
     /// [`LabError::Damaged`].
     pub fn read(folder: &Path) -> Result<Self, LabError> {
         let path = folder.join("lab.toml");
-        let text = hoid_io::read_text(&path)?;
+        let text = hoid_io::read_settings(&path)?;
         let facts: Facts = toml::from_str(&text)
             .map_err(|error| LabError::damaged(&path, format!("{}; expected that of a session", error.message())))?;
+        let conditions = facts.config.condition.len();
+        if let Some(wrong) = facts.plan.iter().find(|run| run.condition >= conditions) {
+            let reason = format!(
+                "the plan names condition {} of {conditions}; it is not as hoid lab wrote it",
+                wrong.condition
+            );
+            return Err(LabError::damaged(&path, reason));
+        }
         Ok(Self {
             done: read_runs(&folder.join("runs.csv"))?,
             folder: folder.to_owned(),
@@ -198,7 +210,7 @@ impl Session {
     /// # Errors
     /// Those of files.
     pub fn end(&mut self, stem: &Stem, how: How, counted: BTreeMap<String, f64>) -> Result<Checked, LabError> {
-        if !stem.file("ticks.csv").exists() {
+        if !APPENDED.iter().any(|end| stem.file(end).exists()) {
             // It was ended before its first tick.
             drop(RunLog::create(stem, 0)?);
         }
@@ -234,16 +246,59 @@ impl Session {
             rms_e: checked.measures.rms_e,
             score: checked.measures.score,
         };
+        self.write_down(done)
+    }
+
+    /// Writes down a run of which nothing but its name is known.
+    fn lost(&mut self, number: usize, stem: &Stem) -> Result<(), LabError> {
+        let condition = stem
+            .text()
+            .split_once("_task-")
+            .and_then(|(_, rest)| rest.rsplit_once("_run-"));
+        self.write_down(Done {
+            number,
+            // A place that no plan has.
+            planned: u32::MAX as usize,
+            condition: condition.map_or_else(String::new, |(name, _)| name.to_owned()),
+            training: false,
+            how: How::Interrupted,
+            utc: utc::now(),
+            verdict: "unverified".to_owned(),
+            reasons: "run.json is cut or not as hoid lab wrote it".to_owned(),
+            notes: String::new(),
+            rms_e: 0.0,
+            score: 0.0,
+        })
+    }
+
+    /// Appends a line, whole or not at all, behind the last whole one.
+    fn write_down(&mut self, done: Done) -> Result<(), LabError> {
         let path = self.folder.join("runs.csv");
-        let unwritable = |error: csv::Error| LabError::damaged(&path, error.to_string());
-        let headed = path.exists();
-        let file = OpenOptions::new().append(true).create(true).open(&path);
-        let file = file.map_err(|source| LabError::file(&path, source))?;
-        let mut writer = csv::WriterBuilder::new().has_headers(!headed).from_writer(&file);
-        writer.serialize(&done).map_err(unwritable)?;
-        writer.flush().map_err(|source| LabError::file(&path, source))?;
-        drop(writer);
-        file.sync_data().map_err(|source| LabError::file(&path, source))?;
+        let whole = if path.exists() {
+            whole_lines(&hoid_io::read_bytes(&path)?)
+        } else {
+            0
+        };
+        let mut writer = csv::WriterBuilder::new()
+            .has_headers(whole == 0)
+            .from_writer(Vec::new());
+        let line = writer
+            .serialize(&done)
+            .map_err(|error| LabError::damaged(&path, error.to_string()));
+        line?;
+        let line = writer
+            .into_inner()
+            .map_err(|error| LabError::damaged(&path, error.to_string()))?;
+        let opened = OpenOptions::new().append(true).create(true).open(&path);
+        let mut file = opened.map_err(|source| LabError::file(&path, source))?;
+        let written = (file.set_len(whole as u64))
+            .and_then(|()| file.write_all(&line))
+            .and_then(|()| file.sync_data());
+        if let Err(source) = written {
+            // What cannot be cut now is when the next line is written.
+            let _ = file.set_len(whole as u64);
+            return Err(LabError::file(&path, source));
+        }
         self.done.push(done);
         Ok(())
     }
@@ -303,13 +358,13 @@ fn read_runs(path: &Path) -> Result<Vec<Done>, LabError> {
     if !path.exists() {
         return Ok(Vec::new());
     }
-    let text = hoid_io::read_text(path)?;
-    // A line that was cut is written again.
-    let whole = text.rfind('\n').map_or(0, |end| end + 1);
-    if whole < text.len() {
-        hoid_io::write_atomically(path, |file| file.write_all(&text.as_bytes()[..whole]))?;
-    }
-    let mut reader = csv::Reader::from_reader(&text.as_bytes()[..whole]);
-    let rows = reader.deserialize().collect::<Result<Vec<Done>, _>>();
-    rows.map_err(|error| LabError::damaged(path, error.to_string()))
+    // A line that is cut or none is left out: its run is judged again when the session is opened.
+    let bytes = hoid_io::read_bytes(path)?;
+    let mut reader = csv::Reader::from_reader(&bytes[..whole_lines(&bytes)]);
+    Ok(reader.deserialize().flatten().collect())
+}
+
+/// Bytes up to the end of the last whole line.
+fn whole_lines(bytes: &[u8]) -> usize {
+    bytes.iter().rposition(|byte| *byte == b'\n').map_or(0, |end| end + 1)
 }

@@ -2,7 +2,7 @@
 
 use std::{
     fmt, io,
-    net::{SocketAddr, UdpSocket},
+    net::{IpAddr, SocketAddr, UdpSocket},
 };
 
 use crate::{args::UdpPlaces, error::CliError};
@@ -40,6 +40,14 @@ impl Udp {
                 places.input
             ))
         })?;
+        let own = |ip: IpAddr| UdpSocket::bind((ip, 0)).is_ok();
+        if places.input.ip().is_unspecified() && places.input.port() == places.output.port() && own(places.output.ip())
+        {
+            return Err(CliError::Stream(format!(
+                "{} is an address of this computer, and answers there would come back as samples; name another port for them",
+                places.output
+            )));
+        }
         Ok(Self {
             socket,
             output: places.output,
