@@ -24,7 +24,7 @@ pub enum AnalysisError {
     },
     /// A file without the columns that were asked for, in which they are found under other names.
     #[error(transparent)]
-    OtherColumns(#[from] OtherColumns),
+    OtherColumns(Box<OtherColumns>),
     /// An offset of a channel that is not there.
     #[error("--offset: there is no channel {name:?}; the record has {known}, and e and u stand for input and output")]
     NoSuchChannel {
@@ -81,7 +81,7 @@ impl AnalysisError {
     /// Why a file is not read, with what to ask for where it has other columns than were asked for.
     pub fn of_reading(error: IoError, path: &Path, options: &ReadOptions) -> Self {
         match other_columns(&error, path, options) {
-            Some(others) => others.into(),
+            Some(others) => Self::OtherColumns(Box::new(others)),
             None => error.into(),
         }
     }
