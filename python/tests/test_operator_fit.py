@@ -167,7 +167,6 @@ def test_what_cannot_be(runs: list[pyhoid.Record], tmp_path: Path) -> None:
         ({"prior": "K=1:1"}, "omega_nm"),
         ({"prior": {"omega_nm": 10.0}}, "centre, spread"),
         ({"prior": {"omega_nm": (-1.0, 0.3)}}, "positive"),
-        ({"prior": tmp_path / "none.json"}, "no such file"),
         ({"individual": ["gain"]}, "expected K, T_L"),
         ({"nd": (3, 99)}, "0..24"),
         ({"run_to_run": -1.0}, "zero or more"),
@@ -175,7 +174,9 @@ def test_what_cannot_be(runs: list[pyhoid.Record], tmp_path: Path) -> None:
         with pytest.raises(pyhoid.OptionError, match=word):
             pyhoid.identify_operator(runs[0], **wrong)
     (tmp_path / "other.json").write_text("[]")
-    with pytest.raises(pyhoid.FormatError, match="hoid identify --json"):
+    with pytest.raises(FileNotFoundError, match="none.json"):
+        pyhoid.identify_operator(runs[0], prior=tmp_path / "none.json")
+    with pytest.raises(pyhoid.OptionError, match="hoid identify --json"):
         pyhoid.identify_operator(runs[0], prior=tmp_path / "other.json")
     with pytest.raises(pyhoid.DataError):
         pyhoid.identify_operator(runs[0].span(0, 0.5))
