@@ -169,7 +169,7 @@ def test_what_cannot_be(runs: list[pyhoid.Record], tmp_path: Path) -> None:
         ({"prior": {"omega_nm": (-1.0, 0.3)}}, "positive"),
         ({"individual": ["gain"]}, "expected K, T_L"),
         ({"nd": (3, 99)}, "0..24"),
-        ({"run_to_run": -1.0}, "zero or more"),
+        ({"run_to_run": -1.0}, "0 or more"),
     ]:
         with pytest.raises(pyhoid.OptionError, match=word):
             pyhoid.identify_operator(runs[0], **wrong)
