@@ -7,7 +7,7 @@
 //! seconds, in which the gains are not known, do not stay.
 //!
 //! Before the data say more the coefficients are supposed to be normal about those of a usual remnant, with the
-//! standard deviation [`WIDE`], which adds `sigma^2/WIDE^2` to the diagonal of the sums, sigma^2 the variance of eps.
+//! standard deviation `WIDE`, which adds `sigma^2/WIDE^2` to the diagonal of the sums, sigma^2 the variance of eps.
 //! It is in units of eps and not of v: the spectrum of a steep remnant, of more than two poles, falls far
 //! below a share of its power, and D has to follow it there.
 //!
