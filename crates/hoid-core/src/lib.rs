@@ -69,6 +69,7 @@
 //! | [`rls`], [`rpem`], [`physical`] | the recursions: least squares, prediction-error method in polynomials and in physical parameters |
 //! | [`multiple_model`] | a bank of hypotheses about when the operator changed |
 //! | [`adaptive`] | gains in a basis that people share, a noise model and a level of its own, a test for changes |
+//! | [`bounds`] | a number within its bounds |
 //! | [`predictor`], [`shape`] | one-step predictor of the general model with its gradient; orders of the model |
 //! | [`adaptation`], [`covariance`], [`window`] | from gradient to step: rules of forgetting; P with a guard against windup; a rectangular window |
 //! | [`ud_covariance`] | the covariance `U D U'` |
@@ -88,6 +89,7 @@ pub mod state;
 
 pub mod adaptation;
 pub mod adaptive;
+pub mod bounds;
 pub mod covariance;
 pub mod delay;
 pub mod divided_differences;

@@ -17,6 +17,7 @@
 
 use crate::{
     adaptation::Adaptation,
+    bounds::within,
     error_bars::{ErrorBars, ErrorPropagation},
     held_operator::{held_operator, held_operator_delayed},
     predictor::{Predictor, Regressor},
@@ -239,17 +240,15 @@ impl<S: Shape, const N: usize, const K: usize, const L: usize, A: Adaptation<N>>
     fn cut_at_bounds(&self, step: &[f64; N], allowed: f64, eta: &mut [f64; N]) -> ([f64; N], bool) {
         let (mut fraction, mut cut) = ([allowed; N], false);
         for i in 0..N {
-            let [low, high] = self.model.bounds[i];
-            // Not by `clamp`, which panics where a restored state has its bounds reversed.
-            let within = eta[i].max(low).min(high);
-            if within != eta[i] {
+            let bounded = within(eta[i], self.model.bounds[i]);
+            if bounded != eta[i] {
                 cut = true;
                 fraction[i] = if step[i] == 0.0 {
                     0.0
                 } else {
-                    (within - self.eta[i]) / step[i]
+                    (bounded - self.eta[i]) / step[i]
                 };
-                eta[i] = within;
+                eta[i] = bounded;
             }
         }
         (fraction, cut)

@@ -15,6 +15,7 @@ use hoid_model::{Orders, Record, SampleTime, Structure};
 
 use crate::{
     forgetting::ForgettingRule,
+    guard::GuardChoice,
     memory::{Memory, MemoryOptions},
     person_prior::PersonPrior,
     recursion::Recursion,
@@ -136,14 +137,15 @@ pub(crate) trait RecursiveMethod: Settings {
         self.gain().and_then(|gain| gain.windup_guard)
     }
 
-    /// True where a guard stands in front of it.
-    fn is_guarded(&self) -> bool {
-        false
+    /// Whether a guard stands in front of it, or that was refused; none where nothing was said and its own default
+    /// is to have none.
+    fn guard(&self) -> Option<GuardChoice> {
+        None
     }
 
-    /// True where the samples were asked for as they come.
-    fn refuses_guard(&self) -> bool {
-        false
+    /// True where a guard stands in front of it.
+    fn is_guarded(&self) -> bool {
+        self.guard() == Some(GuardChoice::Yes)
     }
 
     /// Polynomials that are kept stable.

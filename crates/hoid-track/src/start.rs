@@ -7,7 +7,7 @@
 
 use std::collections::BTreeMap;
 
-use hoid_core::{recursion::Stable, stability::roots_inside};
+use hoid_core::{bounds::within, recursion::Stable, stability::roots_inside};
 use hoid_model::{Record, SampleTime, operator::retrieval_jacobian};
 
 use hoid_ident::{Constraint, Fit, GreyBox, IdentError};
@@ -53,11 +53,6 @@ pub(crate) fn check_sample_time(sample_time: SampleTime) -> Result<(), IdentErro
             ts / 1000.0
         ),
     })
-}
-
-/// The value within its bounds. Without a panic where they are reversed or no numbers, as `clamp` has.
-pub(crate) fn within(value: f64, [low, high]: [f64; 2]) -> f64 {
-    value.max(low).min(high)
 }
 
 /// The start in the coordinates of the recursion.
@@ -213,7 +208,6 @@ pub(crate) fn bounds(setup: &Setup, sample_time: SampleTime) -> Result<Vec<[f64;
             available: names.join(", "),
         });
     }
-    check_sample_time(sample_time)?;
     let usual = |name: &str| match name {
         "omega_nm" => [SLOWEST_OMEGA, FASTEST_SHARE * sample_time.nyquist_rad_s()],
         "zeta_nm" => DAMPING,

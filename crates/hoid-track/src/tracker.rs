@@ -169,7 +169,7 @@ impl Tracker {
         of_guard.or_else(|| self.standing.as_ref()?.event())
     }
 
-    /// True while the estimate stands still, for the guard or for nothing arrives.
+    /// True while the estimate stands still, by the guard or because nothing arrives.
     pub fn is_paused(&self) -> bool {
         let of_guard = self.guard.as_ref().is_some_and(|guard| guard.is_paused());
         of_guard || self.standing.as_ref().is_some_and(|standing| standing.is_paused())
@@ -361,8 +361,7 @@ fn largest_nk(options: &TrackOptions, sample_time: SampleTime) -> usize {
 
 /// The watch of a recursion without a guard, but where that was asked for.
 pub(crate) fn standing_of(options: &TrackOptions, sample_time: SampleTime) -> Option<Box<Standing>> {
-    let method = options.method.inner();
-    if method.is_guarded() || method.refuses_guard() {
+    if options.method.inner().guard().is_some() {
         return None;
     }
     Standing::new(largest_nk(options, sample_time), sample_time).map(Box::new)

@@ -21,6 +21,7 @@
 //! profiles for swapped ones: channels that are alike are never called swapped.
 
 use super::channel::ORDERS;
+use crate::bounds::within;
 
 /// e and u.
 pub const CHANNELS: usize = 2;
@@ -206,11 +207,6 @@ pub struct Profile {
 
 crate::state!([] Profile { usual, blocks, frozen_u, idle, larger, rescaled, swapped, misfits, ratio, ratios, innovation });
 
-/// A number between two bounds; one of them that is no number does not bind.
-fn within(value: f64, least: f64, most: f64) -> f64 {
-    value.max(least).min(most)
-}
-
 impl Default for Profile {
     fn default() -> Self {
         Self::new()
@@ -283,7 +279,7 @@ impl Profile {
         self.blocks = self.blocks.saturating_add(1);
         let weight = if known { WEIGHT } else { 1.0 / f64::from(self.blocks) };
         let toward = |usual: &mut f64, found: f64, least: f64, most: f64| {
-            let bounded = if known { within(found, least, most) } else { found };
+            let bounded = if known { within(found, [least, most]) } else { found };
             *usual += weight * (bounded - *usual);
         };
         // Signals whose squares underflow have no ratio.
@@ -293,14 +289,14 @@ impl Profile {
             self.ratios = self.ratios.saturating_add(1);
             let weight = if known { WEIGHT } else { 1.0 / f64::from(self.ratios) };
             let bounded = if known {
-                within(ratio, 0.5 * self.ratio, 2.0 * self.ratio)
+                within(ratio, [0.5 * self.ratio, 2.0 * self.ratio])
             } else {
                 ratio
             };
             self.ratio += weight * (bounded - self.ratio);
             let size = block.innovation;
             let bounded = if known {
-                within(size, 0.5 * self.innovation, 2.0 * self.innovation)
+                within(size, [0.5 * self.innovation, 2.0 * self.innovation])
             } else {
                 size
             };

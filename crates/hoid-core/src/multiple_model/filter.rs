@@ -11,7 +11,7 @@ use super::{
     response::{Response, Signals},
     signal_ring::{DelayedSignals, SignalRing},
 };
-use crate::recursion::Step;
+use crate::{bounds::within, recursion::Step};
 
 /// Samples between two moves of the linearisation point.
 const RELINEARISE_EVERY: u64 = 64;
@@ -152,7 +152,7 @@ impl<const M: usize, const D: usize, B: AsRef<[Signals]> + AsMut<[Signals]>> Mul
         if self.bank.samples().is_multiple_of(RELINEARISE_EVERY) {
             let [.., omega, zeta] = self.bank.mixture().eta;
             let point = self.response.point();
-            let toward = |to: f64, from: f64| to.max((1.0 - LARGEST_MOVE) * from).min((1.0 + LARGEST_MOVE) * from);
+            let toward = |to: f64, from: f64| within(to, [(1.0 - LARGEST_MOVE) * from, (1.0 + LARGEST_MOVE) * from]);
             let moved = [toward(omega, point[0]), toward(zeta, point[1])];
             self.response
                 .move_to(moved, self.past.iter_mut().chain(self.ring.iter_mut()));

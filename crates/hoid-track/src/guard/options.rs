@@ -41,15 +41,3 @@ settings! {
         pub guard: Option<GuardChoice> = None,
     }
 }
-
-impl GuardOptions {
-    /// Whether there is one, with the method's own default.
-    pub(crate) fn is_on(&self, usual: bool) -> bool {
-        self.guard.map_or(usual, |choice| choice == GuardChoice::Yes)
-    }
-
-    /// Whether it was asked for that samples reach the recursion as they come, even where nothing arrives.
-    pub(crate) fn is_refused(&self) -> bool {
-        self.guard == Some(GuardChoice::No)
-    }
-}

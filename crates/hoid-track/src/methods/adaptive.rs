@@ -31,7 +31,7 @@ use hoid_model::{
 
 use crate::{
     change::Change,
-    guard::GuardOptions,
+    guard::{GuardChoice, GuardOptions},
     memory::Memory,
     method::{About, RecursiveMethod, bad as bad_option, check_delay, check_operator_orders},
     person_prior::PersonPrior,
@@ -142,12 +142,8 @@ impl RecursiveMethod for AdaptiveOptions {
         ))
     }
 
-    fn is_guarded(&self) -> bool {
-        self.guard.is_on(true)
-    }
-
-    fn refuses_guard(&self) -> bool {
-        self.guard.is_refused()
+    fn guard(&self) -> Option<GuardChoice> {
+        self.guard.guard.or(Some(GuardChoice::Yes))
     }
 
     fn limit(&self) -> f64 {

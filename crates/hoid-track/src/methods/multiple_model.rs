@@ -28,7 +28,7 @@ use hoid_ident::{Constraint, IdentError, settings, settings::Bounds};
 
 use crate::{
     change::Change,
-    guard::GuardOptions,
+    guard::{GuardChoice, GuardOptions},
     memory::Memory,
     method::{About, RecursiveMethod, bad as bad_option, check_delay, check_operator_orders},
     recursion::{Recursion, Sample, StepOutcome},
@@ -184,12 +184,8 @@ impl RecursiveMethod for MultipleModelOptions {
         self.smooth
     }
 
-    fn is_guarded(&self) -> bool {
-        self.guard.is_on(true)
-    }
-
-    fn refuses_guard(&self) -> bool {
-        self.guard.is_refused()
+    fn guard(&self) -> Option<GuardChoice> {
+        self.guard.guard.or(Some(GuardChoice::Yes))
     }
 
     fn limit(&self) -> f64 {

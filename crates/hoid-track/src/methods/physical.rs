@@ -9,7 +9,7 @@ use hoid_model::{SampleTime, Structure};
 
 use super::rpem::LIMIT;
 use crate::{
-    guard::GuardOptions,
+    guard::{GuardChoice, GuardOptions},
     kernel::{Kernel, Plan},
     memory::Memory,
     method::{About, RecursiveMethod, check_delay, check_operator_orders},
@@ -81,12 +81,8 @@ impl RecursiveMethod for PhysicalOptions {
         Some(&self.gain)
     }
 
-    fn is_guarded(&self) -> bool {
-        self.guard.is_on(true)
-    }
-
-    fn refuses_guard(&self) -> bool {
-        self.guard.is_refused()
+    fn guard(&self) -> Option<GuardChoice> {
+        self.guard.guard.or(Some(GuardChoice::Yes))
     }
 
     fn limit(&self) -> f64 {

@@ -5,7 +5,7 @@ use hoid_ident::{IdentError, settings};
 use hoid_model::{SampleTime, Structure};
 
 use crate::{
-    guard::GuardOptions,
+    guard::{GuardChoice, GuardOptions},
     kernel::{Kernel, Plan},
     memory::Memory,
     method::{About, RecursiveMethod, bad},
@@ -84,12 +84,8 @@ impl RecursiveMethod for RlsOptions {
         }
     }
 
-    fn is_guarded(&self) -> bool {
-        self.guard.is_on(false)
-    }
-
-    fn refuses_guard(&self) -> bool {
-        self.guard.is_refused()
+    fn guard(&self) -> Option<GuardChoice> {
+        self.guard.guard
     }
 
     /// None, as in the text.

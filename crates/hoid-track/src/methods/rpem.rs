@@ -7,7 +7,7 @@ use hoid_model::{SampleTime, Structure};
 
 use crate::{
     delay_bank::DelayBank,
-    guard::GuardOptions,
+    guard::{GuardChoice, GuardOptions},
     kernel::{Kernel, Plan},
     memory::Memory,
     method::{About, RecursiveMethod, bad},
@@ -98,12 +98,8 @@ impl RecursiveMethod for RpemOptions {
         }
     }
 
-    fn is_guarded(&self) -> bool {
-        self.guard.is_on(false)
-    }
-
-    fn refuses_guard(&self) -> bool {
-        self.guard.is_refused()
+    fn guard(&self) -> Option<GuardChoice> {
+        self.guard.guard
     }
 
     fn limit(&self) -> f64 {

@@ -1,6 +1,7 @@
 //! The filter of state and parameters over samples: start, bounds, restarts.
 
 use hoid_core::{
+    bounds::within,
     delay::DelayLine,
     multiple_model::prior::OPERATOR,
     state::{State, visit_all},
@@ -105,9 +106,9 @@ impl JointFilter {
         }
         for (i, bounds) in self.bounds.into_iter().enumerate() {
             let x = &mut self.belief.x[ETA + i];
-            let within = start::within(*x, bounds);
-            cut |= within != *x;
-            *x = within;
+            let bounded = within(*x, bounds);
+            cut |= bounded != *x;
+            *x = bounded;
             let largest = LARGEST_VARIANCE * self.first.x[ETA + i].powi(2);
             let variance = self.belief.p[ETA + i][ETA + i];
             if variance > largest && largest > 0.0 {
