@@ -33,12 +33,6 @@ pub enum AnalysisError {
         /// What there is.
         known: String,
     },
-    /// A prior that cannot be understood, or says nothing.
-    #[error("--prior: {reason}")]
-    Prior {
-        /// What was found, what was expected, what to do.
-        reason: String,
-    },
     /// Options that contradict each other or the model.
     #[error("{reason}")]
     Options {

@@ -10,9 +10,9 @@ use crate::AnalysisError;
 /// `population`, `none`, `NAME=CENTRE:SPREAD,...`, or another fit: its file, or its JSON.
 ///
 /// # Errors
-/// [`AnalysisError::Prior`], and for a file that cannot be read [`AnalysisError::Io`].
+/// [`AnalysisError::Option`], and for a file that cannot be read [`AnalysisError::Io`].
 pub fn prior_of_text(text: &str) -> Result<OperatorPrior, AnalysisError> {
-    let refuse = |reason: String| AnalysisError::Prior { reason };
+    let refuse = |reason: String| AnalysisError::Option { name: "prior", reason };
     let (found, source) = match text {
         json if json.trim_start().starts_with('{') => (parse_fit(json, "the fit"), "an earlier fit"),
         file if is_fit_file(file) => (read_fit(Path::new(file)), file),

@@ -73,7 +73,6 @@ impl From<AnalysisError> for CliError {
             }
             AnalysisError::SameSamples { .. }
             | AnalysisError::NoSuchChannel { .. }
-            | AnalysisError::Prior { .. }
             | AnalysisError::Options { .. }
             | AnalysisError::NoRecordings => Self::Usage(error.to_string()),
             AnalysisError::Option { name, reason } => Self::Usage(format!("{}: {reason}", typed(name))),

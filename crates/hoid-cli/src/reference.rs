@@ -205,7 +205,7 @@ impl<'a> Keywords<'a> {
             })
             .collect();
         format!(
-            "\n\n#: The options, as the documentation of `{function}` lists them.\n{name} = \"\"\"{}\"\"\"\n",
+            "#: The options, as the documentation of `{function}` lists them.\n{name} = \"\"\"{}\"\"\"\n",
             paragraphs.join("\n").trim_start()
         )
     }
@@ -238,17 +238,14 @@ fn python_settings(methods: &[MethodSpec], batch: &[MethodSpec]) -> String {
          \"MethodSettings\",\n    \"RecursiveMethod\",\n    \"Structure\",\n]\n\n\
          #: A recursive method.\nRecursiveMethod = Literal[\n{}]\n\n\
          #: A polynomial structure.\nStructure = Literal[\n{}]\n{}{}\n\n\
-         #: The methods, as the documentation of `track` lists them.\nMETHODS = \"\"\"{}.\"\"\"{}{}",
+         #: The methods, as the documentation of `track` lists them.\nMETHODS = \"\"\"{}.\"\"\"\n\n{}\n{}",
         one_a_line(&names),
         one_a_line(&structures),
         recursive.typed("MethodSettings", "Options of the recursive methods."),
         batch.typed("BatchSettings", "Options of the batch estimators."),
         methods_text.join("\n").trim_start().trim_end_matches(';'),
-        format!("\n{}", recursive.listed("SETTINGS", "track").trim_start_matches('\n')).replacen("\n#:", "\n\n#:", 1),
-        batch
-            .listed("BATCH_SETTINGS", "identify")
-            .trim_start_matches("\n\n")
-            .replacen("#:", "\n#:", 1),
+        recursive.listed("SETTINGS", "track"),
+        batch.listed("BATCH_SETTINGS", "identify"),
     )
 }
 

@@ -4,30 +4,34 @@
 //! printed settings are made from this list. A new instrumental-variable method is in it by being in
 //! [`IvMethod::ALL`].
 
-use hoid_model::Structure;
+use hoid_model::{Form, Structure};
 
 use crate::{
+    criterion::InitialState,
     estimator::Focus,
     family::FamilyEstimator,
     grey_box::GreyBox,
     iv::IvMethod,
     optimize::{SearchMethod, SearchOptions},
+    order_selection::Criterion,
     settings::{Bounds, Kind, MethodSpec, Setting},
     sigmoid::SigmoidChange,
 };
 
 /// Words for a form.
-const FORMS: &[&str] = &[
-    "auto",
-    "gain",
-    "lead",
-    "lead2",
-    "lag",
-    "lead-lag",
-    "lead2-lag",
-    "quadratic-integral",
-    "lead-droop",
-];
+static FORMS: [&str; Form::NAMES.len() + 1] = or_auto(Form::NAMES);
+/// Words for a rule of initial states.
+static INITIAL_STATES: [&str; InitialState::NAMES.len() + 1] = or_auto(InitialState::NAMES);
+
+/// `auto`, and these names.
+const fn or_auto<const N: usize, const M: usize>(names: [&'static str; N]) -> [&'static str; M] {
+    let (mut all, mut i) = (["auto"; M], 0);
+    while i < N {
+        all[i + 1] = names[i];
+        i += 1;
+    }
+    all
+}
 
 /// The operator of a person.
 pub const OPERATOR: &str = "operator";
@@ -207,8 +211,12 @@ fn controlled_element() -> Setting {
 
 fn criterion() -> Setting {
     let help = "What decides between candidates when something is searched";
-    let words = &["loss", "aic", "aicc", "bic", "fpe", "mdl", "yic"];
-    setting("criterion", Kind::Choice(words), "bic", help)
+    setting(
+        "criterion",
+        Kind::Choice(&Criterion::NAMES),
+        Criterion::Bic.name(),
+        help,
+    )
 }
 
 fn orders(usual: &str) -> Setting {
@@ -246,7 +254,7 @@ fn remnant_order() -> Setting {
 
 fn form() -> Setting {
     let help = "Form of the operator; auto: the simplest that held-out runs do not refute, of one that changes lead";
-    setting("form", Kind::Choice(FORMS), "auto", help)
+    setting("form", Kind::Choice(&FORMS), "auto", help)
 }
 
 fn neuromuscular() -> Setting {
@@ -317,12 +325,7 @@ fn individual() -> Setting {
 
 fn initial_state() -> Setting {
     let help = "Initial states of each record; auto: estimate, and backcast for an output alone (ar, ma, arma)";
-    setting(
-        "initial_state",
-        Kind::Choice(&["auto", "zero", "estimate", "backcast"]),
-        "auto",
-        help,
-    )
+    setting("initial_state", Kind::Choice(&INITIAL_STATES), "auto", help)
 }
 
 fn start() -> Setting {
@@ -357,12 +360,7 @@ fn robust() -> Setting {
 
 fn focus() -> Setting {
     let help = "What the model is to be good at: one-step prediction, or simulation from the input alone";
-    setting(
-        "focus",
-        Kind::Choice(&["prediction", "simulation"]),
-        Focus::default().name(),
-        help,
-    )
+    setting("focus", Kind::Choice(&Focus::NAMES), Focus::default().name(), help)
 }
 
 fn stable() -> Setting {
@@ -373,7 +371,7 @@ fn stable() -> Setting {
 fn search_method() -> Setting {
     setting(
         "search_method",
-        Kind::Choice(&["auto", "gn", "lm", "grad"]),
+        Kind::Choice(&SearchMethod::NAMES),
         SearchMethod::default().name(),
         "How the search steps: gn Gauss-Newton, lm Levenberg-Marquardt, grad steepest descent",
     )
@@ -398,8 +396,7 @@ fn tolerance(usual: SearchOptions) -> Setting {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{criterion::InitialState, order_selection::Criterion};
-    use hoid_model::{Form, NamedChoice};
+    use hoid_model::NamedChoice;
 
     #[test]
     fn every_estimator_says_what_it_is_and_each_option_once() {

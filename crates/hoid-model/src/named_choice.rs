@@ -46,7 +46,7 @@ pub struct UnknownName {
     pub expected: String,
 }
 
-/// Gives an enum without fields the names that users type: `ALL`, `name`,
+/// Gives an enum without fields the names that users type: `ALL`, `NAMES`, `name`,
 /// [`Display`](std::fmt::Display), [`FromStr`](std::str::FromStr) and [`NamedChoice`].
 ///
 /// ```
@@ -68,6 +68,8 @@ macro_rules! named_choice {
         impl $type {
             /// All choices, in the order in which they are listed.
             pub const ALL: [Self; $count] = [$(Self::$variant),+];
+            /// Their names.
+            pub const NAMES: [&'static str; $count] = [$($name),+];
 
             /// The name that users type.
             pub fn name(self) -> &'static str {

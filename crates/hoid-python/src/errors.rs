@@ -137,7 +137,6 @@ impl From<AnalysisError> for Failure {
             }
             AnalysisError::SameSamples { .. } => Self(DataError::new_err(text)),
             AnalysisError::NoSuchChannel { .. }
-            | AnalysisError::Prior { .. }
             | AnalysisError::Options { .. }
             | AnalysisError::Option { .. }
             | AnalysisError::NoRecordings => Self(OptionError::new_err(text)),

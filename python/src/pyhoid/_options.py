@@ -15,8 +15,8 @@ __all__ = [
     "Order",
     "Progress",
     "as_records",
-    "bounds",
     "controlled_element",
+    "guesses",
     "numbers",
     "order",
     "reporter",
@@ -82,20 +82,21 @@ def numbers(name: str, values: Mapping[str, Any]) -> dict[str, float]:
         ) from None
 
 
-def bounds(values: Mapping[str, Any]) -> dict[str, tuple[float, float]]:
-    """Lower and upper bounds by name; None leaves an end open."""
+def guesses(name: str, values: Any) -> str | None:
+    """Pairs of numbers by name, as NAME=VALUE:WEIGHT; None where there are none.
+
+    >>> guesses("coefficient_prior", {"f1": (-1.9, 0.5)})
+    'f1=-1.9:0.5'
+    """
+    if isinstance(values, str):
+        return values
     try:
-        return {
-            str(key): (
-                -math.inf if low is None else float(low),
-                math.inf if high is None else float(high),
-            )
-            for key, (low, high) in values.items()
-        }
-    except (TypeError, ValueError, AttributeError):
+        pairs = [f"{key}={float(v)!r}:{float(weight)!r}" for key, (v, weight) in values.items()]
+    except (AttributeError, TypeError, ValueError):
         raise OptionError(
-            f'bound is {values!r}, expected pairs by name, such as {{"b0": (0, 0.2)}}'
+            f'{name} is {values!r}, expected pairs by name, such as {{"f1": (-1.9, 0.5)}}'
         ) from None
+    return ",".join(pairs) or None
 
 
 def span(name: str, value: Any) -> tuple[float, float] | None:

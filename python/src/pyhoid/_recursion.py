@@ -8,11 +8,12 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping
-from os import PathLike, fspath
+from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
 from . import _options, _pyhoid
+from ._prior import prior_text
 from .errors import FormatError, OptionError
 from .operator_fit import OperatorFit
 
@@ -98,25 +99,12 @@ def _person(prior: Any) -> tuple[str | None, tuple[str, str] | None]:
     >>> _person({"omega_nm": (9, 0.2)})
     ('omega_nm=9.0:0.2', None)
     """
+    text = prior_text(prior)
     if isinstance(prior, OperatorFit):
-        return None, (prior.to_json(), "the fit")
-    if isinstance(prior, Mapping):
-        try:
-            pairs = [f"{name}={float(c)!r}:{float(s)!r}" for name, (c, s) in prior.items()]
-        except (TypeError, ValueError):
-            raise OptionError(
-                f"prior is {prior!r}, expected (centre, spread) by name, "
-                'such as {"omega_nm": (10.5, 0.3)}'
-            ) from None
-        return ",".join(pairs), None
-    if not isinstance(prior, (str, PathLike)):
-        raise OptionError(
-            f'prior is {prior!r}, expected "population", "none", text such as "omega_nm=10.5:0.3", '
-            "(centre, spread) by name, a JSON result, or an OperatorFit"
-        )
-    path = fspath(prior)
-    if isinstance(prior, str) and not path.lower().endswith(".json"):
-        return path, None
+        return None, (text, "the fit")
+    if not isinstance(prior, PathLike) and not text.lower().endswith(".json"):
+        return text, None
+    path = text
     try:
         return None, (Path(path).read_text(encoding="utf-8"), path)
     except OSError as error:

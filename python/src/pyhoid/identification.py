@@ -8,14 +8,13 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping, Sequence
-from os import PathLike, fspath
 from typing import TYPE_CHECKING, Any, Literal, overload
 
 from . import _options, _pyhoid
 from ._options import Order, Progress
 from ._pickling import Call
+from ._prior import prior_text
 from ._settings import BATCH_SETTINGS
-from .errors import OptionError
 from .fit import Fit
 from .operator_fit import OperatorFit
 from .record import Record
@@ -213,7 +212,7 @@ def _texts(settings: Mapping[str, Any]) -> dict[str, str]:
 
 def _text(name: str, kind: str, value: Any) -> str | None:
     if kind == "prior":
-        return _prior(value)
+        return prior_text(value)
     if value is None or (kind == "flag" and not value):
         return None
     if kind == "choice" and isinstance(value, bool):
@@ -228,45 +227,9 @@ def _text(name: str, kind: str, value: Any) -> str | None:
         element = _options.controlled_element(value)
         return element if isinstance(element, str) else "/".join(map(_row, element))
     if kind == "guesses":
-        return _guesses(name, value)
+        return _options.guesses(name, value)
     return _options.text(name, value)
 
 
 def _row(coefficients: Sequence[float]) -> str:
     return ",".join(repr(float(v)) for v in coefficients)
-
-
-def _guesses(name: str, values: Any) -> str | None:
-    """Pairs of numbers by name, as NAME=VALUE:WEIGHT."""
-    if isinstance(values, str):
-        return values
-    try:
-        pairs = [f"{key}={float(v)!r}:{float(weight)!r}" for key, (v, weight) in values.items()]
-    except (AttributeError, TypeError, ValueError):
-        raise OptionError(
-            f'{name} is {values!r}, expected pairs by name, such as {{"f1": (-1.9, 0.5)}}'
-        ) from None
-    return ",".join(pairs) or None
-
-
-def _prior(prior: Any) -> str:
-    """What is known of a person: as text, or the JSON of another fit.
-
-    >>> _prior({"omega_nm": (9, 0.2)})
-    'omega_nm=9.0:0.2'
-    """
-    if prior is None:
-        return "none"
-    if isinstance(prior, OperatorFit):
-        return prior.to_json()
-    if isinstance(prior, (str, PathLike)):
-        return fspath(prior)
-    if isinstance(prior, Mapping):
-        try:
-            return _guesses("prior", prior) or "none"
-        except OptionError:
-            pass
-    raise OptionError(
-        f'prior is {prior!r}, expected "population", "none", text such as "omega_nm=10.5:0.3", '
-        "(centre, spread) by name, a JSON result, or an OperatorFit"
-    )

@@ -353,9 +353,7 @@ impl EstimatorTable {
             let set = asked.set(&setting, &text);
             let known = set.map_err(|error| match error {
                 AnalysisError::Ident(error) => at(&key, in_plan(&error)),
-                AnalysisError::Prior { reason } | AnalysisError::Option { reason, .. } => {
-                    at(&key, format!("is wrong: {reason}"))
-                }
+                AnalysisError::Option { reason, .. } => at(&key, format!("is wrong: {reason}")),
                 other => at(&key, format!("is wrong: {other}")),
             })?;
             if !known {
