@@ -16,7 +16,12 @@ pub fn prior_of_text(text: &str) -> Result<OperatorPrior, AnalysisError> {
     let (found, source) = match text {
         json if json.trim_start().starts_with('{') => (parse_fit(json, "the fit"), "an earlier fit"),
         file if is_fit_file(file) => (read_fit(Path::new(file)), file),
-        _ => return text.parse().map_err(|error: IdentError| refuse(error.to_string())),
+        _ => {
+            return text.parse().map_err(|error: IdentError| match error {
+                IdentError::BadOption { found, expected, .. } => refuse(format!("found {found}; expected {expected}")),
+                other => other.into(),
+            });
+        }
     };
     let found = found.map_err(|error| match error {
         unreadable @ IoError::Unreadable { .. } => unreadable.into(),

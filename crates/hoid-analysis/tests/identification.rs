@@ -237,7 +237,10 @@ fn an_excitation_that_was_named_is_missed() {
 #[test]
 fn a_prior_is_named_or_stands_in_a_file() {
     assert!(prior_of_text("none").unwrap().entries().is_empty());
-    for (text, says) in [("omega_nm", "--prior: "), ("nowhere.json", "nowhere.json")] {
+    for (text, says) in [
+        ("omega_nm", "prior: found omega_nm; expected population, none, "),
+        ("nowhere.json", "nowhere.json"),
+    ] {
         let words = prior_of_text(text).unwrap_err().to_string();
         assert!(words.contains(says), "{words}");
     }

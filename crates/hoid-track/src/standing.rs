@@ -14,9 +14,9 @@
 //!   the value at the beginning of the block; before ten blocks are known, a stand is of one value.
 //! - **Nothing arrives** where e and u stand for [`BOTH_S`], or one of them for [`ONE_S`]: a channel that
 //!   is frozen, or a hand that rests while no answer can be told from none.
-//! - The recursion is then put back to the first sample of the stand, bit for bit (a jump to where it stands is part of it): to the numbers that
-//!   were kept before it, from which it takes the samples again. Value, covariance and innovation
-//!   variance stay as they are there, however long it lasts.
+//! - The recursion is then put back to the first sample of the stand, bit for bit (a jump to where it stands
+//!   is part of it): to the numbers that were kept before it, from which it takes the samples again. Value,
+//!   covariance and innovation variance stay as they are there, however long it lasts.
 //! - It goes on once both signals move and the filters have settled ([`crate::guard`]).
 //!
 //! A recursion that never stands still has the same digits as without. Samples closer than

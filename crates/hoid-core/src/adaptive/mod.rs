@@ -26,7 +26,8 @@
 //!   in each block, weighed by what they predicted, and pruned. Of each there are forms and drifts.
 //! - **Noise** ([`noise`], `volatility`). D is a long autoregression of the residuals, by least squares. The
 //!   innovations of a steep remnant have 1e-7 of the power of u, those of a flat one 1e-2: what is supposed of
-//!   their variance and of D before the data is in the scale of what D leaves, never in that of u. How unevenly the innovations come says how many samples count for one.
+//!   their variance and of D before the data is in the scale of what D leaves, never in that of u. How unevenly
+//!   the innovations come says how many samples count for one.
 //! - **What else predicts as well** (`alternatives`). Other poles and delays that predict u about as well are in
 //!   the errors that are told.
 //! - **The end of the stick** (`saturation`). An output that stands there says that it would be at least so far.

@@ -202,6 +202,11 @@ fn append(path: &Path, file: &mut File, text: &str) -> Result<(), LabError> {
         .map_err(|source| LabError::file(path, source))
 }
 
+/// Bytes up to the end of the last whole line.
+pub(super) fn whole_lines(bytes: &[u8]) -> usize {
+    bytes.iter().rposition(|byte| *byte == b'\n').map_or(0, |end| end + 1)
+}
+
 #[cfg(all(test, target_os = "linux"))]
 mod tests {
     #![allow(clippy::unwrap_used)]

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::{
     folder::Stem,
-    log::{Event, Frame},
+    log::{Event, Frame, whole_lines},
 };
 use crate::{LabError, task::Signals};
 
@@ -59,7 +59,7 @@ fn rows<const N: usize>(path: &Path, mut each: impl FnMut([f64; N])) -> Result<O
         return Ok(Some(format!("{} is not there", name())));
     }
     let bytes = hoid_io::read_bytes(path)?;
-    let whole = bytes.iter().rposition(|byte| *byte == b'\n').map_or(0, |end| end + 1);
+    let whole = whole_lines(&bytes);
     let text = String::from_utf8_lossy(&bytes[..whole]);
     for (k, line) in text.lines().enumerate().skip(1) {
         let mut numbers = [0.0; N];

@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 use super::{
     begun::{APPENDED, Begun, Ended, How},
     folder::{Stem, check_subject, session_folder},
-    log::RunLog,
+    log::{RunLog, whole_lines},
 };
 use crate::{
     LabError,
@@ -282,13 +282,9 @@ impl Session {
         let mut writer = csv::WriterBuilder::new()
             .has_headers(whole == 0)
             .from_writer(Vec::new());
-        let line = writer
-            .serialize(&done)
-            .map_err(|error| LabError::damaged(&path, error.to_string()));
-        line?;
-        let line = writer
-            .into_inner()
-            .map_err(|error| LabError::damaged(&path, error.to_string()))?;
+        let unwritable = |error: String| LabError::damaged(&path, error);
+        writer.serialize(&done).map_err(|error| unwritable(error.to_string()))?;
+        let line = writer.into_inner().map_err(|error| unwritable(error.to_string()))?;
         let opened = OpenOptions::new().append(true).create(true).open(&path);
         let mut file = opened.map_err(|source| LabError::file(&path, source))?;
         let written = (file.set_len(whole as u64))
@@ -362,9 +358,4 @@ fn read_runs(path: &Path) -> Result<Vec<Done>, LabError> {
     let bytes = hoid_io::read_bytes(path)?;
     let mut reader = csv::Reader::from_reader(&bytes[..whole_lines(&bytes)]);
     Ok(reader.deserialize().flatten().collect())
-}
-
-/// Bytes up to the end of the last whole line.
-fn whole_lines(bytes: &[u8]) -> usize {
-    bytes.iter().rposition(|byte| *byte == b'\n').map_or(0, |end| end + 1)
 }
