@@ -368,15 +368,15 @@ def test_a_person_is_tracked_from_an_earlier_fit(c1: pyhoid.Record, tmp_path: Pa
 
 
 def test_units_of_gains_are_those_of_the_record(c1: pyhoid.Record) -> None:
-    assert pyhoid.estimates.unit_of("K_e_dot", [c1]) == "s"
+    assert pyhoid.estimates.unit_of("K_e_dot", pyhoid.estimates.channel_units([c1])) == "s"
     bare = pyhoid.Record(e=c1.e, u=c1.u, sample_time=c1.sample_time)
     fit = pyhoid.identify(bare, nk=29, nd=1)
     assert "deg/deg" not in fit.summary() and fit.to_pandas().loc["K_e", "unit"] == ""
     mixed = pyhoid.Record(e=c1.e, u=c1.u, sample_time=c1.sample_time, units={"e": "mm", "u": "N"})
-    assert pyhoid.estimates.unit_of("K_e", [mixed]) == "N/mm"
-    assert pyhoid.estimates.unit_of("K_e_dot", [mixed]) == "N s/mm"
-    assert pyhoid.estimates.unit_of("K_over_T_I", [mixed], "1/s") == "N/(mm s)"
-    assert pyhoid.estimates.unit_of("c_2", [bare], "s^2") == "s^2"
+    assert pyhoid.estimates.unit_of("K_e", pyhoid.estimates.channel_units([mixed])) == "N/mm"
+    assert pyhoid.estimates.unit_of("K_e_dot", pyhoid.estimates.channel_units([mixed])) == "N s/mm"
+    assert pyhoid.estimates.unit_of("K_over_T_I", pyhoid.estimates.channel_units([mixed]), "1/s") == "N/(mm s)"
+    assert pyhoid.estimates.unit_of("c_2", pyhoid.estimates.channel_units([bare]), "s^2") == "s^2"
     for record, unit in ((bare, ""), (mixed, "N/mm")):
         person = pyhoid.identify_operator(record, form="lead", excitation="none")
         assert person.parameters.K_e.unit == unit and person.parameters.tau_e.unit == "s"
@@ -386,7 +386,7 @@ def test_units_of_columns_with_other_names(tmp_path: Path, c1: pyhoid.Record) ->
     rows = "\n".join(f"{k / 100},{e},{u}" for k, (e, u) in enumerate(zip(c1.e, c1.u)))
     (tmp_path / "own.csv").write_text(f"# units: error mm, stick N\nt,error,stick\n{rows}\n")
     own = pyhoid.read(tmp_path / "own.csv", input="error", output="stick")
-    assert pyhoid.estimates.unit_of("K_e", [own]) == "N/mm"
+    assert pyhoid.estimates.unit_of("K_e", pyhoid.estimates.channel_units([own])) == "N/mm"
 
 
 def test_a_description_with_its_verdict(c1: pyhoid.Record) -> None:

@@ -190,7 +190,7 @@ def answer(result: Any) -> dict[str, Any]:
     found: dict[str, Any] = {"type": type(result).__name__}
     if hasattr(result, "to_json"):
         of_json = json.loads(result.to_json())
-        found["json"] = plain({name: of_json[name] for name in of_json if name != "hoid"})
+        found["json"] = plain({name: of_json[name] for name in of_json if name not in ("hoid", "state")})
     for name in KEPT:
         value = getattr(result, name, None)
         if value is not None and not inspect.ismethod(value):

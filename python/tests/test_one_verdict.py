@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from contextlib import nullcontext
 from collections.abc import Callable
+import json
 from pathlib import Path
 from typing import Any
 
@@ -123,6 +124,28 @@ def test_so_it_is_by_every_estimator(
         assert "stands at an end of its range" in fit.verdict.reasons[0]
 
 
+@pytest.mark.parametrize("how", ["as recorded", "clipped", "spikes"])
+def test_a_description_is_that_of_the_program(
+    how: str, runs: list[pyhoid.Record], tmp_path: Path, cli: Any
+) -> None:
+    path = tmp_path / "run.csv"
+    spoilt_run = spoilt(runs[0], how)
+    run = pyhoid.Record(
+        e=spoilt_run.e, u=spoilt_run.u, f_t=runs[0]["f_t"], sample_time=spoilt_run.sample_time
+    )
+    pyhoid.write(path, run)
+    printed = cli.json("describe", path, "--excitation", "f_t")
+    found = pyhoid.describe(pyhoid.read(path), excitation="f_t")
+    written = json.loads(found.to_json())
+    assert written["kind"] == printed["kind"] == "description"
+    assert written["lines"] == printed["lines"]
+    for key in ("level", "reasons", "notes"):
+        assert written["verdict"][key] == printed["verdict"][key]
+    assert (found.verdict, found.reasons) == (printed["verdict"]["level"], printed["verdict"]["reasons"])
+    if how == "spikes":
+        assert found.faults, "they were looked for and bridged"
+
+
 def test_a_trace_hears_of_its_channels(
     runs: list[pyhoid.Record], tmp_path: Path, cli: Any
 ) -> None:
@@ -167,7 +190,7 @@ def test_what_is_fitted_is_told_from_the_options(runs: list[pyhoid.Record]) -> N
         assert isinstance(person, pyhoid.OperatorFit) and person.form == "lead"
     with pytest.warns(DeprecationWarning, match="noise remnant"):
         remnant = pyhoid.identify(record, remnant_order=1)
-    assert isinstance(remnant, pyhoid.Fit) and remnant.structure == "grey-box"
+    assert isinstance(remnant, pyhoid.Fit) and remnant.structure == "operator"
     with pytest.raises(pyhoid.OptionError, match="nk belongs to"):
         pyhoid.identify(record, "operator", nk=29)
     with pytest.raises(pyhoid.OptionError, match="excitation belongs to"):

@@ -39,6 +39,14 @@ pub enum AnalysisError {
         /// What was found, what was expected, what to do.
         reason: String,
     },
+    /// A text that is no result.
+    #[error(
+        "this is no result of a fit: {found}; expected what to_json of this version wrote, or identify --json printed"
+    )]
+    NotAResult {
+        /// What was found.
+        found: String,
+    },
     /// An option that does not fit the estimator, or has no such value.
     #[error("{name}: {reason}")]
     Option {

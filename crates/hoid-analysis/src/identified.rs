@@ -3,14 +3,16 @@
 use std::fmt;
 
 use hoid_ident::{Fit, family::FamilyFit, frequency::Description, validation::GoodnessOfFit};
-use hoid_model::{Decimation, Detrend, Record, Verdict, uncertainty::Estimate};
+use hoid_model::{ContinuousTransferFunction, Decimation, Detrend, Record, Verdict, uncertainty::Estimate};
+use serde_json::{Map, Value};
 
 use crate::{
     AnalysisError,
     estimators::{BatchEstimator, Fitted},
     identification::Identification,
+    reading::Reading,
     recordings::Recordings,
-    settings::{Setting, shared_settings},
+    settings::Setting,
 };
 
 /// What was identified.
@@ -27,9 +29,15 @@ pub struct Identified<F = FamilyFit> {
     pub described: Option<Description>,
     /// The settings that were used.
     pub settings: Vec<Setting>,
-    rate: Decimation,
-    counts_samples: bool,
-    taken_out: Detrend,
+    /// What the person controls, where it is known.
+    pub controlled_element: Option<ContinuousTransferFunction>,
+    /// The channel of the excitation, where there is one.
+    pub excitation: Option<String>,
+    pub(crate) rate: Decimation,
+    pub(crate) counts_samples: bool,
+    pub(crate) taken_out: Detrend,
+    /// The object that it was read from, where it was.
+    pub(crate) written: Option<Map<String, Value>>,
 }
 
 /// How well a model tells a recording that it was not fitted to.
@@ -65,29 +73,68 @@ impl<E: BatchEstimator> Identification<E> {
             verdict,
             described,
             taken_out,
-            mut settings,
+            used,
+            found,
         } = E::fit(self, &mut data)?;
         let verdict = data.judged(verdict);
         E::judged(&mut fit, &verdict);
-        settings.extend(shared_settings(
-            &data,
-            self.estimator.initial_state(),
-            self.rate,
-            self.faults,
-            self.estimator.search(),
-            self.controlled_element.as_ref(),
-        ));
+        let reading = data.source.as_ref().map(|source| &source.reading);
+        let by_default = Identification::of(self.estimator.by_default());
+        let usual_reading = reading.map(|_| Reading::default());
+        let mut usual = by_default.estimator.settings(data.records[0].sample_time());
+        usual.extend(shared_settings(&by_default, usual_reading.as_ref()));
+        let mut settings = Setting::against(used, &usual);
+        settings.extend(found);
+        settings.extend(Setting::against(shared_settings(self, reading), &usual));
         Ok(Identified {
             fit,
             verdict,
             data,
+            controlled_element: self.controlled_element.clone(),
+            excitation: described.as_ref().and_then(|described| described.channel.clone()),
             described,
             settings,
             rate: self.rate,
             counts_samples,
             taken_out,
+            written: None,
         })
     }
+}
+
+impl Identified {
+    /// VAF and NRMSE over the recordings, each by its own operator.
+    ///
+    /// # Errors
+    /// Those of a prediction.
+    pub fn quality(&self) -> Result<GoodnessOfFit, AnalysisError> {
+        let each = self.data.records.iter().enumerate();
+        let validations = each.map(|(k, record)| self.fit.operator(k).polynomial_fit.validate(record));
+        let validations = validations.collect::<Result<Vec<_>, _>>()?;
+        Ok(GoodnessOfFit::pooled(self.data.records.iter().zip(&validations)))
+    }
+}
+
+/// The settings that every kind of fit shares, defaults included.
+fn shared_settings<E: BatchEstimator>(how: &Identification<E>, reading: Option<&Reading>) -> Vec<Setting> {
+    let (decimation, search) = (how.rate, how.estimator.search());
+    let mut list = vec![Setting::new("initial state", how.estimator.initial_state())];
+    match reading {
+        Some(reading) => list.extend(reading.settings(decimation)),
+        None => list.push(Setting::new("decimate", decimation.to_string())),
+    }
+    list.push(Setting::new("faults", how.faults.to_string()));
+    list.extend(reading.and_then(Reading::masked));
+    list.extend([
+        Setting::new(
+            "search",
+            format!("{}, relative tolerance {:e}", search.method, search.tolerance),
+        ),
+        Setting::new("largest number of steps", search.max_iterations.to_string()),
+    ]);
+    let element = how.controlled_element.as_ref();
+    list.extend(element.map(|element| Setting::new("controlled element", element.to_string())));
+    list
 }
 
 impl fmt::Display for Identified {

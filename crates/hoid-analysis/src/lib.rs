@@ -19,6 +19,7 @@
 //! | the describing function, where the excitation is recorded | `description`, `offset` |
 //! | the fit, a second opinion, the loop, the settings of the estimator | `estimators`: a file each |
 //! | what the recordings say | `identified`, `recordings` |
+//! | a describing function, from recordings to its verdict | `describing` |
 //! | the level of u, the settings that all share | `level`, `settings` |
 //!
 //! Options come as fields, or by their names from texts: `options`.
@@ -37,12 +38,14 @@
 //! ```
 
 mod copies;
+mod describing;
 mod description;
 mod error;
 mod estimators;
 mod files;
 mod identification;
 mod identified;
+pub mod json;
 mod level;
 mod look;
 mod offset;
@@ -56,6 +59,7 @@ mod repair;
 mod request;
 mod settings;
 
+pub use describing::{Described, Describing};
 pub use description::Excitation;
 pub use error::AnalysisError;
 pub use estimators::{BatchEstimator, Fitted, PolynomialFit, Polynomials};

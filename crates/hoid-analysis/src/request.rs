@@ -19,7 +19,7 @@ use hoid_model::{Decimation, FaultHandling, Structure};
 
 use crate::{
     AnalysisError,
-    estimators::{BatchEstimator, Polynomials},
+    estimators::{BatchEstimator, Polynomials, REMNANT_ORDERS},
     identification::Identification,
     options::Options,
 };
@@ -75,7 +75,7 @@ impl Asked {
         };
         Some(match name {
             OPERATOR => Self::Operator(Identification::of(FamilyEstimator::default())),
-            REMNANT => Self::Remnant(Identification::of(GreyBox::new(1..=4))),
+            REMNANT => Self::Remnant(Identification::of(GreyBox::new(REMNANT_ORDERS))),
             CHANGE => Self::Change(Identification::of(SigmoidChange::default())),
             PEM => polynomials(structure, None),
             name => {

@@ -1,33 +1,61 @@
 //! The settings that were used, as they are printed: the values that the numerics received.
 
-use hoid_ident::SearchOptions;
 use hoid_io::QualityIssueKind;
-use hoid_model::{ContinuousTransferFunction, Decimation, FaultHandling};
+use hoid_model::Decimation;
+use serde::{Deserialize, Serialize};
 
-use crate::{reading::Reading, recordings::Recordings};
+use crate::reading::Reading;
 
 /// A setting and its value in words.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Setting {
     /// What it is called.
     pub name: String,
     /// The value that was used.
     pub value: String,
+    /// True where it is another than the default, so that somebody gave it.
+    pub given: bool,
 }
 
 impl Setting {
-    /// A setting.
+    /// A setting by default.
     pub fn new(name: impl Into<String>, value: impl Into<String>) -> Self {
         Self {
             name: name.into(),
             value: value.into(),
+            given: false,
         }
+    }
+
+    /// The same as it was given, or not.
+    #[must_use]
+    pub fn given(self, given: bool) -> Self {
+        Self { given, ..self }
+    }
+
+    /// Settings, given where they say so or are not among those by default.
+    pub fn against(all: Vec<Self>, by_default: &[Self]) -> Vec<Self> {
+        let is_default = |one: &Self| {
+            by_default
+                .iter()
+                .any(|usual| (&usual.name, &usual.value) == (&one.name, &one.value))
+        };
+        all.into_iter()
+            .map(|one| {
+                let given = one.given || !is_default(&one);
+                one.given(given)
+            })
+            .collect()
     }
 }
 
 impl Reading {
     /// How records are read, defaults included.
     pub fn settings(&self, decimation: Decimation) -> Vec<Setting> {
+        Setting::against(self.rows(decimation), &Self::default().rows(Decimation::default()))
+    }
+
+    fn rows(&self, decimation: Decimation) -> Vec<Setting> {
         let options = &self.options;
         let or_all = |bound: Option<f64>, all: &str| bound.map_or(all.to_owned(), |v| v.to_string());
         let sampling = options
@@ -62,7 +90,7 @@ impl Reading {
     }
 
     /// What was left out.
-    fn masked(&self) -> Option<Setting> {
+    pub(crate) fn masked(&self) -> Option<Setting> {
         let kinds: Vec<&str> = self.mask.iter().map(|kind: &QualityIssueKind| kind.name()).collect();
         (!kinds.is_empty()).then(|| {
             Setting::new(
@@ -71,32 +99,4 @@ impl Reading {
             )
         })
     }
-}
-
-/// The settings that every kind of fit shares, defaults included.
-pub(crate) fn shared_settings(
-    recordings: &Recordings,
-    initial_state: &str,
-    decimation: Decimation,
-    handling: FaultHandling,
-    search: &SearchOptions,
-    element: Option<&ContinuousTransferFunction>,
-) -> Vec<Setting> {
-    let mut list = vec![Setting::new("initial state", initial_state)];
-    let reading = recordings.source.as_ref().map(|source| &source.reading);
-    match reading {
-        Some(reading) => list.extend(reading.settings(decimation)),
-        None => list.push(Setting::new("decimate", decimation.to_string())),
-    }
-    list.push(Setting::new("faults", handling.to_string()));
-    list.extend(reading.and_then(Reading::masked));
-    list.extend([
-        Setting::new(
-            "search",
-            format!("{}, relative tolerance {:e}", search.method, search.tolerance),
-        ),
-        Setting::new("largest number of steps", search.max_iterations.to_string()),
-    ]);
-    list.extend(element.map(|element| Setting::new("controlled element", element.to_string())));
-    list
 }

@@ -74,6 +74,7 @@ impl From<AnalysisError> for CliError {
             AnalysisError::SameSamples { .. }
             | AnalysisError::NoSuchChannel { .. }
             | AnalysisError::Options { .. }
+            | AnalysisError::NotAResult { .. }
             | AnalysisError::NoRecordings => Self::Usage(error.to_string()),
             AnalysisError::Option { name, reason } => Self::Usage(format!("{}: {reason}", typed(name))),
             AnalysisError::Misplaced { name, of, instead } => {

@@ -1,43 +1,14 @@
-//! An operator of the family that polynomials stand for, shown to people and to programs.
+//! An operator of the family that polynomials stand for, shown to people.
 
 use hoid::ident::family::{FamilyConversion, PoleRole};
 use hoid::model::{GainUnit, NotConvertible};
-use serde_json::{Map, Value, json};
 
-use crate::{json, text};
+use crate::text;
 
 /// A conversion, or why there is none.
 pub type Converted = Result<FamilyConversion, NotConvertible>;
 
-/// As the operator of a fit: form, parameters by name, what the real poles are, how well it is met.
-pub fn to_json(found: &Converted) -> Value {
-    match found {
-        Ok(found) => {
-            let mut map = Map::new();
-            map.insert("convertible".to_owned(), json!(true));
-            map.insert("form".to_owned(), json!(found.operator.form().name()));
-            for (name, unit, e) in found.parameters() {
-                let mut value = json::estimate(&e);
-                if let Some(fields) = value.as_object_mut() {
-                    fields.insert("unit".to_owned(), json!(unit));
-                }
-                map.insert(name.to_owned(), value);
-            }
-            let poles = found.real_poles.iter();
-            map.insert(
-                "real_poles".to_owned(),
-                poles
-                    .map(|p| json!({"rate_rad_s": json::number(p.rate), "role": role(p.role)}))
-                    .collect(),
-            );
-            map.insert("mismatch".to_owned(), json::number(found.mismatch));
-            Value::Object(map)
-        }
-        Err(reason) => json!({"convertible": false, "reason": reason.to_string()}),
-    }
-}
-
-/// The same as a table and sentences.
+/// As a table and sentences.
 pub fn to_text(found: &Converted, gain: &GainUnit) -> String {
     let found = match found {
         Ok(found) => found,
@@ -63,11 +34,4 @@ pub fn to_text(found: &Converted, gain: &GainUnit) -> String {
         )
     });
     page
-}
-
-fn role(role: PoleRole) -> &'static str {
-    match role {
-        PoleRole::Lag => "lag",
-        PoleRole::Neuromuscular => "neuromuscular",
-    }
 }

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use hoid::analysis::Setting;
 use hoid::ident::{
     Choice, IdentError, OrderRanges,
     settings::{DelayRange, named_pairs},
@@ -25,6 +26,29 @@ pub struct Plan {
     plan: TrackPlan,
     delay: Option<DelayRange>,
     sample_time: SampleTime,
+    /// What was typed of that which has a default.
+    typed: Typed,
+}
+
+/// Whether it was typed.
+struct Typed {
+    method: bool,
+    structure: bool,
+    orders: bool,
+    memory: bool,
+    largest: bool,
+}
+
+impl Typed {
+    fn of(args: &RecursionArgs) -> Self {
+        Self {
+            method: args.method != Method::default().name(),
+            structure: args.structure.is_some(),
+            orders: args.orders.is_some() || args.nk.is_some() || args.delay.is_some(),
+            memory: args.settings.given().any(|(name, _)| name.starts_with("memory")),
+            largest: args.largest != TrackOptions::LARGEST,
+        }
+    }
 }
 
 /// The structure as typed, or that of the method.
@@ -130,6 +154,7 @@ impl Plan {
             plan,
             delay: DelayRange::given(args.nk.as_ref(), args.delay),
             sample_time,
+            typed: Typed::of(args),
         })
     }
 
@@ -159,9 +184,8 @@ impl Plan {
     }
 
     /// Every option that shapes the result, defaults included, with units.
-    pub fn settings(&self, options: &TrackOptions, choice: Option<&Choice>) -> Vec<(String, String)> {
-        let ts = self.sample_time;
-        let setting = |name: &str, text: String| (name.to_owned(), text);
+    pub fn settings(&self, options: &TrackOptions, choice: Option<&Choice>) -> Vec<Setting> {
+        let (ts, typed) = (self.sample_time, &self.typed);
         let mut orders = options.orders.to_string();
         if let Some(choice) = choice {
             orders.push_str(&format!(
@@ -171,38 +195,36 @@ impl Plan {
             ));
         }
         let mut list = vec![
-            setting("method", options.method.name().to_owned()),
-            setting("structure", options.structure.name().to_owned()),
-            setting("orders", orders),
+            Setting::new("method", options.method.name()).given(typed.method),
+            Setting::new("structure", options.structure.name()).given(typed.structure),
+            Setting::new("orders", orders).given(typed.orders),
         ];
         if let Some(delay @ DelayRange::Seconds(..)) = &self.delay {
-            list.push(setting("delay", delay.to_string()));
+            list.push(Setting::new("delay", delay.to_string()).given(true));
         }
-        list.push(setting("memory", options.memory_in_words(ts)));
+        list.push(Setting::new("memory", options.memory_in_words(ts)).given(typed.memory));
         for own in options.method.settings().list() {
-            // What was given; the memory stands above with the defaults of all parameters.
-            let given = options.method.settings().get(own.name);
-            if let Some(text) = given.filter(|text| *text != own.default) {
-                list.push(setting(&own.name.replace('_', " "), text));
+            // The memory stands above with the defaults of all parameters.
+            if let Some(text) = options.method.settings().get(own.name).filter(|text| !text.is_empty()) {
+                let given = text != own.default;
+                list.push(Setting::new(own.name.replace('_', " "), text).given(given));
             }
         }
         if options.method.limit().is_finite() {
-            list.push(setting(
+            list.push(Setting::new(
                 "limit of innovations",
                 format!("{} standard deviations", options.method.limit()),
             ));
         }
         if !options.at_rad_s.is_empty() {
             let each: Vec<String> = options.at_rad_s.iter().map(f64::to_string).collect();
-            list.push(setting("response at", format!("{} rad/s", each.join(", "))));
+            list.push(Setting::new("response at", format!("{} rad/s", each.join(", "))).given(true));
         }
         if let Some(element) = &options.controlled_element {
-            list.push(setting("controlled element", element.to_string()));
+            list.push(Setting::new("controlled element", element.to_string()).given(true));
         }
-        list.push(setting(
-            "fault",
-            format!("not a finite number, or beyond {}", options.largest),
-        ));
+        let fault = format!("not a finite number, or beyond {}", options.largest);
+        list.push(Setting::new("fault", fault).given(typed.largest));
         list
     }
 }

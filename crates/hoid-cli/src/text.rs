@@ -1,6 +1,6 @@
 //! Results as tables for people.
 
-use hoid::analysis::Account;
+use hoid::analysis::{Account, Setting};
 use hoid::ident::{
     Choice, Fit, GreyBoxFit, MarginEstimates,
     order_selection::Criterion,
@@ -101,9 +101,17 @@ pub fn levels(files: &[String], accounts: &[Account]) -> String {
 }
 
 /// Every option that shaped the result.
-pub fn settings(settings: &[(String, String)]) -> String {
-    let list: Vec<String> = settings.iter().map(|(k, v)| format!("{k}: {v}")).collect();
-    format!("\nSettings: {}.\n", list.join("; "))
+pub fn settings(settings: &[Setting]) -> String {
+    let of = |given: bool| {
+        let list = settings.iter().filter(|one| one.given == given);
+        let list: Vec<String> = list.map(|one| format!("{}: {}", one.name, one.value)).collect();
+        if list.is_empty() {
+            "none".to_owned()
+        } else {
+            list.join("; ")
+        }
+    };
+    format!("\nSettings given: {}.\nBy default: {}.\n", of(true), of(false))
 }
 
 /// Orders m of the remnant that a grey box tried; nothing when it was one.

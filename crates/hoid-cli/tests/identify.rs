@@ -8,7 +8,7 @@ use std::fs;
 use serde_json::Value;
 use tempfile::TempDir;
 
-use common::{bad, good, hoid, json, simulated, wave, write};
+use common::{bad, good, hoid, json, setting, simulated, wave, write};
 
 #[test]
 fn identify_prints_the_json_of_the_contract() {
@@ -225,7 +225,10 @@ fn a_grey_box_gives_the_delay_an_error_bar_and_reports() {
             "--json",
         ],
     );
-    assert_eq!(found["structure"], "grey-box");
+    assert_eq!(
+        (&found["kind"], &found["structure"]),
+        (&"operator".into(), &"operator".into())
+    );
     assert_eq!(found["candidates"].as_array().unwrap().len(), 2);
     let delay = &found["operator"]["tau_e"];
     let off = delay["value"].as_f64().unwrap() - 0.28;
@@ -302,7 +305,7 @@ fn a_change_of_another_form_is_found() {
         (&"lead-lag".into(), &true.into())
     );
     assert_eq!(
-        found["settings"]["prior"],
+        setting(&found, "prior"),
         "omega_nm=10.5:0.3,zeta_nm=0.3:0.5,tau_e=0.2:0.7"
     );
     for (end, name, truth) in [

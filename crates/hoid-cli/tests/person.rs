@@ -59,7 +59,7 @@ fn a_person_is_found_by_default() {
     let found = json(at, &[&arguments[..], &["--json"]].concat());
     assert_eq!(
         (&found["structure"], &found["form"]),
-        (&Value::from("grey-box"), &Value::from("lead-lag"))
+        (&Value::from("operator"), &Value::from("lead-lag"))
     );
     let truth = std::fs::read_to_string(at.join("people/truth.csv")).unwrap();
     let mut rows = truth.lines();

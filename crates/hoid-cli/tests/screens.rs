@@ -57,9 +57,18 @@ fn the_answer_comes_first_and_fits_on_a_screen() {
     ] {
         assert!(page.contains(part), "{part}: {page}");
     }
-    assert!(!page.contains("Settings:") && !page.contains("Ljung-Box"), "{page}");
+    assert!(
+        !page.contains("Settings given:") && !page.contains("Ljung-Box"),
+        "{page}"
+    );
     let all = good(d, &[&FIT[..], &["-v"]].concat());
-    for part in ["Settings: ", "Ljung-Box", "noise pole (D)", "coefficient"] {
+    for part in [
+        "Settings given: ",
+        "By default: ",
+        "Ljung-Box",
+        "noise pole (D)",
+        "coefficient",
+    ] {
         assert!(all.contains(part), "{part}: {all}");
     }
     // The answer is the same.

@@ -8,7 +8,7 @@ use std::{fs, path::Path};
 use serde_json::Value;
 use tempfile::TempDir;
 
-use common::{bad, good, hoid, json, physical};
+use common::{bad, good, hoid, json, physical, setting};
 
 const KNOWN_ORDERS: [&str; 4] = ["--nk", "29", "--orders", "nd=1"];
 
@@ -286,8 +286,8 @@ fn the_default_needs_nothing_and_tells_the_loop() {
     let found = json(d, &arguments);
     assert_eq!(found["method"], "adaptive");
     assert!(found["start"].is_null());
-    assert_eq!(found["settings"]["start"], "what is usual of people");
-    assert_eq!(found["settings"]["response at"], "1, 2.5 rad/s");
+    assert_eq!(setting(&found, "start"), "what is usual of people");
+    assert_eq!(setting(&found, "response at"), "1, 2.5 rad/s");
     let trace = trace(d);
     // The first second gives the scale of the gains; then there are bands, which become narrower.
     let errors = column(&trace, "gain_db@2.5_se");
@@ -368,9 +368,9 @@ fn a_person_is_followed_from_an_earlier_fit_of_them() {
         "fit.json",
     ];
     let found = json(d, &with);
-    let start = found["settings"]["start"].as_str().unwrap();
+    let start = setting(&found, "start");
     assert!(start.contains("fit.json") && start.contains("form lead"), "{start}");
-    assert_eq!(found["settings"]["prior"], "fit.json");
+    assert_eq!(setting(&found, "prior"), "fit.json");
     let known = trace(d);
     json(d, &["track", "c.csv", "--out", "trace.csv", "--json", "--at", "2.5"]);
     let usual = trace(d);
@@ -643,7 +643,7 @@ fn a_second_run_chooses_the_start_covariance() {
     let best = candidates.iter().max_by(|a, b| vaf(a).total_cmp(&vaf(b))).unwrap();
     assert_eq!((candidates.len(), &best["covariance"]), (9, &choice["covariance"]));
     assert!((0.0..=100.0).contains(&vaf(best)) && vaf(best) > 80.0, "{choice}");
-    let said: f64 = found["settings"]["covariance"].as_str().unwrap().parse().unwrap();
+    let said: f64 = setting(&found, "covariance").parse().unwrap();
     assert_eq!(Some(said), choice["covariance"].as_f64());
     let page = good(d, &arguments);
     assert!(
@@ -655,12 +655,7 @@ fn a_second_run_chooses_the_start_covariance() {
     // In course instead, whatever P is at the start.
     let updated = json(d, &with(&["--json", "--update-covariance", "--covariance", "0.1"]));
     assert!(updated["covariance_choice"].is_null());
-    assert!(
-        updated["settings"]["covariance updated"]
-            .as_str()
-            .unwrap()
-            .contains("second.csv")
-    );
+    assert!(setting(&updated, "covariance updated").contains("second.csv"));
     let (status, says) = bad(
         d,
         &[
@@ -703,11 +698,11 @@ fn a_delay_is_followed_by_rpem_and_the_windup_guard_is_told() {
         arguments.extend(more);
         json(d, &arguments)
     };
-    let memory = |found: &Value| found["settings"]["memory"].as_str().unwrap().to_owned();
+    let memory = |found: &Value| setting(found, "memory");
     assert!(memory(&of(&[])).contains("without a guard against windup"));
     let guarded = of(&["--windup-guard", "1e4"]);
     assert!(!memory(&guarded).contains("without"));
-    assert_eq!(guarded["settings"]["windup guard"], "1e4");
+    assert_eq!(setting(&guarded, "windup guard"), "1e4");
     let followed = of(&["--track-delay", "0.2..0.4"]);
     let tau = followed["last"]["operator"]["tau_e"]["value"].as_f64().unwrap();
     assert!((tau - 0.28).abs() < 0.03, "{tau}");

@@ -15,7 +15,7 @@ use crate::{
 };
 
 /// A fitted model.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Fit {
     pub(crate) model: PolynomialModel,
     pub(crate) covariance: Option<Vec<f64>>,
@@ -41,7 +41,7 @@ pub struct Fit {
 }
 
 /// What a grey box fitted: theta is a function of these.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub(crate) struct Physical {
     /// What was fitted, in a line.
     pub title: String,
@@ -54,7 +54,7 @@ pub(crate) struct Physical {
 }
 
 /// How a searched delay is known, and how theta moves with it.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub(crate) struct SearchedDelay {
     /// Variance of the delay, s^2.
     pub variance_s2: f64,

@@ -188,7 +188,7 @@ impl OrderRanges {
 }
 
 /// What decides between candidates; the smallest value wins.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 pub enum Criterion {
     /// The loss itself: right only for candidates with the same number of parameters.
     Loss,
@@ -227,16 +227,16 @@ impl Criterion {
 }
 
 /// One candidate of a search.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Candidate {
     /// Its orders.
     pub orders: Orders,
     /// Its figures, or why it could not be fitted.
-    pub outcome: Result<CandidateFigures, IdentError>,
+    pub outcome: Result<CandidateFigures, String>,
 }
 
 /// What candidates are compared by, all on the same samples.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct CandidateFigures {
     /// Loss V.
     pub loss: f64,
@@ -288,7 +288,7 @@ impl CandidateFigures {
 }
 
 /// The chosen fit and the table it was chosen from.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Choice {
     /// The chosen model, fitted on all its samples.
     pub fit: Fit,
@@ -365,10 +365,10 @@ pub fn choose_orders_with(
         .chunks(delays)
         .flat_map(|row| row.chunks(NEIGHBOURS))
         .collect();
-    let candidates: Vec<Candidate> = blocks
+    let (candidates, errors): (Vec<Candidate>, Vec<Option<IdentError>>) = blocks
         .into_par_iter()
         .flat_map_iter(|block| fit_neighbours(&quick, block, records, first, each))
-        .collect();
+        .unzip();
     let best = candidates
         .iter()
         .filter_map(|c| c.outcome.as_ref().ok().map(|f| (c.orders, f.value(criterion))))
@@ -376,7 +376,7 @@ pub fn choose_orders_with(
     let orders = match best {
         Some((orders, _)) => orders,
         None => {
-            let reason = candidates.into_iter().find_map(|c| c.outcome.err());
+            let reason = errors.into_iter().flatten().next();
             return Err(reason.unwrap_or(IdentError::NoFiniteLoss));
         }
     };
@@ -400,7 +400,7 @@ fn fit_neighbours(
     records: &[Record],
     first: usize,
     each: &(dyn Fn() + Sync),
-) -> Vec<Candidate> {
+) -> Vec<(Candidate, Option<IdentError>)> {
     let mut neighbour: Option<Vec<f64>> = None;
     block
         .iter()
@@ -417,10 +417,8 @@ fn fit_neighbours(
             let fit = from_neighbour.map_or_else(|| own.fit_from(records, first), Ok);
             neighbour = fit.as_ref().ok().map(|fit| fit.model().theta().to_vec());
             each();
-            Candidate {
-                orders,
-                outcome: fit.as_ref().map(CandidateFigures::of).map_err(Clone::clone),
-            }
+            let outcome = fit.as_ref().map(CandidateFigures::of).map_err(IdentError::to_string);
+            (Candidate { orders, outcome }, fit.err())
         })
         .collect()
 }

@@ -144,7 +144,7 @@ pub enum ModelError {
 }
 
 /// Why a discrete model has no counterpart with physical meaning in continuous time.
-#[derive(Debug, Clone, PartialEq, Error)]
+#[derive(Debug, Clone, PartialEq, Error, serde::Serialize, serde::Deserialize)]
 #[non_exhaustive]
 pub enum NotConvertible {
     /// The operator is of another form than a gain with a lead.

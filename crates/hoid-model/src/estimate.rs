@@ -6,7 +6,7 @@ use crate::numbers::{DASH, with_uncertainty};
 
 /// A number with its standard error; `None` where the data give none (a delay that was fixed, a
 /// singular information matrix).
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Estimate {
     /// The estimate.
     pub value: f64,

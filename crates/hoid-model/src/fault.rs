@@ -11,7 +11,7 @@ use std::fmt;
 use crate::Finding;
 
 /// What is wrong.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
 #[non_exhaustive]
 pub enum FaultKind {
     /// One or few samples that those before and behind them rule out.
@@ -50,7 +50,7 @@ crate::named_choice!(FaultKind, "kind of fault", 10, {
 });
 
 /// What is to be done about faults.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 pub enum FaultHandling {
     /// They are told, and the data stay as they are.
     Report,
@@ -71,7 +71,7 @@ crate::named_choice!(FaultHandling, "handling of faults", 4, {
 });
 
 /// What was done about a fault.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum FaultAction {
     /// It is told; the data are as they were.
     Reported,
@@ -88,7 +88,7 @@ crate::named_choice!(FaultAction, "action on a fault", 3, {
 });
 
 /// One fault.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Fault {
     /// What it is.
     pub kind: FaultKind,

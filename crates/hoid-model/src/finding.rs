@@ -16,7 +16,7 @@
 use std::fmt;
 
 /// How much a finding weighs.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
 pub enum Severity {
     /// Worth knowing; the result stands.
     Note,
@@ -33,10 +33,11 @@ crate::named_choice!(Severity, "severity", 3, {
 });
 
 /// One observation about a result.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Finding {
     /// What was observed, as a name for programs: `not-converged`, `delay-at-bound`.
-    pub kind: &'static str,
+    #[serde(deserialize_with = "crate::interned::name")]
+    pub kind: crate::interned::Name,
     /// How much it weighs.
     pub severity: Severity,
     /// The observation in a sentence, with its numbers, without a full stop.
@@ -69,7 +70,7 @@ impl Finding {
 }
 
 /// What a result is worth.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
 pub enum VerdictLevel {
     /// Nothing speaks against it.
     Trustworthy,
@@ -86,7 +87,7 @@ crate::named_choice!(VerdictLevel, "verdict", 3, {
 });
 
 /// The level, and the findings it rests on, the gravest first.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Verdict {
     /// What the result is worth.
     pub level: VerdictLevel,

@@ -76,6 +76,7 @@ pub mod estimate_table;
 pub mod family_scenario;
 pub mod forcing;
 pub mod held_system;
+pub mod interned;
 pub mod margins;
 pub mod numbers;
 pub mod operator;

@@ -15,7 +15,7 @@ use crate::{
 };
 
 /// The parameters of the operator's response to the error.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct OperatorParameters {
     /// Error gain K_e, deg/deg.
     pub k_e: f64,

@@ -12,12 +12,30 @@ use crate::{
 };
 
 /// A polynomial model with its coefficients.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(try_from = "Written")]
 pub struct PolynomialModel {
     structure: Structure,
     orders: Orders,
     sample_time: SampleTime,
     theta: Vec<f64>,
+}
+
+/// A model as it is written, not yet checked.
+#[derive(serde::Deserialize)]
+struct Written {
+    structure: Structure,
+    orders: Orders,
+    sample_time: SampleTime,
+    theta: Vec<f64>,
+}
+
+impl TryFrom<Written> for PolynomialModel {
+    type Error = ModelError;
+
+    fn try_from(written: Written) -> Result<Self, ModelError> {
+        Self::new(written.structure, written.orders, written.sample_time, written.theta)
+    }
 }
 
 impl PolynomialModel {

@@ -3,8 +3,23 @@
 use crate::ModelError;
 
 /// Time between two samples, Ts in s: positive and finite.
-#[derive(Debug, Clone, Copy, PartialEq, PartialOrd)]
+#[derive(Debug, Clone, Copy, PartialEq, PartialOrd, serde::Serialize, serde::Deserialize)]
+#[serde(try_from = "f64", into = "f64")]
 pub struct SampleTime(f64);
+
+impl TryFrom<f64> for SampleTime {
+    type Error = ModelError;
+
+    fn try_from(ts_s: f64) -> Result<Self, ModelError> {
+        Self::new(ts_s)
+    }
+}
+
+impl From<SampleTime> for f64 {
+    fn from(ts: SampleTime) -> Self {
+        ts.0
+    }
+}
 
 impl SampleTime {
     /// 0.01 s, the sample time of the reference task.

@@ -24,7 +24,7 @@ pub use hoid_core::stability::MAX_ORDER;
 use crate::ModelError;
 
 /// Which polynomials a model has (Table 5.1).
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
 #[non_exhaustive]
 pub enum Structure {
     /// `u = B q^-nk e + eps`: finite impulse response.
@@ -148,7 +148,7 @@ crate::named_choice!(Structure, "structure", 11, {
 pub const MAX_DELAY: usize = 1_000_000;
 
 /// Numbers of coefficients and the delay.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, serde::Serialize, serde::Deserialize)]
 pub struct Orders {
     /// Coefficients `a1 ... a_na` of A.
     pub na: usize,

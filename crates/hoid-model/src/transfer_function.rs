@@ -7,7 +7,7 @@ use num_complex::Complex64;
 use crate::{ModelError, SampleTime, polynomial};
 
 /// `H(s) = num(s) / den(s) e^{-s tau}`, coefficients by descending powers of s.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct ContinuousTransferFunction {
     num: Vec<f64>,
     den: Vec<f64>,

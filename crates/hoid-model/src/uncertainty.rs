@@ -18,7 +18,7 @@ use crate::{
 pub use crate::estimate::Estimate;
 
 /// The operator with the uncertainty of each parameter.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct OperatorEstimate {
     /// Error gain K_e, in the unit of u by that of e.
     pub k_e: Estimate,
@@ -90,7 +90,7 @@ impl fmt::Display for OperatorEstimate {
 }
 
 /// The remnant filter with the uncertainty of its parameters.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct RemnantEstimate {
     /// Order m of the filter.
     pub order: usize,

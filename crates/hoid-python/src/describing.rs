@@ -1,11 +1,12 @@
 //! `pyhoid.describe` and `pyhoid.describing_function`: how a person responds at the lines of the
 //! excitation.
 
+use hoid_analysis::{Described, Describing, Recordings};
 use hoid_ident::frequency::{
-    Averaging, DescribingFunction, DescribingOptions, Description, DescriptionOptions, Excitation,
-    GainLeadDelayOptions, LineSearch, LineWeights, Realisation, describe as describe_lines, describe_runs,
+    Averaging, DescribingFunction, DescribingOptions, DescriptionOptions, Excitation, GainLeadDelayOptions, LineSearch,
+    LineWeights, Realisation, describe as describe_lines,
 };
-use hoid_model::uncertainty::Estimate;
+use hoid_model::{FaultHandling, uncertainty::Estimate};
 use numpy::{Complex64, PyArray1};
 use pyo3::{prelude::*, types::PyDict};
 
@@ -13,8 +14,9 @@ use crate::{
     arrays::{self, Wanted, array},
     controlled_element::ControlledElement,
     errors::{Outcome, bad_option},
-    figures::{Pair, VerdictParts, error_or_nan, pair, verdict},
-    names,
+    faults::{UsedRecord, faults_of, used_records},
+    figures::{self, Pair, VerdictParts, error_or_nan, pair, verdict},
+    files, names,
 };
 
 /// The describing function; the package wraps it in `pyhoid.DescribingFunction`.
@@ -25,12 +27,11 @@ pub struct PyDescribingFunction {
 
 /// A description with its verdict; the package wraps it in `pyhoid.Description`.
 #[pyclass(name = "Description", module = "pyhoid._pyhoid", frozen)]
-pub struct PyDescription {
-    found: Description,
-}
+pub struct PyDescription(Described);
 
 #[pyfunction]
-#[pyo3(signature = (records, *, excitation, lines, period, controlled_element, start, stop, offset_samples, detrend))]
+#[pyo3(signature = (records, *, excitation, lines, period, controlled_element, start, stop, offset_samples, detrend, faults,
+    decimate))]
 #[allow(clippy::too_many_arguments)]
 pub fn describe<'py>(
     py: Python<'py>,
@@ -43,42 +44,71 @@ pub fn describe<'py>(
     stop: Option<f64>,
     offset_samples: f64,
     detrend: &str,
+    faults: &str,
+    decimate: &str,
 ) -> Outcome<PyDescription> {
     let records = arrays::records(&records, Wanted::All)?;
-    let element = controlled_element.map(|e| e.transfer_function()).transpose()?;
-    let options = DescriptionOptions {
-        excitation,
-        lines_rad_s: lines,
-        period_s: period,
-        controlled_element: element,
-        from_s: start,
-        to_s: stop,
-        offset_samples,
-        detrend: names::detrend(detrend)?,
+    let describing = Describing {
+        options: DescriptionOptions {
+            excitation,
+            lines_rad_s: lines,
+            period_s: period,
+            controlled_element: controlled_element.map(|e| e.transfer_function()).transpose()?,
+            from_s: start,
+            to_s: stop,
+            offset_samples,
+            detrend: names::detrend(detrend)?,
+        },
+        faults: names::choice::<FaultHandling>("faults", faults)?,
+        rate: files::decimation(decimate)?,
+        ..Describing::default()
     };
-    let found = py.detach(|| describe_runs(&records, &options))?;
-    Ok(PyDescription { found })
+    let found = py.detach(|| describing.run(Recordings::of_records(records)))?;
+    Ok(PyDescription(found))
 }
 
 #[pymethods]
 impl PyDescription {
+    /// The settings that were used.
+    #[getter]
+    fn settings(&self) -> Vec<(String, String, bool)> {
+        figures::settings(&self.0.settings)
+    }
+
+    /// The result as JSON.
+    fn to_json(&self) -> String {
+        self.0.to_json()
+    }
+
+    /// The records as they were described: which of those given each is a part of, the record, and what was
+    /// done to it.
+    fn records<'py>(&self, py: Python<'py>) -> PyResult<Vec<UsedRecord<'py>>> {
+        used_records(py, &self.0.data)
+    }
+
+    /// The faults of the records: which of those given, and the fault.
+    #[getter]
+    fn faults<'py>(&self, py: Python<'py>) -> PyResult<Vec<(usize, Bound<'py, PyDict>)>> {
+        faults_of(py, &self.0.data)
+    }
+
     /// The describing function alone.
     fn function(&self) -> PyDescribingFunction {
         PyDescribingFunction {
-            found: self.found.function.clone(),
+            found: self.0.found.function.clone(),
         }
     }
 
     /// Phase in deg at each line, without jumps.
     #[getter]
     fn phase_deg<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        array(py, self.found.phases_deg().iter().map(|p| p.value).collect())
+        array(py, self.0.found.phases_deg().iter().map(|p| p.value).collect())
     }
 
     /// Crossover and margins; none without a controlled element.
     #[getter]
     fn open_loop<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
-        let Some(margins) = &self.found.margins else {
+        let Some(margins) = &self.0.found.margins else {
             return Ok(None);
         };
         let all = PyDict::new(py);
@@ -92,20 +122,20 @@ impl PyDescription {
     /// Share of the power of u off the lines, and with the part at the lines.
     #[getter]
     fn remnant(&self) -> (Pair, Pair) {
-        let function = &self.found.function;
+        let function = &self.0.found.function;
         (pair(function.off_line_share), pair(function.noise_ratio))
     }
 
     /// Level, reasons and notes.
     #[getter]
     fn verdict(&self) -> VerdictParts {
-        verdict(&self.found.verdict)
+        verdict(&self.0.found.verdict)
     }
 
     /// Channel of the excitation and its period in s.
     #[getter]
     fn excitation(&self) -> (Option<String>, f64) {
-        (self.found.channel.clone(), self.found.excitation.period_s())
+        (self.0.found.channel.clone(), self.0.found.excitation.period_s())
     }
 }
 

@@ -135,7 +135,7 @@ impl From<AnalysisError> for Failure {
                 let of: Vec<String> = of.into_iter().map(estimator).collect();
                 bad_option(format!("{name} belongs to {}{instead}", of.join(", ")))
             }
-            AnalysisError::SameSamples { .. } => Self(DataError::new_err(text)),
+            AnalysisError::SameSamples { .. } | AnalysisError::NotAResult { .. } => Self(DataError::new_err(text)),
             AnalysisError::NoSuchChannel { .. }
             | AnalysisError::Options { .. }
             | AnalysisError::Option { .. }

@@ -1,12 +1,13 @@
 //! `pyhoid.identify` by default: the operator of a person, of the family of operators.
 
-use hoid_analysis::{Identification, Identified, Recordings};
-use hoid_ident::family::{AgreementMethod, ClusterKind, FamilyFit, FormFigures, LoopMeasures, Parameter};
+use hoid_analysis::Identified;
+use hoid_ident::family::{AgreementMethod, ClusterKind, FormFigures, LoopMeasures, Parameter};
 use numpy::{PyArray1, PyArray2};
 use pyo3::{prelude::*, types::PyDict};
 
 use crate::{
     arrays::{array, matrix},
+    errors::Outcome,
     faults::{UsedRecord, faults_of, used_records},
     figures::{self, Pair, VerdictParts, pair, verdict},
     fit::PyFit,
@@ -14,28 +15,7 @@ use crate::{
 
 /// The operator of a person; the package wraps it in `pyhoid.OperatorFit`.
 #[pyclass(name = "OperatorFit", module = "pyhoid._pyhoid", frozen)]
-pub struct PyOperatorFit {
-    found: FamilyFit,
-    data: Recordings,
-    /// How it was asked for.
-    asked: Identification,
-    /// Channel of the excitation.
-    channel: Option<String>,
-    settings: Vec<(String, String)>,
-}
-
-impl PyOperatorFit {
-    /// An operator that was identified.
-    pub fn new(found: Identified, asked: Identification) -> Self {
-        Self {
-            channel: found.described.and_then(|described| described.channel),
-            settings: figures::settings(found.settings),
-            found: found.fit,
-            data: found.data,
-            asked,
-        }
-    }
-}
+pub struct PyOperatorFit(pub Identified);
 
 /// Name, unit, value, standard error, interval, share of the prior, whether it is determined.
 type ParameterParts = (String, &'static str, f64, Option<f64>, Option<(f64, f64)>, f64, bool);
@@ -83,41 +63,46 @@ fn form_row<'py>(py: Python<'py>, f: &FormFigures) -> PyResult<Bound<'py, PyDict
 impl PyOperatorFit {
     /// The settings that were used.
     #[getter]
-    fn settings(&self) -> Vec<(String, String)> {
-        self.settings.clone()
+    fn settings(&self) -> Vec<(String, String, bool)> {
+        figures::settings(&self.0.settings)
+    }
+
+    /// The result as JSON, from which it comes back.
+    fn to_json(&self) -> Outcome<String> {
+        Ok(self.0.to_json()?)
     }
 
     /// The form, and whether it has neuromuscular dynamics.
     #[getter]
     fn form(&self) -> (&'static str, bool) {
-        (self.found.form.name(), self.found.neuromuscular)
+        (self.0.fit.form.name(), self.0.fit.neuromuscular)
     }
 
     #[getter]
     fn title(&self) -> String {
-        self.found.title()
+        self.0.fit.title()
     }
 
     /// Those of the common operator, or of the operator of each record.
     #[getter]
     fn parameters(&self) -> Vec<Vec<ParameterParts>> {
         let of = |parameters: &Vec<Parameter>| parameters.iter().map(parameter).collect();
-        self.found.operators.iter().map(|o| of(&o.parameters)).collect()
+        self.0.fit.operators.iter().map(|o| of(&o.parameters)).collect()
     }
 
     /// Names of the coordinates, in the order of the covariance.
     #[getter]
     fn coordinates(&self) -> Vec<&'static str> {
-        let all = self.found.form.coordinates(self.found.neuromuscular);
+        let all = self.0.fit.form.coordinates(self.0.fit.neuromuscular);
         all.iter().map(|c| c.name()).collect()
     }
 
     fn coordinate_values<'py>(&self, py: Python<'py>, record: usize) -> Bound<'py, PyArray1<f64>> {
-        array(py, self.found.operator(record).operator.coordinates().to_vec())
+        array(py, self.0.fit.operator(record).operator.coordinates().to_vec())
     }
 
     fn covariance<'py>(&self, py: Python<'py>, record: usize) -> PyResult<Option<Bound<'py, PyArray2<f64>>>> {
-        self.square(py, self.found.operator(record).covariance.as_deref())
+        self.square(py, self.0.fit.operator(record).covariance.as_deref())
     }
 
     /// As if residuals were white and nothing varied.
@@ -126,22 +111,22 @@ impl PyOperatorFit {
         py: Python<'py>,
         record: usize,
     ) -> PyResult<Option<Bound<'py, PyArray2<f64>>>> {
-        self.square(py, self.found.operator(record).model_based.as_deref())
+        self.square(py, self.0.fit.operator(record).model_based.as_deref())
     }
 
     #[getter]
     fn verdict(&self) -> VerdictParts {
-        verdict(&self.found.verdict)
+        verdict(&self.0.fit.verdict)
     }
 
     #[getter]
     fn forms<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyDict>>> {
-        self.found.forms.iter().map(|f| form_row(py, f)).collect()
+        self.0.fit.forms.iter().map(|f| form_row(py, f)).collect()
     }
 
     #[getter]
     fn lines<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
-        let Some(lines) = &self.found.lines else {
+        let Some(lines) = &self.0.fit.lines else {
             return Ok(None);
         };
         let (all, parameters) = (PyDict::new(py), PyDict::new(py));
@@ -153,8 +138,8 @@ impl PyOperatorFit {
         all.set_item("degrees_of_freedom", lines.degrees_of_freedom)?;
         all.set_item("held_out", lines.held_out_total())?;
         all.set_item("converged", lines.termination.converged())?;
-        if let Some(element) = &self.asked.controlled_element {
-            let measures = self.found.loop_measures_at_lines(element);
+        if let Some(element) = &self.0.controlled_element {
+            let measures = self.0.fit.loop_measures_at_lines(element);
             all.set_item("open_loop", loop_parts(py, measures)?)?;
             all.set_item("open_loop_intervals", loop_intervals(py, measures)?)?;
         }
@@ -164,12 +149,12 @@ impl PyOperatorFit {
     /// Why there is no fit at the lines of an excitation that was named.
     #[getter]
     fn no_lines(&self) -> Option<&str> {
-        self.found.no_lines.as_deref()
+        self.0.fit.no_lines.as_deref()
     }
 
     #[getter]
     fn riv_bj<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
-        let Some(found) = &self.found.instrumental else {
+        let Some(found) = &self.0.fit.instrumental else {
             return Ok(None);
         };
         let (all, parameters) = (PyDict::new(py), PyDict::new(py));
@@ -180,8 +165,8 @@ impl PyOperatorFit {
         all.set_item("nd", found.noise_order)?;
         all.set_item("converged", found.termination.converged())?;
         all.set_item("termination", found.termination.to_string())?;
-        if let Some(element) = &self.asked.controlled_element {
-            let measures = self.found.loop_measures_by_instruments(element);
+        if let Some(element) = &self.0.controlled_element {
+            let measures = self.0.fit.loop_measures_by_instruments(element);
             all.set_item("open_loop", loop_parts(py, measures)?)?;
         }
         Ok(Some(all))
@@ -189,7 +174,7 @@ impl PyOperatorFit {
 
     #[getter]
     fn agreement<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
-        let Some(agreement) = &self.found.agreement else {
+        let Some(agreement) = &self.0.fit.agreement else {
             return Ok(None);
         };
         let (all, mut rows) = (PyDict::new(py), Vec::new());
@@ -225,19 +210,19 @@ impl PyOperatorFit {
     /// Crossover and phase margin; none without a controlled element.
     #[getter]
     fn open_loop<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
-        let of = |element| loop_parts(py, self.found.loop_measures(0, element));
-        self.asked.controlled_element.as_ref().map(of).transpose()
+        let of = |element| loop_parts(py, self.0.fit.loop_measures(0, element));
+        self.0.controlled_element.as_ref().map(of).transpose()
     }
 
     #[getter]
     fn open_loop_intervals<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
-        let of = |element| loop_intervals(py, self.found.loop_measures(0, element));
-        self.asked.controlled_element.as_ref().map(of).transpose()
+        let of = |element| loop_intervals(py, self.0.fit.loop_measures(0, element));
+        self.0.controlled_element.as_ref().map(of).transpose()
     }
 
     #[getter]
     fn box_jenkins<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
-        let Some(free) = &self.found.free_model else {
+        let Some(free) = &self.0.fit.free_model else {
             return Ok(None);
         };
         let all = PyDict::new(py);
@@ -251,14 +236,14 @@ impl PyOperatorFit {
     /// Coefficients c and d.
     #[getter]
     fn noise<'py>(&self, py: Python<'py>) -> (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>) {
-        let (c, d) = self.found.noise.clone();
+        let (c, d) = self.0.fit.noise.clone();
         (array(py, c), array(py, d))
     }
 
     /// Parameter, centre, spread and source of each entry.
     #[getter]
     fn prior(&self) -> Vec<(String, f64, f64, String)> {
-        let entries = self.found.prior.entries().iter();
+        let entries = self.0.fit.prior.entries().iter();
         entries
             .map(|e| (e.parameter.clone(), e.centre, e.spread, e.source.clone()))
             .collect()
@@ -266,7 +251,7 @@ impl PyOperatorFit {
 
     #[getter]
     fn figures<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let (found, all) = (&self.found, PyDict::new(py));
+        let (found, all) = (&self.0.fit, PyDict::new(py));
         let kind = match found.cluster_kind {
             ClusterKind::Runs => "runs",
             ClusterKind::Blocks => "blocks",
@@ -285,40 +270,40 @@ impl PyOperatorFit {
 
     #[getter]
     fn termination<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        figures::termination(py, self.found.termination)
+        figures::termination(py, self.0.fit.termination)
     }
 
     /// Channel of the excitation; none where there was none.
     #[getter]
     fn excitation(&self) -> Option<&str> {
-        self.channel.as_deref()
+        self.0.excitation.as_deref()
     }
 
     /// The records as they were fitted: which of those given each is a part of, the record, and what was done
     /// to it.
     fn records<'py>(&self, py: Python<'py>) -> PyResult<Vec<UsedRecord<'py>>> {
-        used_records(py, &self.data)
+        used_records(py, &self.0.data)
     }
 
     /// The faults of the records: which of those given, and the fault.
     #[getter]
     fn faults<'py>(&self, py: Python<'py>) -> PyResult<Vec<(usize, Bound<'py, PyDict>)>> {
-        faults_of(py, &self.data)
+        faults_of(py, &self.0.data)
     }
 
     /// The model of a record as polynomials.
     fn fit(&self, record: usize) -> PyFit {
         PyFit::new(
-            self.found.operator(record).polynomial_fit.clone(),
+            self.0.fit.operator(record).polynomial_fit.clone(),
             None,
-            self.data.len(),
+            self.0.data.len(),
         )
     }
 }
 
 impl PyOperatorFit {
     fn square<'py>(&self, py: Python<'py>, values: Option<&[f64]>) -> PyResult<Option<Bound<'py, PyArray2<f64>>>> {
-        let columns = self.found.form.coordinates(self.found.neuromuscular).len();
+        let columns = self.0.fit.form.coordinates(self.0.fit.neuromuscular).len();
         values.map(|c| matrix(py, c.to_vec(), columns)).transpose()
     }
 }

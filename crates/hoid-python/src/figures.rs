@@ -124,8 +124,9 @@ pub fn plain_margins<'py>(py: Python<'py>, m: &Margins) -> PyResult<Bound<'py, P
 }
 
 /// Settings that were used, by their printed names.
-pub fn settings(all: Vec<hoid_analysis::Setting>) -> Vec<(String, String)> {
-    all.into_iter().map(|setting| (setting.name, setting.value)).collect()
+pub fn settings(all: &[hoid_analysis::Setting]) -> Vec<(String, String, bool)> {
+    let parts = |one: &hoid_analysis::Setting| (one.name.clone(), one.value.clone(), one.given);
+    all.iter().map(parts).collect()
 }
 
 pub fn quality<'py>(py: Python<'py>, q: &GoodnessOfFit) -> PyResult<Bound<'py, PyDict>> {

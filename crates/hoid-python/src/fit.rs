@@ -2,9 +2,9 @@
 
 use std::path::PathBuf;
 
-use hoid_analysis::{Identified, PolynomialFit, Recordings};
+use hoid_analysis::{Identified, PolynomialFit, Recordings, json::state};
 use hoid_ident::{Candidate, Choice, Fit, GreyBoxFit, MarginEstimates, Series, grey_box::OrderCandidate};
-use hoid_model::{Record, Verdict, margins::MANUAL_CONTROL_RANGE_RAD_S};
+use hoid_model::{Record, margins::MANUAL_CONTROL_RANGE_RAD_S};
 use hoid_report::{ModelSection, Report, known_operator, write_report};
 use numpy::{PyArray1, PyArray2, PyReadonlyArray1};
 use pyo3::{
@@ -15,7 +15,7 @@ use pyo3::{
 use crate::{
     arrays::{self, Wanted, array, matrix},
     controlled_element::ControlledElement,
-    errors::Outcome,
+    errors::{DataError, Outcome},
     faults::{UsedRecord, faults_of, used_records},
     figures::{self, Pair, VerdictParts, pair},
     names,
@@ -26,52 +26,90 @@ use crate::{
 pub struct PyFit {
     fit: Fit,
     choice: Option<Choice>,
-    grey_box: Option<GreyBoxFit>,
     /// Number of records that the model was fitted to.
     records: usize,
-    /// What it is worth and what it is of, where it is a result by itself.
-    identified: Option<(Verdict, Recordings)>,
-    /// Whether a level of u was estimated of each record.
-    with_levels: bool,
-    settings: Vec<(String, String)>,
+    /// The result that it is, where it is one by itself and not a part of another.
+    whole: Option<Whole>,
+}
+
+/// A part of another result as it is written.
+#[derive(serde::Serialize)]
+struct Part<'a> {
+    fit: &'a Fit,
+    choice: &'a Option<Choice>,
+    records: usize,
+}
+
+/// The same as it is read.
+#[derive(serde::Deserialize)]
+pub struct PartRead {
+    fit: Fit,
+    choice: Option<Choice>,
+    records: usize,
+}
+
+impl From<PartRead> for PyFit {
+    fn from(part: PartRead) -> Self {
+        Self::new(part.fit, part.choice, part.records)
+    }
+}
+
+/// A result that is shown as polynomials.
+enum Whole {
+    Polynomials(Box<Identified<PolynomialFit>>),
+    Remnant(Box<Identified<GreyBoxFit>>),
+}
+
+/// The same of each.
+macro_rules! each {
+    ($whole:expr, $found:ident => $what:expr) => {
+        match $whole {
+            Whole::Polynomials($found) => $what,
+            Whole::Remnant($found) => $what,
+        }
+    };
 }
 
 impl PyFit {
+    /// A part of another result.
     pub fn new(fit: Fit, choice: Option<Choice>, records: usize) -> Self {
         Self {
             fit,
             choice,
-            grey_box: None,
             records,
-            identified: None,
-            with_levels: false,
-            settings: Vec::new(),
+            whole: None,
         }
     }
 
     /// Polynomials that were identified.
     pub fn of_polynomials(found: Identified<PolynomialFit>) -> Self {
-        let with_levels = found.is_without_means();
-        let PolynomialFit { fit, choice } = found.fit;
-        let records = found.data.len();
         Self {
-            with_levels,
-            settings: figures::settings(found.settings),
-            identified: Some((found.verdict, found.data)),
-            ..Self::new(fit, choice, records)
+            fit: found.fit.fit.clone(),
+            choice: found.fit.choice.clone(),
+            records: found.data.names.len(),
+            whole: Some(Whole::Polynomials(Box::new(found))),
         }
     }
 
     /// An operator and its remnant that were identified.
     pub fn of_grey_box(found: Identified<GreyBoxFit>) -> Self {
-        let first = Self::new(found.fit.polynomial_fit(0).clone(), None, found.data.len());
         Self {
-            with_levels: found.is_without_means(),
-            settings: figures::settings(found.settings),
-            grey_box: Some(found.fit),
-            identified: Some((found.verdict, found.data)),
-            ..first
+            fit: found.fit.polynomial_fit(0).clone(),
+            choice: None,
+            records: found.data.names.len(),
+            whole: Some(Whole::Remnant(Box::new(found))),
         }
+    }
+
+    fn grey_box(&self) -> Option<&GreyBoxFit> {
+        match &self.whole {
+            Some(Whole::Remnant(found)) => Some(&found.fit),
+            _ => None,
+        }
+    }
+
+    fn data(&self) -> Option<&Recordings> {
+        self.whole.as_ref().map(|whole| each!(whole, found => &found.data))
     }
 
     fn margins_with(&self, element: &ControlledElement) -> Outcome<MarginEstimates> {
@@ -105,14 +143,38 @@ fn series(py: Python<'_>, found: Series) -> SeriesParts<'_> {
 impl PyFit {
     /// The settings that were used.
     #[getter]
-    fn settings(&self) -> Vec<(String, String)> {
-        self.settings.clone()
+    fn settings(&self) -> Vec<(String, String, bool)> {
+        let of = |whole: &Whole| each!(whole, found => figures::settings(&found.settings));
+        self.whole.as_ref().map(of).unwrap_or_default()
+    }
+
+    /// The result as JSON, from which it comes back.
+    fn to_json(&self) -> Outcome<String> {
+        match &self.whole {
+            Some(whole) => Ok(each!(whole, found => found.to_json())?),
+            None => Err(DataError::new_err(
+                "this model is a part of another result: write that one (fit.to_json() of the operator or the trace)",
+            )
+            .into()),
+        }
+    }
+
+    /// Of a part of another result its model alone, from which it comes back; none of a result by itself.
+    fn state(&self) -> Option<String> {
+        if self.whole.is_some() {
+            return None;
+        }
+        state::written(&Part {
+            fit: &self.fit,
+            choice: &self.choice,
+            records: self.records,
+        })
     }
 
     #[getter]
     fn structure(&self) -> &'static str {
         if self.fit.is_grey_box() {
-            "grey-box"
+            "operator"
         } else {
             self.fit.model().structure().name()
         }
@@ -144,7 +206,7 @@ impl PyFit {
 
     #[getter]
     fn covariance<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray2<f64>>>> {
-        let found = match &self.grey_box {
+        let found = match self.grey_box() {
             Some(grey_box) => grey_box.covariance(),
             // An operator of the family has its own, of its coordinates.
             None if self.fit.is_grey_box() => None,
@@ -209,7 +271,7 @@ impl PyFit {
     /// The operator of each record of a grey box; empty for other fits.
     #[getter]
     fn operators<'py>(&self, py: Python<'py>) -> PyResult<Vec<Option<Bound<'py, PyDict>>>> {
-        let Some(grey_box) = &self.grey_box else {
+        let Some(grey_box) = self.grey_box() else {
             return Ok(Vec::new());
         };
         (0..self.records)
@@ -220,22 +282,23 @@ impl PyFit {
     /// The level of u in each record of the fit as it was read; empty where none was estimated.
     #[getter]
     fn levels(&self) -> Vec<Option<Pair>> {
-        let identified = self.identified.iter().filter(|_| self.with_levels);
-        let accounts = identified.flat_map(|(_, data)| &data.accounts);
+        let without = |whole: &&Whole| each!(whole, found => found.is_without_means());
+        let data = self.whole.as_ref().filter(without).and_then(|_| self.data());
+        let accounts = data.into_iter().flat_map(|data| &data.accounts);
         accounts.map(|account| account.level.map(pair)).collect()
     }
 
     /// The records as they were fitted: which of those given each is a part of, the record, and what was done
     /// to it.
     fn records<'py>(&self, py: Python<'py>) -> PyResult<Vec<UsedRecord<'py>>> {
-        let data = self.identified.as_ref().map(|(_, data)| used_records(py, data));
+        let data = self.data().map(|data| used_records(py, data));
         data.unwrap_or_else(|| Ok(Vec::new()))
     }
 
     /// The faults of the records: which of those given, and the fault.
     #[getter]
     fn faults<'py>(&self, py: Python<'py>) -> PyResult<Vec<(usize, Bound<'py, PyDict>)>> {
-        let data = self.identified.as_ref().map(|(_, data)| faults_of(py, data));
+        let data = self.data().map(|data| faults_of(py, data));
         data.unwrap_or_else(|| Ok(Vec::new()))
     }
 
@@ -256,8 +319,8 @@ impl PyFit {
 
     /// What it is worth; of a part of another result, by these records alone.
     fn verdict(&self, py: Python<'_>, records: Vec<Bound<'_, PyAny>>) -> Outcome<VerdictParts> {
-        if let Some((verdict, _)) = &self.identified {
-            return Ok(figures::verdict(verdict));
+        if let Some(whole) = &self.whole {
+            return Ok(each!(whole, found => figures::verdict(&found.verdict)));
         }
         let records = arrays::records(&records, Wanted::Only(&[]))?;
         let found = py.detach(|| self.fit.verdict(&records, self.choice.as_ref()))?;
@@ -382,7 +445,7 @@ impl PyFit {
         for candidate in self.choice.iter().flat_map(|choice| &choice.candidates) {
             list.append(candidate_row(py, candidate)?)?;
         }
-        for candidate in self.grey_box.iter().flat_map(GreyBoxFit::candidates) {
+        for candidate in self.grey_box().into_iter().flat_map(GreyBoxFit::candidates) {
             list.append(order_row(py, candidate)?)?;
         }
         Ok(list)
@@ -420,7 +483,7 @@ fn candidate_row<'py>(py: Python<'py>, candidate: &Candidate) -> PyResult<Bound<
             row.set_item("yic", f.yic)?;
             row.set_item("converged", f.converged)?;
         }
-        Err(reason) => row.set_item("error", reason.to_string())?,
+        Err(reason) => row.set_item("error", reason)?,
     }
     Ok(row)
 }
@@ -435,7 +498,7 @@ fn order_row<'py>(py: Python<'py>, candidate: &OrderCandidate) -> PyResult<Bound
             row.set_item("bic", f.bic)?;
             row.set_item("converged", f.converged)?;
         }
-        Err(reason) => row.set_item("error", reason.to_string())?,
+        Err(reason) => row.set_item("error", reason)?,
     }
     Ok(row)
 }

@@ -2,7 +2,10 @@
 
 use std::{collections::BTreeMap, sync::Arc};
 
-use hoid_analysis::{AnalysisError, Asked, BatchEstimator, Identification, Identified, Recordings, Request};
+use hoid_analysis::{
+    AnalysisError, Asked, BatchEstimator, Identification, Identified, Recordings, Request,
+    json::{Answer, state},
+};
 use hoid_ident::{
     estimators,
     settings::{Kind, MethodSpec, Setting},
@@ -12,10 +15,10 @@ use pyo3::prelude::*;
 
 use crate::{
     arrays::{self, Wanted},
-    errors::{Failure, Outcome},
+    errors::{DataError, Failure, Outcome},
     family::PyOperatorFit,
     files,
-    fit::PyFit,
+    fit::{PartRead, PyFit},
     interrupt::{self, Standing},
     names,
     time_varying::PyTimeVaryingFit,
@@ -50,18 +53,38 @@ pub fn identify<'py>(
     let (asked, notes) = request.asked()?;
     let progress = progress.as_ref();
     let fit = match asked {
-        Asked::Operator(how) => {
-            let found = run(py, how.clone(), records, 1, progress)?;
-            Bound::new(py, PyOperatorFit::new(found, how))?.into_any()
-        }
-        Asked::Remnant(how) => Bound::new(py, PyFit::of_grey_box(run(py, how, records, 10, progress)?))?.into_any(),
-        Asked::Change(how) => Bound::new(py, PyTimeVaryingFit::new(run(py, how, records, 10, progress)?))?.into_any(),
+        Asked::Operator(how) => Answer::Operator(run(py, how, records, 1, progress)?),
+        Asked::Remnant(how) => Answer::Remnant(run(py, how, records, 10, progress)?),
+        Asked::Change(how) => Answer::Change(run(py, how, records, 10, progress)?),
         Asked::Polynomials(how) => {
             let models = how.estimator.ranges(records[0].sample_time())?.combinations()?.len();
-            Bound::new(py, PyFit::of_polynomials(run(py, how, records, models, progress)?))?.into_any()
+            Answer::Polynomials(run(py, how, records, models, progress)?)
         }
     };
-    Ok((fit, notes))
+    Ok((native(py, fit)?, notes))
+}
+
+/// A result that `to_json` wrote.
+#[pyfunction]
+pub fn from_json<'py>(py: Python<'py>, text: &str) -> Outcome<Bound<'py, PyAny>> {
+    Ok(native(py, Answer::from_json(text)?)?)
+}
+
+/// A part of a result that its `state` wrote.
+#[pyfunction]
+pub fn from_state(text: &str) -> PyResult<PyFit> {
+    let part: PartRead = state::read(text).map_err(DataError::new_err)?;
+    Ok(part.into())
+}
+
+/// The class of a result.
+fn native(py: Python<'_>, answer: Answer) -> PyResult<Bound<'_, PyAny>> {
+    Ok(match answer {
+        Answer::Operator(found) => Bound::new(py, PyOperatorFit(found))?.into_any(),
+        Answer::Remnant(found) => Bound::new(py, PyFit::of_grey_box(found))?.into_any(),
+        Answer::Change(found) => Bound::new(py, PyTimeVaryingFit(found))?.into_any(),
+        Answer::Polynomials(found) => Bound::new(py, PyFit::of_polynomials(found))?.into_any(),
+    })
 }
 
 /// The identification without the interpreter, in a thread of its own where it is long.

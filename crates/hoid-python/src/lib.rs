@@ -73,6 +73,8 @@ fn _pyhoid(module: &Bound<'_, PyModule>) -> PyResult<()> {
         wrap_pyfunction!(group::simulate_group, module)?,
         wrap_pyfunction!(group::simulate_people, module)?,
         wrap_pyfunction!(identify::batch_estimators, module)?,
+        wrap_pyfunction!(identify::from_json, module)?,
+        wrap_pyfunction!(identify::from_state, module)?,
         wrap_pyfunction!(identify::identify, module)?,
         wrap_pyfunction!(recursion::counts_samples, module)?,
         wrap_pyfunction!(recursion::recursive_methods, module)?,

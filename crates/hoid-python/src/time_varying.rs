@@ -1,8 +1,7 @@
 //! The fit of an operator whose gains change once.
 
-use hoid_analysis::{Identified, Recordings};
+use hoid_analysis::Identified;
 use hoid_ident::{ChangedOperator, GainsAt, SigmoidFit, validation::whiteness};
-use hoid_model::Verdict;
 use numpy::{PyArray1, PyArray2};
 use pyo3::{prelude::*, types::PyDict};
 
@@ -15,23 +14,7 @@ use crate::{
 
 /// The package wraps it in `pyhoid.TimeVaryingFit`.
 #[pyclass(name = "TimeVaryingFit", module = "pyhoid._pyhoid", frozen)]
-pub struct PyTimeVaryingFit {
-    fit: SigmoidFit,
-    found: Verdict,
-    data: Recordings,
-    settings: Vec<(String, String)>,
-}
-
-impl PyTimeVaryingFit {
-    pub fn new(found: Identified<SigmoidFit>) -> Self {
-        Self {
-            fit: found.fit,
-            found: found.verdict,
-            data: found.data,
-            settings: figures::settings(found.settings),
-        }
-    }
-}
+pub struct PyTimeVaryingFit(pub Identified<SigmoidFit>);
 
 /// The operator before or after the change: of a gain and a lead as that of any fit, else its form
 /// and each parameter by its name; the poles of the family are stable by their bounds.
@@ -53,25 +36,30 @@ fn operator<'py>(py: Python<'py>, of: &ChangedOperator) -> PyResult<Option<Bound
 impl PyTimeVaryingFit {
     /// The settings that were used.
     #[getter]
-    fn settings(&self) -> Vec<(String, String)> {
-        self.settings.clone()
+    fn settings(&self) -> Vec<(String, String, bool)> {
+        figures::settings(&self.0.settings)
+    }
+
+    /// The result as JSON, from which it comes back.
+    fn to_json(&self) -> Outcome<String> {
+        Ok(self.0.to_json()?)
     }
 
     #[getter]
     fn form(&self) -> &'static str {
-        self.fit.form().name()
+        self.0.fit.form().name()
     }
 
     /// Name, estimate, unit and remark of each parameter.
     #[getter]
     fn parameters(&self) -> Vec<(String, Pair, &'static str, Option<String>)> {
         let one = |p: hoid_ident::ChangeParameter| (p.name, pair(p.estimate), p.unit, p.remark.map(|r| r.to_string()));
-        self.fit.parameters().into_iter().map(one).collect()
+        self.0.fit.parameters().into_iter().map(one).collect()
     }
 
     #[getter]
     fn covariance<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyArray2<f64>>>> {
-        let Some(c) = self.fit.covariance() else {
+        let Some(c) = self.0.fit.covariance() else {
             return Ok(None);
         };
         let columns = (c.len() as f64).sqrt().round() as usize;
@@ -80,7 +68,7 @@ impl PyTimeVaryingFit {
 
     #[getter]
     fn figures<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let (fit, all) = (&self.fit, PyDict::new(py));
+        let (fit, all) = (&self.0.fit, PyDict::new(py));
         all.set_item("loss", fit.loss())?;
         all.set_item("innovation_variance", fit.innovation_variance())?;
         all.set_item("residuals", fit.residual_count())?;
@@ -90,28 +78,29 @@ impl PyTimeVaryingFit {
 
     #[getter]
     fn termination<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let all = figures::termination(py, self.fit.termination())?;
-        all.set_item("start", self.fit.start())?;
+        let all = figures::termination(py, self.0.fit.termination())?;
+        all.set_item("start", self.0.fit.start())?;
         Ok(all)
     }
 
     /// Whether there is a change, and the comparison with an operator that does not change.
     #[getter]
     fn change<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let (c, all) = (self.fit.comparison(), PyDict::new(py));
-        all.set_item("found", self.fit.change_found())?;
+        let (c, all) = (self.0.fit.comparison(), PyDict::new(py));
+        all.set_item("found", self.0.fit.change_found())?;
         all.set_item("likelihood_ratio", c.likelihood_ratio)?;
         all.set_item("extra_parameters", c.extra_parameters)?;
         all.set_item("bic_difference", c.bic_difference)?;
-        all.set_item("t_M_interval", self.fit.midpoint_interval())?;
-        all.set_item("G_interval", self.fit.rate_interval())?;
+        all.set_item("t_M_interval", self.0.fit.midpoint_interval())?;
+        all.set_item("G_interval", self.0.fit.rate_interval())?;
         Ok(all)
     }
 
     /// The level of u in each record, where it was estimated.
     #[getter]
     fn levels(&self) -> Vec<Option<Pair>> {
-        self.data
+        self.0
+            .data
             .accounts
             .iter()
             .map(|account| account.level.map(pair))
@@ -121,33 +110,33 @@ impl PyTimeVaryingFit {
     /// The records as they were fitted: which of those given each is a part of, the record, and what was done
     /// to it.
     fn records<'py>(&self, py: Python<'py>) -> PyResult<Vec<UsedRecord<'py>>> {
-        used_records(py, &self.data)
+        used_records(py, &self.0.data)
     }
 
     /// The faults of the records: which of those given, and the fault.
     #[getter]
     fn faults<'py>(&self, py: Python<'py>) -> PyResult<Vec<(usize, Bound<'py, PyDict>)>> {
-        faults_of(py, &self.data)
+        faults_of(py, &self.0.data)
     }
 
     #[getter]
     fn initial<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
-        operator(py, self.fit.initial_operator())
+        operator(py, self.0.fit.initial_operator())
     }
 
     #[getter]
     fn last<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
-        operator(py, self.fit.last_operator())
+        operator(py, self.0.fit.last_operator())
     }
 
     /// `t`, and what changes (K_e, T_L and K_e_dot of a gain and a lead) at these times, each with
     /// its standard error.
     fn gains<'py>(&self, py: Python<'py>, times: Vec<f64>) -> PyResult<Bound<'py, PyDict>> {
-        let gains: Vec<GainsAt> = times.iter().map(|t| self.fit.gains_at(*t)).collect();
+        let gains: Vec<GainsAt> = times.iter().map(|t| self.0.fit.gains_at(*t)).collect();
         let all = PyDict::new(py);
         all.set_item("t", array(py, times))?;
         // The names are there without times too.
-        for (i, of) in self.fit.gains_at(0.0).gains.iter().enumerate() {
+        for (i, of) in self.0.fit.gains_at(0.0).gains.iter().enumerate() {
             all.set_item(
                 of.name,
                 array(py, gains.iter().map(|g| g.gains[i].estimate.value).collect()),
@@ -164,7 +153,7 @@ impl PyTimeVaryingFit {
         record: &Bound<'py, PyAny>,
     ) -> Outcome<(usize, Bound<'py, PyArray1<f64>>)> {
         let record = arrays::record(record, Wanted::Only(&[]))?;
-        let found = py.detach(|| self.fit.residuals(&record))?;
+        let found = py.detach(|| self.0.fit.residuals(&record))?;
         Ok((found.first, array(py, found.values)))
     }
 
@@ -174,19 +163,19 @@ impl PyTimeVaryingFit {
         record: &Bound<'py, PyAny>,
     ) -> Outcome<(usize, Bound<'py, PyArray1<f64>>)> {
         let record = arrays::record(record, Wanted::Only(&[]))?;
-        let found = py.detach(|| self.fit.simulate(&record))?;
+        let found = py.detach(|| self.0.fit.simulate(&record))?;
         Ok((found.first, array(py, found.values)))
     }
 
     #[getter]
     fn verdict(&self) -> VerdictParts {
-        figures::verdict(&self.found)
+        figures::verdict(&self.0.verdict)
     }
 
     /// Whiteness of the residuals of a record.
     fn ljung_box<'py>(&self, py: Python<'py>, record: &Bound<'py, PyAny>) -> Outcome<Option<Bound<'py, PyDict>>> {
         let record = arrays::record(record, Wanted::Only(&[]))?;
-        let fit = &self.fit;
+        let fit = &self.0.fit;
         let test = py.detach(|| {
             fit.residuals(&record)
                 .map(|found| whiteness(&found.values, fit.d().len()))

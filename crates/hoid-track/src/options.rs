@@ -38,6 +38,9 @@ pub struct TrackOptions {
 }
 
 impl TrackOptions {
+    /// Magnitude beyond which a sample is a fault, by default.
+    pub const LARGEST: f64 = 1e6;
+
     /// Default options, for the orders given.
     pub fn new(method: Method, structure: Structure, orders: Orders) -> Self {
         Self {
@@ -47,7 +50,7 @@ impl TrackOptions {
             start: StartAt::Span(None),
             update_from_s: None,
             search: SearchOptions::default(),
-            largest: 1e6,
+            largest: Self::LARGEST,
             at_rad_s: Vec::new(),
             controlled_element: None,
         }

@@ -35,7 +35,7 @@ from .errors import (
 from .estimates import Estimate, Operator, Remnant
 from .fit import Fit, FrequencyResponse, Series, Validation
 from .groups import group, group_manifest, simulate_group, simulate_people
-from .identification import identify, identify_operator
+from .identification import from_json, identify, identify_operator
 from .operator_fit import OperatorFit
 from .operator_parameters import OperatorParameter
 from .reading import info, read, read_segments, write
@@ -93,6 +93,7 @@ __all__ = [
     "discretise",
     "errors",
     "from_control",
+    "from_json",
     "group",
     "group_manifest",
     "identify",

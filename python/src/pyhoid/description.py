@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from . import _options, _pyhoid, _text
 from ._arrays import FloatArray
-from ._decimation import decimated
+from ._faults import faults_of
 from ._pickling import Call, recalled, state_of
 from .errors import OptionError
 from .estimates import Estimate, estimates
@@ -18,6 +18,8 @@ from .record import Record
 
 if TYPE_CHECKING:
     import pandas as pd
+
+    from ._literals import Faults
 
 __all__ = ["DescribingFunction", "Description", "describe", "describing_function"]
 
@@ -275,6 +277,11 @@ class Description:
 
     def __init__(self, native: _pyhoid.Description, call: Call | None = None) -> None:
         self.function = DescribingFunction(native.function(), call)
+        self._json: str = native.to_json()
+        #: The settings that were used, by name.
+        self.settings: dict[str, str] = {name: value for name, value, _ in native.settings}
+        #: Faults of the records that were looked for: kind, channel, from, to, size, action.
+        self.faults: list[dict[str, Any]] = faults_of(native)
         self.phase_deg: FloatArray = native.phase_deg
         found = native.open_loop
         self.open_loop: dict[str, Estimate | None] | None = (
@@ -285,6 +292,13 @@ class Description:
         self.noise_ratio = Estimate(*ratio)
         self.verdict, self.reasons, self.notes = native.verdict
         self.excitation, self.period = native.excitation
+
+    def to_json(self) -> str:
+        """The object of ``hoid describe --json`` as text.
+
+        >>> pyhoid.describe(records).to_json()
+        """
+        return self._json
 
     def __repr__(self) -> str:
         parts = [f"Verdict: {self.verdict}", *(f"- {reason}" for reason in self.reasons)]
@@ -305,6 +319,7 @@ def describe(
     stop: float | None = None,
     offset_samples: float = 0.0,
     detrend: str = "none",
+    faults: Faults = "bridge",
     decimate: int | str = "auto",
 ) -> Description:
     """Describe how a person responds at the lines of a periodic excitation, without a model.
@@ -331,6 +346,8 @@ def describe(
     offset_samples : float
         ``e[k]`` belongs to ``u[k + offset_samples]``.
     detrend : {"none", "mean", "linear"}
+    faults : {"bridge", "cut", "report", "keep"}
+        What is done about faults of the records, as in `identify`.
     decimate : "auto", "off" or int
         As in `identify`. The response at the lines is the same at both rates.
 
@@ -351,14 +368,7 @@ def describe(
     >>> found.open_loop["phase_margin_deg"]
     """
     settings = {name: value for name, value in locals().items() if name != "records"}
-    given = _options.as_records(records)
-    several = decimated(given, decimate)
-    # A ratio of samples knows no hold: what the input was moved for it is taken back.
-    late = offset_samples * given[0].sample_time + several[0].input_lead
-    settings |= {
-        "decimate": "off",
-        "offset_samples": offset_samples * given[0].sample_time / several[0].sample_time,
-    }
+    several = tuple(_options.as_records(records))
     element = None
     if controlled_element is not None:
         element = _options.controlled_element(controlled_element)
@@ -371,8 +381,11 @@ def describe(
             controlled_element=element,
             start=start,
             stop=stop,
-            offset_samples=late / several[0].sample_time,
+            # A ratio of samples knows no hold: what the input was moved for it is taken back.
+            offset_samples=offset_samples + several[0].input_lead / several[0].sample_time,
             detrend=detrend,
+            faults=faults,
+            decimate=str(decimate),
         ),
         Call("describe", several, settings),
     )

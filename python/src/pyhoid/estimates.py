@@ -36,8 +36,8 @@ UNITS: Mapping[str, str] = {
 _GAINS = ("K", "K_e", "K_e_dot", "K_over_T_I", "K_I")
 
 
-def unit_of(name: str, records: Sequence[Record] = (), own: str | None = None) -> str:
-    """The unit of a parameter; of a gain only where the records declare those of e and u.
+def unit_of(name: str, units: tuple[str, str] = ("", ""), own: str | None = None) -> str:
+    """The unit of a parameter; of a gain only where those of e and u are declared.
 
     `own` is the unit that it has beside that of u/e; by default that of its name.
 
@@ -47,7 +47,7 @@ def unit_of(name: str, records: Sequence[Record] = (), own: str | None = None) -
     own = UNITS.get(name, "") if own is None else own
     if name.rstrip("0123456789") not in _GAINS:
         return own
-    e, u = channel_units(records[0]) if records else ("", "")
+    e, u = units
     if not e or not u:
         return ""
     if own and e == u:
@@ -57,9 +57,11 @@ def unit_of(name: str, records: Sequence[Record] = (), own: str | None = None) -
     return f"{u} {own}/{e}" if own else f"{u}/{e}"
 
 
-def channel_units(record: Record) -> tuple[str, str]:
+def channel_units(records: Sequence[Record]) -> tuple[str, str]:
     """The units of input and output, whatever their columns are called; empty where none is said."""
-    units = record.units
+    if not records:
+        return ("", "")
+    record, units = records[0], records[0].units
     return (
         units.get(record.input_name or "", "").strip(),
         units.get(record.output_name, "").strip(),
@@ -123,11 +125,13 @@ class _Converted(Named[Estimate]):
     """Estimates by name, or the reason why there are none."""
 
     _what = "the model"
-    #: The records that it is of, for the units of gains.
-    _records: Sequence[Record] = ()
+    #: Units of e and u, for those of gains.
+    _units: tuple[str, str] = ("", "")
 
-    def __init__(self, found: Mapping[str, Any], records: Sequence[Record] = ()) -> None:
-        self._records = records
+    def __init__(
+        self, found: Mapping[str, Any], units: tuple[str, str] = ("", "")
+    ) -> None:
+        self._units = units
         self.convertible: bool = bool(found["convertible"])
         self.reason: str | None = found.get("reason")
         self._all: dict[str, Estimate] = {
@@ -152,7 +156,7 @@ class _Converted(Named[Estimate]):
             [
                 name,
                 *_text.with_uncertainty(estimate.value, estimate.standard_error),
-                unit_of(name, self._records),
+                unit_of(name, self._units),
             ]
             for name, estimate in self._all.items()
         ]
@@ -197,8 +201,10 @@ class Operator(_Converted):
     _what = "the operator"
     _owner = "Operator"
 
-    def __init__(self, found: Mapping[str, Any], records: Sequence[Record] = ()) -> None:
-        super().__init__(found, records)
+    def __init__(
+        self, found: Mapping[str, Any], units: tuple[str, str] = ("", "")
+    ) -> None:
+        super().__init__(found, units)
         self.stable: bool = bool(found.get("stable", False))
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping, Sequence
 from os import PathLike
 from pathlib import Path
@@ -10,12 +11,12 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from . import _faults, _options, _pyhoid, _text
+from . import _options, _pyhoid, _text
 from ._arrays import FloatArray, signal
 from .errors import DataError, NotConvertibleError
 from .estimates import Estimate, Operator, Remnant, estimates, unit_of
 from .record import Record
-from ._pickling import Call, recalled, state_of
+from ._results import Result
 from .verdict import Verdict
 
 if TYPE_CHECKING:
@@ -95,32 +96,12 @@ class Validation(NamedTuple):
     feedback: bool
 
 
-#: What a pickle keeps of the native side.
-_ANSWERS = (
-    "structure",
-    "title",
-    "orders",
-    "sample_time",
-    "parameters",
-    "covariance",
-    "polynomials",
-    "figures",
-    "termination",
-    "stable",
-    "operator",
-    "operators",
-    "roots",
-    "candidates",
-    "criterion",
-    "delay_interval",
-    "levels",
-)
+#: Figures of its quality.
+_QUALITY = ("vaf_simulation", "vaf_prediction", "nrmse_simulation", "nrmse_prediction")
 
 
-class Fit:
+class Fit(Result):
     """A fitted model. `identify` makes it.
-
-    It can be pickled: see `pyhoid._pickling`.
 
     Attributes
     ----------
@@ -135,35 +116,22 @@ class Fit:
     >>> fit.parameters, fit.standard_errors, fit.verdict
     """
 
+    _native: _pyhoid.Fit
+
     def __init__(
         self,
         native: _pyhoid.Fit,
-        records: Sequence[Record],
+        records: Sequence[Record] = (),
         settings: Mapping[str, Any] | None = None,
-        call: Call | None = None,
+        units: tuple[str, str] | None = None,
     ) -> None:
-        self._native = native
-        self._call = call
-        #: Those of a part of another result are the records that it is of.
-        self.records: tuple[Record, ...] = _faults.used(native, records) or tuple(records)
-        self.settings: dict[str, Any] = dict(settings or {})
+        super().__init__(native, records, settings, units)
         self._quality: dict[str, float] | None = None
         self._verdict: Verdict | None = None
-        #: Faults of the records that were looked for: kind, channel, from, to, size, action.
-        self.faults: list[dict[str, Any]] = _faults.faults_of(native)
-
-    def __getstate__(self) -> dict[str, Any]:
-        if self.records:
-            # What a summary shows is said before it is stored.
-            _ = self.quality, self.verdict
-        return state_of(self, _ANSWERS)
-
-    def __setstate__(self, state: Any) -> None:
-        recalled(self, state, _ANSWERS)
 
     @property
     def structure(self) -> str:
-        """Name of the structure, such as ``"bj"`` or ``"grey-box"``."""
+        """Name of the structure, such as ``"bj"``; ``"operator"`` with its remnant of order m."""
         return self._native.structure
 
     @property
@@ -246,7 +214,7 @@ class Fit:
     def operator(self) -> Operator | None:
         """The human operator; None where the structure cannot represent one."""
         found = self._native.operator
-        return None if found is None else Operator(found, self.records)
+        return None if found is None else Operator(found, self.units)
 
     @property
     def operators(self) -> list[Operator | None]:
@@ -254,7 +222,7 @@ class Fit:
 
         Empty for other fits.
         """
-        return [None if found is None else Operator(found, self.records) for found in self._native.operators]
+        return [None if found is None else Operator(found, self.units) for found in self._native.operators]
 
     @property
     def levels(self) -> list[Estimate | None]:
@@ -287,9 +255,17 @@ class Fit:
 
         They are taken over the records of the fit.
         """
-        if self._quality is None:
-            self._quality = self._native.quality(list(self.records))
-        return self._quality
+        known = self._quality
+        if known is None:
+            # Without records as it was written.
+            written = None if self.records else json.loads(self.to_json())["fit"]
+            known = (
+                self._native.quality(list(self.records))
+                if written is None
+                else {name: float(written[name]) for name in _QUALITY}
+            )
+            self._quality = known
+        return known
 
     @property
     def verdict(self) -> Verdict:
@@ -300,7 +276,7 @@ class Fit:
         DataError
             For a fit without records, such as the start of a `Tracker`.
         """
-        if not self.records:
+        if not self.records and self._native.state() is not None:
             raise DataError("the fit has no records to be judged on; a fit by identify has them")
         if self._verdict is None:
             self._verdict = Verdict(*self._native.verdict(list(self.records)))
@@ -431,7 +407,7 @@ class Fit:
                 "standard_error": [
                     np.nan if e.standard_error is None else e.standard_error for _, e in rows
                 ],
-                "unit": [unit_of(name, self.records) for name, _ in rows],
+                "unit": [unit_of(name, self.units) for name, _ in rows],
             },
             index=pd.Index([name for name, _ in rows], name="parameter"),
         )
@@ -540,7 +516,7 @@ class Fit:
         """
         header = ["parameter", "value", "standard error", "unit"]
         rows = [
-            [name, *_text.with_uncertainty(e.value, e.standard_error), unit_of(name, self.records)]
+            [name, *_text.with_uncertainty(e.value, e.standard_error), unit_of(name, self.units)]
             for name, e in self.estimates.items()
         ]
         parts = [self._headline(), _text.plain_table(header, rows)]
@@ -572,7 +548,7 @@ class Fit:
 
         header = ["", "value", "standard error", "unit"]
         rows = [
-            [name, *_text.with_uncertainty(e.value, e.standard_error), unit_of(name, self.records)]
+            [name, *_text.with_uncertainty(e.value, e.standard_error), unit_of(name, self.units)]
             for name, e in self.estimates.items()
         ]
         parts = [_text.html_table(self._headline(), header, rows)]

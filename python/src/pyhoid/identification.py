@@ -6,13 +6,13 @@ The options of the estimators are not listed here: they are those of the registr
 
 from __future__ import annotations
 
+import json
 import warnings
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Literal, overload
 
 from . import _options, _pyhoid
 from ._options import Order, Progress
-from ._pickling import Call
 from ._prior import prior_text
 from ._settings import BATCH_SETTINGS
 from .fit import Fit
@@ -20,7 +20,7 @@ from .operator_fit import OperatorFit
 from .record import Record
 from .time_varying import TimeVaryingFit
 
-__all__ = ["identify", "identify_operator"]
+__all__ = ["from_json", "identify", "identify_operator"]
 
 #: Type of each keyword of the batch estimators, from the registry of the library.
 _KINDS = {
@@ -170,17 +170,54 @@ def identify(
     )
     for note in notes:
         warnings.warn(note, DeprecationWarning, stacklevel=2)
-    asked = {"structure": structure, "na": na, "nb": nb, "nc": nc, "nd": nd, "nf": nf, "method": method}
-    call = Call("identify", several, {**asked, "faults": faults, "decimate": decimate, **given})
-    used = dict(found.settings)
-    if isinstance(found, _pyhoid.TimeVaryingFit):
-        return TimeVaryingFit(found, several, used, call)
-    if isinstance(found, _pyhoid.OperatorFit):
-        return OperatorFit(found, several, used, call)
-    return Fit(found, several, used, call)
+    return _result(found, several)
 
 
 identify.__doc__ = (identify.__doc__ or "").format(settings=BATCH_SETTINGS)
+
+
+def from_json(text: str) -> OperatorFit | Fit | TimeVaryingFit:
+    """A result that its `to_json` wrote, or ``hoid identify --json`` printed.
+
+    It is equal to the one that was written, and predicts, simulates and validates as that did; the
+    samples of its records are not in it.
+
+    Parameters
+    ----------
+    text : str
+        The JSON.
+
+    Raises
+    ------
+    DataError
+        For a text that is no result, was changed, or is of another version.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> fit = pyhoid.from_json(Path("person.json").read_text())
+    """
+    units = [record.get("units", {}) for record in _records(text)]
+    first = units[0] if units else {}
+    return _result(_pyhoid.from_json(text), (), (first.get("input", ""), first.get("output", "")))
+
+
+def _records(text: str) -> list[dict[str, Any]]:
+    try:
+        records = json.loads(text)["records"]
+    except (ValueError, KeyError, TypeError):
+        return []
+    return records if isinstance(records, list) else []
+
+
+def _result(
+    native: Any, records: Sequence[Record], units: tuple[str, str] | None = None
+) -> OperatorFit | Fit | TimeVaryingFit:
+    if isinstance(native, _pyhoid.TimeVaryingFit):
+        return TimeVaryingFit(native, records, units=units)
+    if isinstance(native, _pyhoid.OperatorFit):
+        return OperatorFit(native, records, units=units)
+    return Fit(native, records, units=units)
 
 
 def identify_operator(

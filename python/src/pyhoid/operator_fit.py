@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
@@ -10,9 +9,8 @@ from typing import TYPE_CHECKING, Any
 from . import _pyhoid, _text
 from ._arrays import FloatArray
 from ._decimation import said
-from ._faults import faults_of, used
-from ._pickling import Call, recalled, state_of
-from .estimates import Estimate, channel_units, estimates, unit_of
+from ._results import Result
+from .estimates import Estimate, estimates, unit_of
 from .fit import Fit
 from .operator_parameters import OperatorParameter, OperatorParameters
 from .record import Record
@@ -23,11 +21,7 @@ if TYPE_CHECKING:
 
 __all__ = ["OperatorFit"]
 
-#: What a pickle keeps of the native side, beside what is read from it at once.
-_ANSWERS = ("title", "parameters", "figures")
-
-
-class OperatorFit:
+class OperatorFit(Result):
     """The operator of a person. `identify` makes it.
 
     Attributes
@@ -108,20 +102,17 @@ class OperatorFit:
     def __init__(
         self,
         native: _pyhoid.OperatorFit,
-        records: Sequence[Record],
+        records: Sequence[Record] = (),
         settings: Mapping[str, Any] | None = None,
-        call: Call | None = None,
+        units: tuple[str, str] | None = None,
     ) -> None:
-        self._native = native
-        self._call = call
-        self.settings: dict[str, Any] = dict(settings or {})
-        self.records: tuple[Record, ...] = used(native, records)
+        super().__init__(native, records, settings, units)
         self.form, self.neuromuscular = native.form
         self.operators: tuple[OperatorParameters, ...] = tuple(
             OperatorParameters(
                 {
                     name: OperatorParameter(
-                        value, error, interval, share, determined, unit_of(name, self.records, unit)
+                        value, error, interval, share, determined, unit_of(name, self.units, unit)
                     )
                     for name, unit, value, error, interval, share, determined in of
                 }
@@ -130,7 +121,6 @@ class OperatorFit:
         )
         self.parameters = self.operators[0]
         self.verdict = Verdict(*native.verdict)
-        self.faults: list[dict[str, Any]] = faults_of(native)
         self.forms: list[dict[str, Any]] = native.forms
         self.lines = native.lines
         if self.lines is not None:
@@ -183,16 +173,10 @@ class OperatorFit:
                 native.fit(k),
                 self.records[k : k + 1] if several else self.records,
                 self.settings,
-                call and call.to(k),
+                self.units,
             )
             for k in range(len(self.operators))
         )
-
-    def __getstate__(self) -> dict[str, Any]:
-        return state_of(self, _ANSWERS)
-
-    def __setstate__(self, state: Any) -> None:
-        recalled(self, state, _ANSWERS)
 
     @property
     def fit(self) -> Fit:
@@ -203,62 +187,6 @@ class OperatorFit:
     def converged(self) -> bool:
         """Whether the search converged."""
         return bool(self.termination["converged"])
-
-    def to_json(self) -> str:
-        """The fit as text for a file that is a prior elsewhere.
-
-        ``pyhoid.track(record, prior=fit)`` takes the fit itself; a file of this text is read by
-        ``hoid track --prior``, ``hoid stream --prior`` and ``hoid identify --prior``. The keys are
-        those of ``hoid identify --json``, not all of them.
-
-        Examples
-        --------
-        >>> from pathlib import Path
-        >>> Path("person.json").write_text(person.to_json())
-        """
-        input_unit, output_unit = channel_units(self.records[0]) if self.records else ("", "")
-
-        def number(value: float | None) -> float | None:
-            return value if value is not None and math.isfinite(value) else None
-
-        return json.dumps(
-            {
-                "structure": "grey-box",
-                "form": self.form,
-                "neuromuscular": self.neuromuscular,
-                "verdict": {
-                    "level": self.verdict.level,
-                    "reasons": list(self.verdict.reasons),
-                },
-                "records": [
-                    {
-                        "sample_time": self.sample_time,
-                        "units": {
-                            "input": input_unit,
-                            "output": output_unit,
-                        },
-                    }
-                ],
-                "parameters": [
-                    {
-                        "name": name,
-                        "value": number(p.value),
-                        "standard_error": number(p.standard_error),
-                        "determined": p.determined,
-                    }
-                    for name, p in self.parameters.items()
-                ],
-                "noise": {name: values.tolist() for name, values in self.noise.items()},
-                "innovation_variance": self.innovation_variance,
-                "covariance": None
-                if self.covariance is None
-                else {
-                    "coordinates": list(self.coordinates),
-                    "values": list(self.coordinates.values()),
-                    "matrix": self.covariance.tolist(),
-                },
-            }
-        )
 
     def to_pandas(self) -> pd.DataFrame:
         """The parameters as a table.

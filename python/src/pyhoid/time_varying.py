@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from . import _faults, _pyhoid, _text
+from . import _pyhoid, _text
 from ._arrays import FloatArray, signal
+from ._results import Result
 from .estimates import Estimate, Operator
 from .fit import Series
-from ._pickling import Call, recalled, state_of
 from .record import Record
 from .verdict import Verdict
 
@@ -21,22 +20,7 @@ if TYPE_CHECKING:
 __all__ = ["TimeVaryingFit"]
 
 
-#: What a pickle keeps of the native side.
-_ANSWERS = (
-    "form",
-    "parameters",
-    "covariance",
-    "figures",
-    "termination",
-    "change",
-    "initial",
-    "last",
-    "verdict",
-    "levels",
-)
-
-
-class TimeVaryingFit:
+class TimeVaryingFit(Result):
     """A fitted operator whose gains change once, along a sigmoid.
 
     `identify` makes it with ``change="sigmoid"``.
@@ -47,27 +31,9 @@ class TimeVaryingFit:
     >>> fit.change, fit.initial, fit.last
     """
 
-    def __init__(
-        self,
-        native: _pyhoid.TimeVaryingFit,
-        records: Sequence[Record],
-        settings: Mapping[str, Any] | None = None,
-        call: Call | None = None,
-    ) -> None:
-        self._native = native
-        self._call = call
-        self.records: tuple[Record, ...] = _faults.used(native, records)
-        self.settings: dict[str, Any] = dict(settings or {})
-        #: Faults of the records that were looked for: kind, channel, from, to, size, action.
-        self.faults: list[dict[str, Any]] = _faults.faults_of(native)
+    _native: _pyhoid.TimeVaryingFit
 
-    def __getstate__(self) -> dict[str, Any]:
-        return state_of(self, _ANSWERS)
-
-    def __setstate__(self, state: Any) -> None:
-        recalled(self, state, _ANSWERS)
-
-    structure = "time-varying"
+    structure = "operator"
 
     @property
     def form(self) -> str:

@@ -13,7 +13,7 @@ import numpy.typing as npt
 from . import _options, _pyhoid, _text
 from ._arrays import FloatArray
 from ._decimation import said
-from .estimates import Estimate, Operator, unit_of
+from .estimates import Estimate, Operator, channel_units, unit_of
 from ._pickling import Call, recalled, state_of
 from .fit import Fit
 from .record import Record
@@ -207,7 +207,7 @@ class Trace:
         native = self._native.start
         if native is None:
             return None
-        return Fit(native, [self.record], call=self._call and self._call.to("start"))
+        return Fit(native, [self.record])
 
     def operator(self, row: int = -1) -> Operator | None:
         """The operator of a row, by default the last.
@@ -215,7 +215,7 @@ class Trace:
         >>> trace.operator()
         """
         found = self._native.operator(row if row >= 0 else row + len(self))
-        return None if found is None else Operator(found, [self.record])
+        return None if found is None else Operator(found, channel_units([self.record]))
 
     def to_pandas(self) -> pd.DataFrame:
         """All columns with the time in s as index.
@@ -240,7 +240,7 @@ class Trace:
         """The unit of a column."""
         base = name.removesuffix("_se")
         of_response = {"gain_db": "dB", "phase_deg": "deg"}.get(base.partition("@")[0])
-        return of_response or unit_of(base, [self.record])
+        return of_response or unit_of(base, channel_units([self.record]))
 
     def to_xarray(self) -> xr.Dataset:
         """All columns over the coordinate ``t`` (s).

@@ -16,9 +16,10 @@ mod sigmoid;
 use std::{collections::BTreeMap, ops::RangeInclusive};
 
 use hoid_ident::{Constraint, SearchOptions, frequency::Description};
-use hoid_model::{Detrend, Verdict};
+use hoid_model::{Detrend, SampleTime, Verdict};
 
 pub use polynomials::{PolynomialFit, Polynomials};
+pub(crate) use remnant::ORDERS as REMNANT_ORDERS;
 
 use crate::{AnalysisError, identification::Identification, recordings::Recordings, settings::Setting};
 
@@ -37,6 +38,12 @@ pub trait BatchEstimator: Sized {
 
     /// What it says of initial states.
     fn initial_state(&self) -> &'static str;
+
+    /// The same estimator with its defaults.
+    fn by_default(&self) -> Self;
+
+    /// Its own settings as they are printed, at a sample time.
+    fn settings(&self, sample_time: SampleTime) -> Vec<Setting>;
 
     /// Fits recordings that have been repaired and are at their rate; takes out of them what it fits without.
     ///
@@ -59,8 +66,10 @@ pub struct Fitted<F> {
     pub described: Option<Description>,
     /// What was taken out of e and u for it.
     pub taken_out: Detrend,
-    /// Its own settings, as they were used.
-    pub settings: Vec<Setting>,
+    /// The estimator as it was used.
+    pub used: Vec<Setting>,
+    /// What was found of what was left open.
+    pub found: Vec<Setting>,
 }
 
 /// A range as users write it.

@@ -6,7 +6,7 @@ use hoid_ident::{
     family::{FamilyEstimator, FamilyFit},
     judgement::second_opinion,
 };
-use hoid_model::{Detrend, FaultHandling, Form, Verdict};
+use hoid_model::{Detrend, FaultHandling, Form, SampleTime, Verdict};
 
 use super::{BatchEstimator, Fitted, delay, range};
 use crate::{
@@ -23,6 +23,36 @@ impl BatchEstimator for FamilyEstimator {
 
     fn initial_state(&self) -> &'static str {
         self.initial_state.name()
+    }
+
+    fn by_default(&self) -> Self {
+        Self::default()
+    }
+
+    fn settings(&self, _sample_time: SampleTime) -> Vec<Setting> {
+        let names: Vec<&str> = self.forms.iter().map(|form: &Form| form.name()).collect();
+        let form = match names.as_slice() {
+            [only] => (*only).to_owned(),
+            all => format!("auto of {}", all.join(", ")),
+        };
+        let mut list = vec![
+            Setting::new("structure", "operator"),
+            Setting::new("form", form),
+            Setting::new("neuromuscular", if self.neuromuscular { "yes" } else { "no" }),
+            Setting::new("prior", self.prior.to_string()),
+            Setting::new(
+                "noise orders",
+                format!("nc={}, nd={}, by AIC", range(&self.nc), range(&self.nd)),
+            ),
+            delay(self.delay_range_s),
+            Setting::new("taken out of e and u", self.detrend.to_string()),
+            Setting::new("variation from run to run", self.run_to_run.to_string()),
+        ];
+        if !self.individual.is_empty() {
+            let names: Vec<&str> = self.individual.iter().map(|c| c.parameter()).collect();
+            list.push(Setting::new("individual", names.join(", ")));
+        }
+        list
     }
 
     fn fit(with: &Identification<Self>, data: &mut Recordings) -> Result<Fitted<FamilyFit>, AnalysisError> {
@@ -53,10 +83,10 @@ impl BatchEstimator for FamilyEstimator {
             verdict = verdict.and(fit.loop_finding(0, element));
         }
         let described = described.ok().flatten();
-        let mut settings = settings(&estimator);
-        if let Some(channel) = described.as_ref().and_then(|d| d.channel.clone()) {
-            settings.push(Setting::new("excitation", channel));
-        }
+        let channel = described.as_ref().and_then(|d| d.channel.clone());
+        let is_named = with.excitation.named().is_some();
+        let found = channel.map(|channel| Setting::new("excitation", channel).given(is_named));
+        let used = estimator.settings(fit.sample_time);
         if estimator.detrend == Detrend::Mean {
             levels_into(&mut data.accounts, &data.records, |k, record| {
                 fit.operator(k).polynomial_fit.level(record)
@@ -70,37 +100,12 @@ impl BatchEstimator for FamilyEstimator {
             verdict,
             described,
             taken_out: estimator.detrend,
-            settings,
+            used,
+            found: found.into_iter().collect(),
         })
     }
 
     fn judged(fit: &mut FamilyFit, verdict: &Verdict) {
         fit.verdict = verdict.clone();
     }
-}
-
-fn settings(estimator: &FamilyEstimator) -> Vec<Setting> {
-    let names: Vec<&str> = estimator.forms.iter().map(|form: &Form| form.name()).collect();
-    let form = match names.as_slice() {
-        [only] => (*only).to_owned(),
-        all => format!("auto of {}", all.join(", ")),
-    };
-    let mut list = vec![
-        Setting::new("structure", "operator"),
-        Setting::new("form", form),
-        Setting::new("neuromuscular", if estimator.neuromuscular { "yes" } else { "no" }),
-        Setting::new("prior", estimator.prior.to_string()),
-        Setting::new(
-            "noise orders",
-            format!("nc={}, nd={}, by AIC", range(&estimator.nc), range(&estimator.nd)),
-        ),
-        delay(estimator.delay_range_s),
-        Setting::new("taken out of e and u", estimator.detrend.to_string()),
-        Setting::new("variation from run to run", estimator.run_to_run.to_string()),
-    ];
-    if !estimator.individual.is_empty() {
-        let names: Vec<&str> = estimator.individual.iter().map(|c| c.parameter()).collect();
-        list.push(Setting::new("individual", names.join(", ")));
-    }
-    list
 }

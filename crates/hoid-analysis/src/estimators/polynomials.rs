@@ -35,7 +35,7 @@ pub struct Polynomials {
 }
 
 /// A polynomial model, and the table that it was chosen from where something was searched.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub struct PolynomialFit {
     /// The model.
     pub fit: Fit,
@@ -106,16 +106,41 @@ impl Polynomials {
             ..self.template.clone()
         })
     }
+}
 
-    fn settings(&self, ranges: &OrderRanges) -> Vec<Setting> {
+impl BatchEstimator for Polynomials {
+    type Fit = PolynomialFit;
+
+    fn counts_samples(&self) -> bool {
+        true
+    }
+
+    fn search(&self) -> &SearchOptions {
+        &self.template.search
+    }
+
+    fn initial_state(&self) -> &'static str {
+        self.template.initial_state.map_or("auto", InitialState::name)
+    }
+
+    fn by_default(&self) -> Self {
+        Self::new(self.template.structure)
+    }
+
+    fn settings(&self, sample_time: SampleTime) -> Vec<Setting> {
         let template = &self.template;
         let start = self.start.as_ref();
         let start = start.map_or("own".to_owned(), |start| {
             named(start.iter().map(|(name, v)| (name, *v)))
         });
         let mut list = vec![
-            Setting::new("structure", template.structure.name()),
-            Setting::new("orders", ranges.to_string()),
+            // The default is no polynomial structure: whoever has one asked for it.
+            Setting::new("structure", template.structure.name()).given(true),
+            Setting::new(
+                "orders",
+                self.ranges(sample_time)
+                    .map_or_else(|_| String::new(), |ranges| ranges.to_string()),
+            ),
             Setting::new("criterion", self.criterion.to_string()),
             Setting::new("focus", template.focus.to_string()),
             Setting::new("start", start),
@@ -150,22 +175,6 @@ impl Polynomials {
         list.extend(constraints(&template.constraints));
         list
     }
-}
-
-impl BatchEstimator for Polynomials {
-    type Fit = PolynomialFit;
-
-    fn counts_samples(&self) -> bool {
-        true
-    }
-
-    fn search(&self) -> &SearchOptions {
-        &self.template.search
-    }
-
-    fn initial_state(&self) -> &'static str {
-        self.template.initial_state.map_or("auto", InitialState::name)
-    }
 
     fn fit(with: &Identification<Self>, data: &mut Recordings) -> Result<Fitted<PolynomialFit>, AnalysisError> {
         let how = &with.estimator;
@@ -174,14 +183,15 @@ impl BatchEstimator for Polynomials {
         let ranges = how.ranges(records[0].sample_time())?;
         let combinations = ranges.combinations()?;
         let estimator = how.estimator(&combinations)?;
-        let mut settings = how.settings(&ranges);
+        let used = how.settings(records[0].sample_time());
+        let mut found = Vec::new();
         let told = progress::counter("candidates", combinations.len());
         let (mut fit, choice) = fit_or_choose(&estimator, &ranges, how.criterion, records, &told)?;
         if let Some(method) = how.method {
             let instruments = how.instruments.clone().unwrap_or_else(|| Instruments::usual(records));
-            settings.push(Setting::new("method", format!("{method}, {instruments}")));
+            found.push(Setting::new("method", format!("{method}, {instruments}")).given(true));
             if choice.is_some() {
-                settings.push(Setting::new("orders chosen by", "the prediction error method"));
+                found.push(Setting::new("orders chosen by", "the prediction error method"));
             }
             let instrumental = InstrumentalVariable {
                 instruments,
@@ -200,13 +210,14 @@ impl BatchEstimator for Polynomials {
                 verdict = verdict.and(second_opinion::of_level(&estimator, &fit, records));
             }
         }
-        settings.extend(level.told(data, |_, record| fit.level(record)));
+        found.extend(level.told(data, |_, record| fit.level(record)));
         Ok(Fitted {
             fit: PolynomialFit { fit, choice },
             verdict,
             described: None,
             taken_out: level.detrend(),
-            settings,
+            used,
+            found,
         })
     }
 }

@@ -2,7 +2,7 @@
 //! of two persons.
 
 use hoid_ident::{InitialState, SearchOptions, SigmoidChange, SigmoidFit, judgement::second_opinion};
-use hoid_model::{Detrend, FaultHandling};
+use hoid_model::{Detrend, FaultHandling, SampleTime};
 
 use super::{BatchEstimator, Fitted, constraints, delay};
 use crate::{
@@ -24,6 +24,24 @@ impl BatchEstimator for SigmoidChange {
         InitialState::Estimate.name()
     }
 
+    fn by_default(&self) -> Self {
+        Self::default()
+    }
+
+    fn settings(&self, _sample_time: SampleTime) -> Vec<Setting> {
+        let mut settings = vec![
+            Setting::new("structure", "operator"),
+            Setting::new("change", "sigmoid"),
+            Setting::new("form", self.form.name()),
+            Setting::new("neuromuscular", if self.neuromuscular { "yes" } else { "no" }),
+            Setting::new("prior", self.prior.to_string()),
+            Setting::new("orders", format!("nd={}", self.nd)),
+            delay(self.delay_range_s),
+        ];
+        settings.extend(constraints(&self.constraints));
+        settings
+    }
+
     fn fit(with: &Identification<Self>, data: &mut Recordings) -> Result<Fitted<SigmoidFit>, AnalysisError> {
         let estimator = Self {
             level: may_have_level(data, true, with.faults),
@@ -34,26 +52,16 @@ impl BatchEstimator for SigmoidChange {
         if with.faults != FaultHandling::Keep {
             verdict = verdict.and(second_opinion::of_sigmoid(&estimator, &fit, &data.records));
         }
-        let mut settings = vec![
-            Setting::new("structure", "operator"),
-            Setting::new("change", "sigmoid"),
-            Setting::new("form", estimator.form.name()),
-            Setting::new("neuromuscular", if estimator.neuromuscular { "yes" } else { "no" }),
-            Setting::new("prior", estimator.prior.to_string()),
-            Setting::new("orders", format!("nd={}", estimator.nd)),
-            delay(estimator.delay_range_s),
-        ];
-        settings.extend(constraints(&estimator.constraints));
         if estimator.level {
             levels_into(&mut data.accounts, &data.records, |_, record| fit.level(record));
-            settings.push(Setting::level());
         }
         Ok(Fitted {
             fit,
             verdict,
             described: None,
             taken_out: Detrend::None,
-            settings,
+            used: estimator.settings(data.records[0].sample_time()),
+            found: estimator.level.then(Setting::level).into_iter().collect(),
         })
     }
 }

@@ -107,7 +107,7 @@ fn to_family(args: &ConvertArgs, f: &[f64], b: &[f64], sample_time: SampleTime) 
         json::print(&json!({
             "sample_time": json::number(sample_time.s()),
             "discrete": {"f": f, "b": b, "nk": args.nk},
-            "operator": family_operator::to_json(&found),
+            "operator": json::of_family(&found),
         }))?;
     } else {
         output::show(&family_operator::to_text(&found, &GainUnit::default()))?;

@@ -83,8 +83,11 @@ pub fn by_channel<T: Clone>(option: &str, typed: &[(String, T)]) -> Result<BTree
 }
 
 /// Settings as the rows of a table.
-pub fn rows(settings: Vec<Setting>) -> Vec<(String, String)> {
-    settings.into_iter().map(|one| (one.name, one.value)).collect()
+pub fn rows(settings: &[Setting]) -> Vec<(String, String)> {
+    settings
+        .iter()
+        .map(|one| (one.name.clone(), one.value.clone()))
+        .collect()
 }
 
 /// What was done to the records and what is wrong with their files, as rows of a table of settings.

@@ -103,3 +103,10 @@ pub fn physical<'a>(arguments: &[&'a str]) -> Vec<&'a str> {
     }
     all
 }
+
+/// The value of a setting in a result.
+pub fn setting(found: &Value, name: &str) -> String {
+    let all = found["settings"].as_array().unwrap();
+    let one = all.iter().find(|one| one["name"] == name).unwrap();
+    one["value"].as_str().unwrap().to_owned()
+}

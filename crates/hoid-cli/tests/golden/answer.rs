@@ -11,7 +11,7 @@ use serde_json::{Map, Value, json};
 use super::manifest::Call;
 
 /// Keys without an answer.
-const VOLATILE: [&str; 3] = ["hoid", "seconds", "threads"];
+const VOLATILE: [&str; 4] = ["hoid", "seconds", "state", "threads"];
 /// Lists that are longer are kept in part.
 const LONG: usize = 24;
 /// Rows of a table that are kept, about.

@@ -3,7 +3,7 @@
 use hoid_model::Orders;
 
 /// What is assumed about the time before a record.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 pub enum InitialState {
     /// Input, output and innovations were zero.
     Zero,

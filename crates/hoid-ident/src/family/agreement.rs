@@ -34,7 +34,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 use crate::linalg::least_squares::{dot, solve_symmetric};
 
 /// A method that is held against others.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum AgreementMethod {
     /// Prediction error.
     PredictionError,
@@ -65,7 +65,7 @@ impl AgreementMethod {
 }
 
 /// Methods side by side.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Agreement {
     /// Each coordinate that counts, by all methods.
     pub rows: Vec<AgreementRow>,
@@ -78,7 +78,7 @@ pub struct Agreement {
 }
 
 /// One coordinate of all methods.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct AgreementRow {
     /// The coordinate.
     pub coordinate: Coordinate,
@@ -96,7 +96,7 @@ impl AgreementRow {
 }
 
 /// Two methods.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct AgreementPair {
     /// Which.
     pub methods: (AgreementMethod, AgreementMethod),

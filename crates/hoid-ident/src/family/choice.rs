@@ -18,7 +18,7 @@
 use hoid_model::Form;
 
 /// What a form is judged by.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct FormFigures {
     /// The form.
     pub form: Form,

@@ -33,7 +33,7 @@ pub(super) fn quantile(clusters: usize) -> f64 {
 }
 
 /// What the clusters are.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum ClusterKind {
     /// Each record is one.
     Runs,

@@ -57,7 +57,7 @@ const SETTLED: f64 = 0.01;
 const HALVINGS: usize = 6;
 
 /// The operator by refined instrumental variables.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct InstrumentalFit {
     /// The operator.
     pub operator: FamilyOperator,

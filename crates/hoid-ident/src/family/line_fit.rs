@@ -13,7 +13,7 @@ use crate::{IdentError, SearchOptions, Termination};
 const FEWEST_RUNS: usize = 5;
 
 /// A fit of one form at the lines.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct LineFit {
     /// The operator.
     pub operator: FamilyOperator,

@@ -21,12 +21,13 @@ const LARGEST_PRIOR_SHARE: f64 = 0.5;
 const LARGEST_LOG_ERROR: f64 = 0.35;
 
 /// One parameter of an operator.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Parameter {
     /// K, K_over_T_I, T_L, T_I, omega_nm, zeta_nm, tau_e ...
     pub name: String,
     /// Its unit.
-    pub unit: &'static str,
+    #[serde(deserialize_with = "hoid_model::interned::name")]
+    pub unit: hoid_model::interned::Name,
     /// Its value; infinite for T_I of a pure integration.
     pub value: f64,
     /// Standard error, to first order; `None` where there is none.

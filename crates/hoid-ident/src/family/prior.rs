@@ -24,7 +24,7 @@ use crate::{IdentError, grey_box::objective::Penalty};
 const LEAST_SPREAD: f64 = 1e-3;
 
 /// What is known of one parameter.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct ParameterPrior {
     /// `omega_nm`, `zeta_nm`, `tau_e`, `T_L` or `T_I`.
     pub parameter: String,
@@ -37,7 +37,7 @@ pub struct ParameterPrior {
 }
 
 /// What is known of the parameters of an operator before the data.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 pub struct OperatorPrior {
     entries: Vec<ParameterPrior>,
 }

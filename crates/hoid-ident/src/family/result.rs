@@ -19,7 +19,7 @@ use super::{
 use crate::{Fit, Termination};
 
 /// An operator of one or several records.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct OperatorOfRecord {
     /// The operator.
     pub operator: FamilyOperator,
@@ -35,7 +35,7 @@ pub struct OperatorOfRecord {
 }
 
 /// Whether the form can be told from a Box-Jenkins model of the same orders.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct FreeModel {
     /// Loss of Box-Jenkins with the orders and the delay of the fit.
     pub loss: f64,
@@ -48,7 +48,7 @@ pub struct FreeModel {
 }
 
 /// The result of [`super::FamilyEstimator::fit`].
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub struct FamilyFit {
     /// The form that was chosen or given.
     pub form: Form,

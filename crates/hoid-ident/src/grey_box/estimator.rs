@@ -110,13 +110,20 @@ impl GreyBox {
             ..self.search
         };
         let (mut candidates, mut before) = (Vec::new(), None::<GreyBoxFit>);
+        let mut error = None;
         let mut best: Option<(usize, GreyBoxFit)> = None;
         for (i, criterion) in criteria.iter().enumerate() {
             progress::step("remnant orders", i, criteria.len());
             let eta = before.as_ref().map(|fit| fit.eta.as_slice());
             let found = self.fit_order(criterion, &starts, eta, &quick, &mut workspace);
             candidates.push(candidate(criterion, found.as_ref()));
-            before = found.ok();
+            before = match found {
+                Ok(fit) => Some(fit),
+                Err(reason) => {
+                    error.get_or_insert(reason);
+                    None
+                }
+            };
             if let Some(fit) = &before
                 && best.as_ref().is_none_or(|(_, known)| fit.bic() < known.bic())
             {
@@ -124,8 +131,7 @@ impl GreyBox {
             }
         }
         let Some((i, rough)) = best else {
-            let reason = candidates.into_iter().find_map(|c| c.outcome.err());
-            return Err(reason.unwrap_or(IdentError::NoFiniteLoss));
+            return Err(error.unwrap_or(IdentError::NoFiniteLoss));
         };
         let polished = criteria[i].search(rough.eta.clone(), &self.search, None, &mut workspace);
         let fit = match polished {
@@ -295,7 +301,7 @@ impl GreyBox {
 fn candidate(criterion: &PhysicalCriterion<'_, Layout>, found: Result<&GreyBoxFit, &IdentError>) -> OrderCandidate {
     OrderCandidate {
         order: criterion.layout.order,
-        outcome: found.map_err(Clone::clone).map(|fit| OrderFigures {
+        outcome: found.map_err(IdentError::to_string).map(|fit| OrderFigures {
             loss: fit.loss(),
             aic: fit.aic(),
             bic: fit.bic(),

@@ -37,7 +37,7 @@ const TIME_CONSTANT_LIMITS: (f64, f64) = (0.1, 1e4);
 const HIGHEST_FREQUENCY: f64 = 0.999;
 
 /// The second coordinate of the gains.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub(crate) enum Lead {
     /// K_e_dot in s.
     RateGain,
@@ -46,7 +46,7 @@ pub(crate) enum Lead {
 }
 
 /// The parameters as constrained, checked.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub(crate) struct Layout {
     /// Order m of the remnant filter.
     pub order: usize,

@@ -7,21 +7,21 @@ use hoid_model::{
     uncertainty::{Estimate, OperatorEstimate, RemnantEstimate, variance_along},
 };
 
-use crate::{Fit, IdentError, Termination};
+use crate::{Fit, Termination};
 
 use super::layout::{DELAY, LEAD, Layout, Lead, TIME_CONSTANT};
 
 /// One order m of the remnant filter that was tried.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct OrderCandidate {
     /// Order m.
     pub order: usize,
     /// Its figures, all on the same samples, or why it could not be fitted.
-    pub outcome: Result<OrderFigures, IdentError>,
+    pub outcome: Result<OrderFigures, String>,
 }
 
 /// What orders are compared by.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct OrderFigures {
     /// Loss V.
     pub loss: f64,
@@ -34,7 +34,7 @@ pub struct OrderFigures {
 }
 
 /// A fit in physical parameters.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub struct GreyBoxFit {
     pub(crate) layout: Layout,
     pub(crate) eta: Vec<f64>,

@@ -3,7 +3,7 @@
 use std::fmt;
 
 /// How a search ended.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[non_exhaustive]
 pub enum Reason {
     /// A linear problem, solved directly.
@@ -52,7 +52,7 @@ impl fmt::Display for Reason {
 }
 
 /// How a search ended, and after how many steps.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub struct Termination {
     /// Why it ended.
     pub reason: Reason,

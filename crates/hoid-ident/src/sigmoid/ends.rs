@@ -12,18 +12,20 @@ use super::{
 };
 
 /// A parameter with its unit and its error.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct NamedEstimate {
     /// K, T_L, T_I ... as [`FamilyOperator::named`] calls them.
-    pub name: &'static str,
+    #[serde(deserialize_with = "hoid_model::interned::name")]
+    pub name: hoid_model::interned::Name,
     /// Unit; empty for none.
-    pub unit: &'static str,
+    #[serde(deserialize_with = "hoid_model::interned::name")]
+    pub unit: hoid_model::interned::Name,
     /// Estimate.
     pub estimate: Estimate,
 }
 
 /// An operator with the errors of its parameters.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct ChangedOperator {
     /// The operator.
     pub operator: FamilyOperator,

@@ -42,7 +42,7 @@ impl GainsAt {
 }
 
 /// An operator who changes once.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct SigmoidFit {
     layout: Layout,
     sample_time: SampleTime,
@@ -52,6 +52,7 @@ pub struct SigmoidFit {
     /// With ln G and 1/T_I.
     theta: Vec<f64>,
     covariance: Option<Vec<f64>>,
+    #[serde(with = "each_or_none")]
     remarks: Vec<Option<Remark>>,
     midpoint_interval: Option<Interval>,
     rate_interval: Option<Interval>,
@@ -67,6 +68,22 @@ pub struct SigmoidFit {
     initial: ChangedOperator,
     last: ChangedOperator,
     constant: ChangedOperator,
+}
+
+/// A list of which some are missing, as lists of one or none: not every format has a missing element.
+mod each_or_none {
+    use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+    use super::Remark;
+
+    pub fn serialize<S: Serializer>(all: &[Option<Remark>], to: S) -> Result<S::Ok, S::Error> {
+        all.iter().map(Option::as_slice).collect::<Vec<_>>().serialize(to)
+    }
+
+    pub fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<Option<Remark>>, D::Error> {
+        let all = Vec::<Vec<Remark>>::deserialize(from)?;
+        Ok(all.into_iter().map(|mut one| one.pop()).collect())
+    }
 }
 
 impl SigmoidFit {

@@ -22,7 +22,7 @@ use crate::{
 };
 
 /// Why a parameter has no standard error, or none that the data give.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[non_exhaustive]
 pub enum Remark {
     /// It was fixed.
@@ -68,7 +68,7 @@ impl fmt::Display for Remark {
 }
 
 /// The fit against the one without a change.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Comparison {
     /// `n ln(V_0/V_1)`.
     pub likelihood_ratio: f64,

@@ -33,7 +33,7 @@ pub const SIGMOID_NAMES: [(&str, &str); 9] = [
 pub(crate) const MOST_VARYING: usize = 3;
 
 /// Where everything stands in theta.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub(crate) struct Layout {
     pub form: Form,
     pub neuromuscular: bool,

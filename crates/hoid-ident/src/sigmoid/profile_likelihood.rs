@@ -27,7 +27,7 @@ const MOST_POINTS: usize = 40;
 const HALVINGS: usize = 4;
 
 /// Ends of a 95 % interval; the bound of the parameter, or infinity for a rate, where it is open.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub(crate) struct Interval {
     pub low: f64,
     pub high: f64,

@@ -4,7 +4,7 @@
 use crate::linalg::{least_squares::dot, products::variance};
 
 /// Fit percentages on one record.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct GoodnessOfFit {
     /// VAF of the simulated output, %.
     pub vaf_simulation: f64,

@@ -8,7 +8,7 @@ use super::correlation::{Correlation, autocorrelation, centred};
 pub const LARGEST_LAG: usize = 50;
 
 /// Test of Ljung and Box: are the residuals white?
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct LjungBox {
     /// `Q = n (n + 2) sum_k r_k^2/(n - k)` over the lags 1 to [`LARGEST_LAG`].
     pub statistic: f64,

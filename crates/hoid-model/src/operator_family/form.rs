@@ -4,7 +4,7 @@ use super::dual::{Dual, PARTIALS};
 
 /// A form of the operator, without its delay and neuromuscular part; p is the power of the lead, q
 /// that of the lag.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
 pub enum Form {
     /// `K` (p = 0, q = 0).
     Gain,
@@ -42,7 +42,7 @@ const LEAK: f64 = 1e-4;
 
 /// A coordinate in which an operator is fitted. Lag and neuromuscular part are fitted in
 /// coordinates whose estimates are nearly normal also where the data say little.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
 pub enum Coordinate {
     /// K without a lag, `K/T_I` with one.
     Gain,

@@ -29,11 +29,28 @@ pub const PARAMETERS: [(&str, &str); 13] = [
 ];
 
 /// An operator: its form and the values of its coordinates.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+#[serde(try_from = "Written")]
 pub struct FamilyOperator {
     form: Form,
     neuromuscular: bool,
     coordinates: Vec<f64>,
+}
+
+/// An operator as it is written, not yet checked.
+#[derive(serde::Deserialize)]
+struct Written {
+    form: Form,
+    neuromuscular: bool,
+    coordinates: Vec<f64>,
+}
+
+impl TryFrom<Written> for FamilyOperator {
+    type Error = ModelError;
+
+    fn try_from(written: Written) -> Result<Self, ModelError> {
+        Self::new(written.form, written.neuromuscular, &written.coordinates)
+    }
 }
 
 /// `Y(j omega)` and its derivatives along the coordinates.

@@ -6,7 +6,7 @@ use super::held_numerator::Factored;
 pub(super) const SMALLEST_RATIO: f64 = 1e-9;
 
 /// How the remnant filter is taken to discrete time, or was.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 pub enum RemnantDiscretisation {
     /// Exact for noise held over each sample.
     #[default]

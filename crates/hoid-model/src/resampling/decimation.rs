@@ -14,7 +14,7 @@ const WANTED_HZ: f64 = 100.0;
 const ROUNDING: f64 = 1e-6;
 
 /// Whether the rate of a record is lowered, and by how much.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 pub enum Decimation {
     /// Above 200 Hz by the factor that comes nearest to 100 Hz.
     #[default]

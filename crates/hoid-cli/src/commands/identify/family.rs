@@ -9,6 +9,7 @@ use hoid::report::{
     figures::{ModelCurve, describing},
     write_report,
 };
+use serde_json::Value;
 
 use super::{family_form::Found, picture::of_polynomials};
 use crate::{
@@ -28,23 +29,20 @@ pub fn run(
     let model = &identified.fit.operator(0).polynomial_fit;
     let validation = other.map(|other| identified.validated(model, other)).transpose()?;
     let Identified {
-        fit,
-        data,
-        described,
-        settings,
-        ..
-    } = identified;
+        fit, data, described, ..
+    } = &identified;
     let found = Found {
-        fit: &fit,
+        identified: &identified,
+        fit,
         files: &data.names,
         records: &data.records,
         accounts: &data.accounts,
         element: identification.controlled_element.as_ref(),
         validation: validation.as_ref().map(|v| (v.name.as_str(), v.quality)),
-        settings: &reading::rows(settings),
+        settings: &identified.settings,
     };
     if let Some(path) = &args.picture.figure {
-        let svg = match &described {
+        let svg = match described {
             Some(described) => picture(&found, described),
             None => of_polynomials(&fit.operator(0).polynomial_fit, &data.records, None),
         };
@@ -54,7 +52,11 @@ pub fn run(
         report(&found, described.as_ref(), directory)?;
     }
     if args.show.json {
-        json::print(&found.to_json()?)?;
+        let mut object = identified.json()?;
+        if let Some((file, quality)) = &found.validation {
+            object.insert("validation".to_owned(), json::validation(file, quality));
+        }
+        json::print(&Value::Object(object))?;
     } else {
         output::show(&found.page(args.show.verbose)?)?;
     }
@@ -107,7 +109,7 @@ fn report(found: &Found<'_>, described: Option<&Description>, directory: &Path) 
         ("hoid".to_owned(), env!("CARGO_PKG_VERSION").to_owned()),
         ("records".to_owned(), found.files.join(", ")),
     ];
-    facts.extend(found.settings.iter().cloned());
+    facts.extend(reading::rows(found.settings));
     facts.extend(reading::accounts(found.files, found.accounts));
     let report = Report {
         title,

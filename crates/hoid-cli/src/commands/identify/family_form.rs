@@ -1,26 +1,19 @@
-//! The operator of a person, shown to people and to programs.
+//! The operator of a person, shown to people.
 
-use hoid::analysis::Account;
+use hoid::analysis::{Account, Identified, Setting};
 use hoid::ident::{
     MarginEstimates,
-    family::{
-        AgreementMethod, AgreementPair, AgreementRow, ClusterKind, FamilyFit, FormFigures, LoopMeasures,
-        OperatorOfRecord, Parameter,
-    },
+    family::{ClusterKind, FamilyFit, FormFigures, LoopMeasures, OperatorOfRecord, Parameter},
     validation::GoodnessOfFit,
 };
-use hoid::model::{ContinuousTransferFunction, FamilyOperator, GainUnit, Record, uncertainty::Estimate};
+use hoid::model::{ContinuousTransferFunction, GainUnit, Record, uncertainty::Estimate};
 use hoid::report::{Answer, AnswerRow, numbers, sentence};
-use serde_json::{Map, Value, json};
 
-use crate::{
-    error::CliError,
-    json::{self, number, optional},
-    text,
-};
+use crate::{error::CliError, text};
 
 /// Everything that was found.
 pub struct Found<'a> {
+    pub identified: &'a Identified,
     pub fit: &'a FamilyFit,
     pub files: &'a [String],
     /// As they were fitted: without their mean.
@@ -28,7 +21,7 @@ pub struct Found<'a> {
     pub accounts: &'a [Account],
     pub element: Option<&'a ContinuousTransferFunction>,
     pub validation: Option<(&'a str, GoodnessOfFit)>,
-    pub settings: &'a [(String, String)],
+    pub settings: &'a [Setting],
 }
 
 impl Found<'_> {
@@ -75,14 +68,6 @@ impl Found<'_> {
         })
     }
 
-    fn quality(&self) -> Result<GoodnessOfFit, CliError> {
-        let mut validations = Vec::with_capacity(self.records.len());
-        for (k, record) in self.records.iter().enumerate() {
-            validations.push(self.fit.operator(k).polynomial_fit.validate(record)?);
-        }
-        Ok(GoodnessOfFit::pooled(self.records.iter().zip(&validations)))
-    }
-
     /// The answer, and with `verbose` what is behind it.
     pub fn page(&self, verbose: bool) -> Result<String, CliError> {
         let mut page = self.answer()?;
@@ -121,7 +106,7 @@ impl Found<'_> {
             let here = fit.loop_measures(0, element);
             page.push_str(&format!("Open loop with {element}: {}\n", measures(here.as_ref())));
         }
-        let quality = self.quality()?;
+        let quality = self.identified.quality()?;
         let coherence = fit.coherent_share;
         page.push_str(&format!(
             "Fit: VAF of the prediction {:.2} %{}{}.\n",
@@ -233,7 +218,7 @@ impl Found<'_> {
             "Errors by the scatter of {clusters}: variances {:.2} times those of white residuals. Intervals of 95 %, Student's.\n",
             fit.inflation
         ));
-        let quality = self.quality()?;
+        let quality = self.identified.quality()?;
         page.push_str(&format!(
             "VAF prediction {:.2} %; simulation {:.2} %, which says little of people: an operator with a lag integrates offset and \
              drift of e{}.\n",
@@ -266,159 +251,6 @@ impl Found<'_> {
         });
         Ok(page)
     }
-
-    pub fn to_json(&self) -> Result<Value, CliError> {
-        let fit = self.fit;
-        let of = fit.operator(0);
-        let mut map = Map::new();
-        let mut set = |key: &str, value: Value| map.insert(key.to_owned(), value);
-        set("hoid", json!(env!("CARGO_PKG_VERSION")));
-        set("verdict", json::verdict(&fit.verdict));
-        set("records", json::records(self.files, self.records, self.accounts));
-        set("warnings", json::warnings(self.files, self.accounts));
-        set("faults", json::faults(self.files, self.accounts));
-        set("structure", json!("grey-box"));
-        set("form", json!(fit.form.name()));
-        set("neuromuscular", json!(fit.neuromuscular));
-        set("orders", json::orders(&of.polynomial_fit.orders()));
-        set("parameters", of.parameters.iter().map(parameter).collect());
-        if let Some(element) = self.element {
-            set("open_loop", open_loop(fit.loop_measures(0, element).as_ref()));
-        }
-        set("loss", number(fit.loss));
-        set("innovation_variance", number(fit.innovation_variance));
-        set("residuals", json!(fit.residuals));
-        set("termination", json::termination(&fit.termination));
-        let mut quality = json::goodness(&self.quality()?);
-        quality.insert("coherent_share".to_owned(), optional(fit.coherent_share));
-        set("fit", Value::Object(quality));
-        set("operator", operator(of));
-        if fit.operators.len() > 1 {
-            set("operators", fit.operators.iter().map(operator).collect());
-        }
-        set("remnant", Value::Null);
-        set("noise", json!({"c": fit.noise.0, "d": fit.noise.1}));
-        set("forms", fit.forms.iter().map(form_figures).collect());
-        set("lines", self.lines_json());
-        set("riv_bj", self.instrumental_json());
-        set("agreement", self.agreement_json());
-        set(
-            "box_jenkins",
-            fit.free_model.map_or(Value::Null, |free| {
-                json!({
-                    "loss": number(free.loss),
-                    "likelihood_ratio": number(free.likelihood_ratio),
-                    "degrees_of_freedom": free.degrees_of_freedom,
-                    "p_value": number(free.p_value),
-                })
-            }),
-        );
-        set("covariance", covariance(&of.operator, of.covariance.as_deref()));
-        set(
-            "errors",
-            json!({
-                "clusters": fit.clusters,
-                "kind": match fit.cluster_kind {
-                    ClusterKind::Runs => "runs",
-                    ClusterKind::Blocks => "blocks",
-                },
-                "inflation": number(fit.inflation),
-                "largest_ratio_to_model_based": optional(fit.error_ratio),
-                "model_based": covariance(&of.operator, of.model_based.as_deref()),
-            }),
-        );
-        let prior = fit.prior.entries().iter();
-        set(
-            "prior",
-            prior
-                .map(|e| json!({"parameter": e.parameter, "centre": e.centre, "spread": e.spread, "source": e.source}))
-                .collect(),
-        );
-        if let Some((file, q)) = &self.validation {
-            set("validation", json::validation(file, q));
-        }
-        set("candidates", json!([]));
-        set("settings", json::settings(self.settings));
-        Ok(Value::Object(map))
-    }
-
-    fn lines_json(&self) -> Value {
-        let Some(lines) = &self.fit.lines else {
-            return why_not(self.fit.no_lines.as_ref());
-        };
-        let mut map = Map::new();
-        map.insert("parameters".to_owned(), all_named(&lines.parameters()));
-        map.insert("chi2".to_owned(), number(lines.chi_squared));
-        map.insert("degrees_of_freedom".to_owned(), json!(lines.degrees_of_freedom));
-        map.insert("held_out".to_owned(), optional(lines.held_out_total()));
-        map.insert("converged".to_owned(), json!(lines.termination.converged()));
-        if let Some(element) = self.element {
-            let measures = self.fit.loop_measures_at_lines(element);
-            map.insert("open_loop".to_owned(), open_loop(measures.as_ref()));
-        }
-        Value::Object(map)
-    }
-
-    fn instrumental_json(&self) -> Value {
-        let Some(found) = &self.fit.instrumental else {
-            return why_not(self.fit.no_instrumental.as_ref());
-        };
-        let mut map = Map::new();
-        map.insert("parameters".to_owned(), all_named(&found.parameters()));
-        map.insert("nd".to_owned(), json!(found.noise_order));
-        map.insert("converged".to_owned(), json!(found.termination.converged()));
-        map.insert("termination".to_owned(), json!(found.termination.to_string()));
-        if let Some(element) = self.element {
-            let measures = self.fit.loop_measures_by_instruments(element);
-            map.insert("open_loop".to_owned(), open_loop(measures.as_ref()));
-        }
-        Value::Object(map)
-    }
-
-    fn agreement_json(&self) -> Value {
-        self.fit.agreement.as_ref().map_or(Value::Null, |agreement| {
-            let row = |r: &AgreementRow| {
-                let mut map = Map::new();
-                map.insert("coordinate".to_owned(), json!(r.coordinate.name()));
-                for method in [
-                    AgreementMethod::PredictionError,
-                    AgreementMethod::Lines,
-                    AgreementMethod::Instrumental,
-                ] {
-                    let pair = r.of(method).map_or(
-                        Value::Null,
-                        |(value, error)| json!({"value": number(value), "standard_error": number(error)}),
-                    );
-                    map.insert(method.name().to_owned(), pair);
-                }
-                map.insert("difference_in_errors".to_owned(), number(r.difference_in_errors));
-                Value::Object(map)
-            };
-            let pair = |pair: &AgreementPair| {
-                json!({
-                    "methods": [pair.methods.0.name(), pair.methods.1.name()],
-                    "chi2": number(pair.statistic),
-                    "p_value": number(pair.p_value),
-                })
-            };
-            json!({
-                "coordinates": agreement.rows.iter().map(row).collect::<Vec<_>>(),
-                "pairs": agreement.pairs.iter().map(pair).collect::<Vec<_>>(),
-                "chi2": number(agreement.statistic),
-                "p_value": number(agreement.p_value),
-            })
-        })
-    }
-}
-
-/// Of a method that gave nothing: the reason, where there is one.
-fn why_not(reason: Option<&String>) -> Value {
-    reason.map_or(Value::Null, |why| json!({"reason": why}))
-}
-
-/// Estimates in the order of the form, each with its name.
-fn all_named(parameters: &[(&'static str, Estimate)]) -> Value {
-    parameters.iter().map(|(name, e)| json::named(name, e)).collect()
 }
 
 fn named(p: &Parameter, gain: &GainUnit) -> String {
@@ -523,67 +355,4 @@ fn forms(all: &[FormFigures], chosen: &str) -> String {
         ]);
     }
     rows.to_string()
-}
-
-fn parameter(p: &Parameter) -> Value {
-    json!({
-        "name": p.name,
-        "unit": p.unit,
-        "value": number(p.value),
-        "standard_error": optional(p.standard_error),
-        "interval": p.interval.map_or(Value::Null, |(low, high)| json!([number(low), number(high)])),
-        "prior_share": number(p.prior_share),
-        "determined": p.determined,
-    })
-}
-
-/// The operator by the names of its parameters.
-fn operator(of: &OperatorOfRecord) -> Value {
-    let mut map = Map::new();
-    map.insert("convertible".to_owned(), json!(true));
-    map.insert("form".to_owned(), json!(of.operator.form().name()));
-    for p in &of.parameters {
-        let mut value = parameter(p);
-        if let Some(fields) = value.as_object_mut() {
-            fields.remove("name");
-        }
-        map.insert(p.name.clone(), value);
-    }
-    Value::Object(map)
-}
-
-fn open_loop(found: Option<&LoopMeasures>) -> Value {
-    let of = |value: fn(&LoopMeasures) -> Estimate, interval: fn(&LoopMeasures) -> Option<(f64, f64)>| {
-        found.map(|m| json::estimate_within(&value(m), interval(m)))
-    };
-    json!({
-        "crossover_rad_s": of(|m| m.crossover_rad_s, LoopMeasures::crossover_interval),
-        "phase_margin_deg": of(|m| m.phase_margin_deg, LoopMeasures::phase_margin_interval),
-    })
-}
-
-fn form_figures(f: &FormFigures) -> Value {
-    json!({
-        "form": f.form.name(),
-        "loss": optional(f.loss),
-        "criterion": optional(f.criterion),
-        "held_out": optional(f.held_out),
-        "chi2": optional(f.chi_squared),
-        "degrees_of_freedom": f.degrees_of_freedom,
-        "converged": f.converged,
-    })
-}
-
-/// Coordinates with their names and the rows of their covariance.
-fn covariance(operator: &FamilyOperator, covariance: Option<&[f64]>) -> Value {
-    let coordinates = operator.form().coordinates(operator.has_neuromuscular());
-    let p = coordinates.len();
-    let names: Vec<&str> = coordinates.iter().map(|c| c.name()).collect();
-    covariance.map_or(Value::Null, |c| {
-        let rows: Vec<Vec<Value>> = c
-            .chunks(p)
-            .map(|row| row.iter().map(|v| number(*v)).collect())
-            .collect();
-        json!({"coordinates": names, "values": operator.coordinates(), "matrix": rows})
-    })
 }

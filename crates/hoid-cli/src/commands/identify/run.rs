@@ -2,13 +2,17 @@
 
 use std::path::{Path, PathBuf};
 
-use hoid::analysis::{Asked, Recordings};
-use hoid::ident::{
-    Choice, Fit, GreyBoxFit, MarginEstimates,
-    validation::{GoodnessOfFit, nrmse_fit, vaf},
+use hoid::analysis::{
+    Asked, Identified, PolynomialFit, Recordings,
+    json::{BatchAnswer, PolynomialAnswer},
 };
-use hoid::model::{ContinuousTransferFunction, GainUnit, NotConvertible, Record, margins::MANUAL_CONTROL_RANGE_RAD_S};
+use hoid::ident::{
+    Choice, Fit, GreyBoxFit,
+    validation::{nrmse_fit, vaf},
+};
+use hoid::model::{GainUnit, Record};
 use hoid::report::{Answer, ModelSection, Report, known_operator, write_report};
+use serde_json::Value;
 
 use super::{
     family,
@@ -19,9 +23,7 @@ use crate::{
     args::IdentifyArgs,
     commands::{figure, places, reading},
     error::CliError,
-    family_operator::{self, Converted},
-    json::{self, Identified},
-    output, text,
+    family_operator, json, output, text,
 };
 
 pub fn run(args: &IdentifyArgs) -> Result<(), CliError> {
@@ -41,83 +43,42 @@ pub fn run(args: &IdentifyArgs) -> Result<(), CliError> {
         Asked::Operator(identification) => family::run(args, &identification, read, other),
         Asked::Change(identification) => sigmoid::run(args, &identification, read),
         Asked::Remnant(identification) => {
-            let element = identification.controlled_element.as_ref();
             let found = output::watched("fitting", || identification.run(read))?;
-            let beside = Beside {
-                choice: None,
-                grey_box: Some(&found.fit),
-                element,
-            };
-            show(args, &found, found.fit.polynomial_fit(0), beside, other)
+            show(
+                args,
+                &found,
+                found.fit.polynomial_fit(0),
+                (None, Some(&found.fit)),
+                other,
+            )
         }
         Asked::Polynomials(identification) => {
-            let element = identification.controlled_element.as_ref();
             let found = output::watched("fitting", || identification.run(read))?;
-            let beside = Beside {
-                choice: found.fit.choice.as_ref(),
-                grey_box: None,
-                element,
-            };
-            show(args, &found, &found.fit.fit, beside, other)
+            let PolynomialFit { fit, choice } = &found.fit;
+            show(args, &found, fit, (choice.as_ref(), None), other)
         }
     }
 }
 
-/// What is shown with a fit of polynomials.
-#[derive(Clone, Copy)]
-struct Beside<'a> {
-    /// The table that it was chosen from.
-    choice: Option<&'a Choice>,
-    /// The fit in physical parameters that it is written from.
-    grey_box: Option<&'a GreyBoxFit>,
-    /// What the person controls.
-    element: Option<&'a ContinuousTransferFunction>,
-}
-
 /// Writes and prints a fit of polynomials.
-fn show<F>(
+fn show<F: BatchAnswer>(
     args: &IdentifyArgs,
-    found: &hoid::analysis::Identified<F>,
+    found: &Identified<F>,
     fit: &Fit,
-    Beside {
-        choice,
-        grey_box,
-        element,
-    }: Beside<'_>,
+    (choice, grey_box): (Option<&Choice>, Option<&GreyBoxFit>),
     other: Option<Recordings>,
 ) -> Result<(), CliError> {
     let (data, verdict) = (&found.data, &found.verdict);
     let validation = other.map(|other| found.validated(fit, other)).transpose()?;
-    let settings = reading::rows(found.settings.clone());
+    let settings = reading::rows(&found.settings);
     let (records, with_input) = (&data.records, fit.model().structure().has_input());
-    let operator = fit.operator();
-    // Three poles or one are no gain with a lead, but may be another form.
-    let family = match &operator {
-        Err(NotConvertible::OtherOrders { poles: 1..=3, .. }) if with_input => Some(fit.family_operator(None)),
-        _ => None,
-    };
-    let remnant = (fit.orders().nd > 0).then(|| fit.remnant(args.remnant_discretisation));
-    let margins = element.map(|element| loop_margins(fit, element));
-    let validations = records.iter().map(|r| fit.validate(r)).collect::<Result<Vec<_>, _>>()?;
-    let ahead = args.horizon.map(|k| prediction_ahead(fit, records, k)).transpose()?;
-    let identified = Identified {
-        verdict,
-        files: &data.names,
-        records,
-        accounts: &data.accounts,
-        quality: GoodnessOfFit::pooled(records.iter().zip(&validations)),
-        fit,
-        choice,
-        grey_box,
-        operator: &operator,
-        family: family.as_ref().map(family_operator::to_json),
-        remnant: remnant.as_ref(),
-        margins: margins.as_ref(),
-        validations: &validations,
-        ahead,
-        validation: validation.as_ref().map(|v| (v.name.as_str(), v.quality)),
-        settings: &settings,
-    };
+    let mut answer = PolynomialAnswer::of(found, fit)?;
+    (answer.choice, answer.grey_box) = (choice, grey_box);
+    if let Some(found) = &mut answer.remnant {
+        *found = fit.remnant(args.remnant_discretisation);
+    }
+    answer.ahead = args.horizon.map(|k| prediction_ahead(fit, records, k)).transpose()?;
+    answer.validation = validation.as_ref().map(|v| (v.name.as_str(), v.quality));
     let pictured = with_input && (args.report.is_some() || args.picture.figure.is_some());
     let described = pictured.then(|| description(args, data)).flatten();
     if let Some(path) = &args.picture.figure {
@@ -147,12 +108,12 @@ fn show<F>(
                 records,
                 candidates: choice,
                 truth: known_operator(records),
-                margins,
+                margins: answer.margins,
             }],
             notes: Vec::new(),
             answer: Some(Answer {
                 verdict: verdict.clone(),
-                sentence: identified.sentence(),
+                sentence: sentence(&answer),
                 parameters: Vec::new(),
             }),
             pictures: for_page(fit, records, described.as_ref()).into_iter().collect(),
@@ -161,9 +122,9 @@ fn show<F>(
         output::notice("", format!("report: {}", page.display()));
     }
     if args.show.json {
-        json::print(&identified.to_json())?;
+        json::print(&Value::Object(found.with_state(answer.object())))?;
     } else {
-        output::show(&page(&identified, family.as_ref(), args.show.verbose))?;
+        output::show(&page(&answer, args.show.verbose))?;
     }
     CliError::of_verdict(verdict)
 }
@@ -191,16 +152,21 @@ fn prediction_ahead(fit: &Fit, records: &[Record], k: usize) -> Result<(usize, f
     Ok((k, vaf(&measured, &predicted), nrmse_fit(&measured, &predicted)))
 }
 
-fn loop_margins(fit: &Fit, element: &ContinuousTransferFunction) -> MarginEstimates {
-    let (low, high) = MANUAL_CONTROL_RANGE_RAD_S;
-    // The sampled model says nothing above half the sampling frequency.
-    let high = high.min(fit.model().sample_time().nyquist_rad_s());
-    fit.margins(|omega| element.response(omega), (low, high))
+/// The answer in words.
+fn sentence(found: &PolynomialAnswer<'_>) -> Option<String> {
+    let of = found.operator.as_ref().ok().filter(|_| found.has_operator());
+    let named = of.iter().flat_map(|o| o.rows()).map(|(name, _, e)| (name, e.value));
+    let margins = found.margins.as_ref();
+    hoid::report::sentence(
+        named,
+        margins.and_then(|m| m.crossover_rad_s),
+        margins.and_then(|m| m.phase_margin_deg),
+    )
 }
 
 /// The answer, and with `verbose` what is behind it.
-fn page(found: &Identified<'_>, family: Option<&Converted>, verbose: bool) -> String {
-    let mut page = answer(found, family);
+fn page(found: &PolynomialAnswer<'_>, verbose: bool) -> String {
+    let mut page = answer(found);
     if verbose {
         page.push_str(&details(found));
     } else {
@@ -210,18 +176,18 @@ fn page(found: &Identified<'_>, family: Option<&Converted>, verbose: bool) -> St
 }
 
 /// Verdict, parameters with their intervals, fit, and what they are of.
-fn answer(found: &Identified<'_>, family: Option<&Converted>) -> String {
+fn answer(found: &PolynomialAnswer<'_>) -> String {
     let fit = found.fit;
     let gain = found.records.first().map(GainUnit::of).unwrap_or_default();
     let mut page = text::verdict(found.verdict);
     page.push_str(&format!("{}\n", fit.title()));
-    if let Some(words) = found.sentence() {
+    if let Some(words) = sentence(found) {
         page.push_str(&format!("{words}\n"));
     }
-    let operator = match family {
+    let operator = match &found.family {
         _ if !fit.model().structure().has_input() => None,
         Some(family) => Some(family_operator::to_text(family, &gain)),
-        None => Some(text::operator(found.operator, &gain)),
+        None => Some(text::operator(&found.operator, &gain)),
     };
     // Where there is no operator the coefficients are the answer.
     if !found.has_operator() {
@@ -232,13 +198,13 @@ fn answer(found: &Identified<'_>, family: Option<&Converted>) -> String {
     if let Some(grey_box) = found.grey_box {
         page.push_str(&text::other_records(grey_box, found.files, &gain));
     }
-    if let Some(remnant) = found.remnant {
+    if let Some(remnant) = &found.remnant {
         page.push_str(&text::remnant(remnant));
     }
     if let Some(choice) = found.choice {
         page.push_str(&text::delay(choice));
     }
-    if let Some(m) = found.margins {
+    if let Some(m) = &found.margins {
         let whose = match found.grey_box {
             Some(_) if found.files.len() > 1 => format!(" (operator of {})", found.files[0]),
             _ => String::new(),
@@ -265,7 +231,7 @@ fn answer(found: &Identified<'_>, family: Option<&Converted>) -> String {
 }
 
 /// What was tried, coefficients, roots, tests of the residuals, settings.
-fn details(found: &Identified<'_>) -> String {
+fn details(found: &PolynomialAnswer<'_>) -> String {
     let fit = found.fit;
     let mut page = "\n".to_owned();
     if let Some(choice) = found.choice {
@@ -284,7 +250,7 @@ fn details(found: &Identified<'_>) -> String {
     page.push_str(&text::roots(fit));
     // Residuals that are rounding say nothing.
     if fit.covariance().is_some() {
-        page.push_str(&text::residual_tests(found.files, found.validations));
+        page.push_str(&text::residual_tests(found.files, &found.validations));
     }
     page.push_str(&text::levels(found.files, found.accounts));
     page.push_str(&text::settings(found.settings));

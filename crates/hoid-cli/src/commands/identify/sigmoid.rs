@@ -1,38 +1,27 @@
 //! `hoid identify --change sigmoid`: the operator whose gains change once.
 
-use hoid::analysis::{Account, Identification, Identified, Recordings};
+use hoid::analysis::{Account, Identification, Identified, Recordings, Setting};
 use hoid::ident::{
-    ChangedOperator, SigmoidChange, SigmoidFit,
+    SigmoidChange, SigmoidFit,
     validation::{LjungBox, whiteness},
 };
 use hoid::io::write_record;
 use hoid::model::{Channel, Form, GainUnit, Record, Verdict};
 use hoid::report::numbers;
-use serde_json::{Map, Value, json};
+use serde_json::Value;
 
-use crate::{
-    args::IdentifyArgs,
-    commands::reading,
-    error::CliError,
-    json::{self, number},
-    output, text,
-};
+use crate::{args::IdentifyArgs, error::CliError, json, output, text};
 
 pub fn run(
     args: &IdentifyArgs,
     identification: &Identification<SigmoidChange>,
     read: Recordings,
 ) -> Result<(), CliError> {
-    let Identified {
-        fit,
-        verdict,
-        data,
-        settings,
-        ..
-    } = output::watched("fitting", || identification.run(read))?;
+    let identified = output::watched("fitting", || identification.run(read))?;
+    let Identified { fit, verdict, data, .. } = &identified;
     let records = data.records.as_slice();
     if let Some(path) = &args.trace {
-        write_record(path, &trace(&fit, &records[0])?)?;
+        write_record(path, &trace(fit, &records[0])?)?;
         output::message(&format!("trace of {}: {}", args.records[0].display(), path.display()));
     }
     let test = |record: &Record| Ok(whiteness(&fit.residuals(record)?.values, fit.d().len()));
@@ -41,20 +30,20 @@ pub fn run(
         .map(test)
         .collect::<Result<Vec<Option<LjungBox>>, CliError>>()?;
     let found = Found {
-        fit: &fit,
-        verdict: &verdict,
+        fit,
+        verdict,
         files: &data.names,
         records,
         accounts: &data.accounts,
         tests: &tests,
-        settings: &reading::rows(settings),
+        settings: &identified.settings,
     };
     if args.show.json {
-        json::print(&found.to_json())?;
+        json::print(&Value::Object(identified.json()?))?;
     } else {
         output::show(&found.page(args.show.verbose))?;
     }
-    CliError::of_verdict(&verdict)
+    CliError::of_verdict(verdict)
 }
 
 /// What changes over the time of a record, with standard errors where they are all known.
@@ -93,20 +82,6 @@ fn before_and_after(fit: &SigmoidFit) -> String {
     rows.to_string()
 }
 
-/// The operator before or after the change.
-fn operator(of: &ChangedOperator) -> Value {
-    if let Some(lead) = of.lead() {
-        return json::operator(&Ok(lead));
-    }
-    let mut map = Map::new();
-    map.insert("convertible".to_owned(), json!(true));
-    map.insert("form".to_owned(), json!(of.operator.form().name()));
-    for p in &of.parameters {
-        map.insert(p.name.to_owned(), json::estimate(&p.estimate));
-    }
-    Value::Object(map)
-}
-
 /// Everything that was found.
 struct Found<'a> {
     fit: &'a SigmoidFit,
@@ -116,7 +91,7 @@ struct Found<'a> {
     accounts: &'a [Account],
     /// Whiteness of the residuals of each record.
     tests: &'a [Option<LjungBox>],
-    settings: &'a [(String, String)],
+    settings: &'a [Setting],
 }
 
 impl Found<'_> {
@@ -214,63 +189,5 @@ impl Found<'_> {
         }
         page.push_str(&text::settings(settings));
         page
-    }
-
-    fn to_json(&self) -> Value {
-        let Self {
-            fit,
-            verdict,
-            files,
-            records,
-            accounts,
-            tests,
-            settings,
-        } = *self;
-        let parameters: Vec<Value> = fit
-            .parameters()
-            .iter()
-            .map(|p| {
-                json!({
-                    "name": p.name,
-                    "value": number(p.estimate.value),
-                    "standard_error": json::optional(p.estimate.standard_error),
-                    "unit": p.unit,
-                    "remark": p.remark.map(|r| r.to_string()),
-                })
-            })
-            .collect();
-        let t = fit.termination();
-        let c = fit.comparison();
-        let interval = |interval: Option<(f64, f64)>| interval.map_or(Value::Null, |(low, high)| json!([low, high]));
-        let settings: Map<String, Value> = settings.iter().map(|(k, v)| (k.clone(), json!(v))).collect();
-        json!({
-            "hoid": env!("CARGO_PKG_VERSION"),
-            "records": json::records(files, records, accounts),
-            "warnings": json::warnings(files, accounts),
-            "faults": json::faults(files, accounts),
-            "verdict": json::verdict(verdict),
-            "structure": "time-varying",
-            "form": fit.form().name(),
-            "neuromuscular": fit.has_neuromuscular(),
-            "parameters": parameters,
-            "loss": number(fit.loss()),
-            "innovation_variance": number(fit.innovation_variance()),
-            "termination": {"reason": t.reason.to_string(), "converged": t.converged(), "iterations": t.iterations},
-            "start": fit.start(),
-            "residuals": fit.residual_count(),
-            "initial_states": fit.state_count(),
-            "change": {
-                "found": fit.change_found(),
-                "likelihood_ratio": number(c.likelihood_ratio),
-                "extra_parameters": c.extra_parameters,
-                "bic_difference": number(c.bic_difference),
-                "t_M_interval": interval(fit.midpoint_interval()),
-                "G_interval": interval(fit.rate_interval()),
-            },
-            "residual_tests": tests.iter().map(|t| json!({"ljung_box": json::ljung_box(t.as_ref())})).collect::<Vec<_>>(),
-            "initial": operator(fit.initial_operator()),
-            "last": operator(fit.last_operator()),
-            "settings": settings,
-        })
     }
 }

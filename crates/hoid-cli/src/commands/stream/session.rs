@@ -2,6 +2,7 @@
 
 use std::collections::VecDeque;
 
+use hoid::analysis::Setting;
 use hoid::ident::Choice;
 use hoid::model::{Decimator, Finding, SampleTime};
 use hoid::track::{Change, Live, LiveOutcome, Sample, TrackFault, TrackOptions};
@@ -112,13 +113,16 @@ impl Session {
         let mut settings = self.plan.settings(options, choice);
         if let Some(decimator) = &self.decimator {
             let done = decimator.done();
-            settings.push(("rate".to_owned(), format!("{done}, {:.3} s behind", done.lag_s)));
+            settings.push(Setting::new("rate", format!("{done}, {:.3} s behind", done.lag_s)));
         }
         if self.scale != (1.0, 1.0) {
             let (e, u) = self.scale;
-            settings.push(("scale".to_owned(), format!("e times {e}, u times {u}")));
+            settings.push(Setting::new("scale", format!("e times {e}, u times {u}")).given(true));
         }
-        let each: Vec<String> = settings.iter().map(|(k, v)| format!("{k}: {v}")).collect();
+        let each: Vec<String> = settings
+            .iter()
+            .map(|one| format!("{}: {}", one.name, one.value))
+            .collect();
         output::message(&format!("{when}; {}.", each.join("; ")));
     }
 

@@ -1,5 +1,6 @@
 //! A trace as JSON.
 
+use hoid::analysis::Setting;
 use hoid::ident::Fit;
 use hoid::model::{Record, remnant::RemnantDiscretisation};
 use hoid::track::NoCrossover;
@@ -8,7 +9,7 @@ use serde_json::{Map, Value, json};
 use super::result::Tracked;
 use crate::{
     error::CliError,
-    json::{self, Identified, number},
+    json::{self, PolynomialAnswer, number},
 };
 
 impl Tracked<'_> {
@@ -19,22 +20,15 @@ impl Tracked<'_> {
     pub fn to_json(&self) -> Result<Value, CliError> {
         let trace = self.trace;
         let counts = trace.counts();
-        let mut map = Map::new();
+        let mut map = json::envelope(
+            "trace",
+            std::slice::from_ref(&self.file),
+            std::slice::from_ref(self.record),
+            std::slice::from_ref(self.account),
+            self.verdict,
+            self.settings,
+        );
         let mut set = |key: &str, value: Value| map.insert(key.to_owned(), value);
-        set("hoid", json!(env!("CARGO_PKG_VERSION")));
-        set(
-            "records",
-            json::records(
-                std::slice::from_ref(&self.file),
-                std::slice::from_ref(self.record),
-                std::slice::from_ref(self.account),
-            ),
-        );
-        set(
-            "warnings",
-            json::warnings(std::slice::from_ref(&self.file), std::slice::from_ref(self.account)),
-        );
-        set("verdict", json::verdict(self.verdict));
         set("method", json!(trace.options().method.name()));
         set("structure", json!(trace.options().structure.name()));
         set("orders", json::orders(&trace.options().orders));
@@ -88,8 +82,6 @@ impl Tracked<'_> {
             .collect();
         set("rms_relative_error", Value::Object(errors));
         set("trace", json!(self.out));
-        let settings: Map<String, Value> = self.settings.iter().map(|(k, v)| (k.clone(), json!(v))).collect();
-        set("settings", Value::Object(settings));
         Ok(Value::Object(map))
     }
 
@@ -98,9 +90,9 @@ impl Tracked<'_> {
         let records = std::slice::from_ref(span);
         let validation = fit.validate(span)?;
         let verdict = fit.verdict(records, self.choice)?;
-        let operator = fit.operator();
         let remnant = (fit.orders().nd > 0).then(|| fit.remnant(RemnantDiscretisation::ZeroOrderHold));
-        Ok(Identified {
+        let words = format!("{} to {}", span.time_s(0), span.time_s(span.len()));
+        let answer = PolynomialAnswer {
             verdict: &verdict,
             files: std::slice::from_ref(&self.file),
             records,
@@ -109,19 +101,16 @@ impl Tracked<'_> {
             choice: self.choice,
             grey_box: None,
             quality: validation.quality,
-            operator: &operator,
+            operator: fit.operator(),
             family: None,
-            remnant: remnant.as_ref(),
+            remnant,
             margins: None,
-            validations: std::slice::from_ref(&validation),
+            validations: vec![validation],
             ahead: None,
             validation: None,
-            settings: &[(
-                "span in s".to_owned(),
-                format!("{} to {}", span.time_s(0), span.time_s(span.len())),
-            )],
-        }
-        .to_json())
+            settings: &[Setting::new("span in s", words)],
+        };
+        Ok(Value::Object(answer.object()))
     }
 
     fn last_json(&self) -> Value {

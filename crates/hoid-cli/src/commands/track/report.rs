@@ -9,7 +9,10 @@ use hoid::report::{
 use super::result::Tracked;
 use crate::{
     args::TrackArgs,
-    commands::{figure, reading::accounts},
+    commands::{
+        figure,
+        reading::{accounts, rows},
+    },
     error::CliError,
     output,
 };
@@ -26,7 +29,7 @@ pub fn write(args: &TrackArgs, tracked: &Tracked<'_>, batch: &[BatchFit]) -> Res
         ("hoid".to_owned(), env!("CARGO_PKG_VERSION").to_owned()),
         ("record".to_owned(), tracked.file.clone()),
     ];
-    settings.extend(tracked.settings.iter().cloned());
+    settings.extend(rows(tracked.settings));
     settings.extend(accounts(
         std::slice::from_ref(&tracked.file),
         std::slice::from_ref(tracked.account),

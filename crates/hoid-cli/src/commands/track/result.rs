@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use hoid::analysis::Account;
+use hoid::analysis::{Account, Setting};
 use hoid::ident::{Choice, Fit};
 use hoid::io::{ColumnValues, OutputColumn, OutputTable};
 use hoid::model::{NotConvertible, Record, Verdict, uncertainty::OperatorEstimate};
@@ -26,7 +26,7 @@ pub struct Tracked<'a> {
     pub covariance: Option<&'a (String, CovarianceChoice)>,
     /// The file of the trace.
     pub out: String,
-    pub settings: &'a [(String, String)],
+    pub settings: &'a [Setting],
 }
 
 /// Rows without an operator and their most frequent reason.
@@ -68,7 +68,7 @@ impl Tracked<'_> {
             "units: t s, T_L s, omega_nm rad/s; gains are u by e; gain_db@W dB and phase_deg@W deg at W rad/s; _se are standard errors"
                 .to_owned(),
         ];
-        comments.extend(self.settings.iter().map(|(k, v)| format!("{k}: {v}")));
+        comments.extend(self.settings.iter().map(|one| format!("{}: {}", one.name, one.value)));
         comments.extend(
             self.account
                 .quality_issues

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use hoid::analysis::{Recordings, findings_of_quality};
+use hoid::analysis::{Recordings, Setting, findings_of_quality};
 use hoid::io::{check_table_path, write_table};
 use hoid::model::Record;
 use hoid::track::{
@@ -116,42 +116,37 @@ pub fn run(args: &TrackArgs) -> Result<(), CliError> {
             choice.span_s.1,
             choice.vaf()
         );
-        settings.push(("covariance chosen".to_owned(), words));
+        settings.push(Setting::new("covariance chosen", words));
     }
     if let (Some((file, _)), true) = (&validation, args.update_covariance) {
-        settings.push((
-            "covariance updated".to_owned(),
-            format!("by what the estimate explains of {file}, VAF"),
-        ));
+        let words = format!("by what the estimate explains of {file}, VAF");
+        settings.push(Setting::new("covariance updated", words).given(true));
     }
-    settings.push((
-        "start".to_owned(),
-        match &options.start {
-            _ if options.method.starts_itself() => options.start_in_words(),
-            StartAt::Span(Some((from, to))) => format!("batch fit of {from:.2} to {to:.2} s"),
-            StartAt::Span(None) => "batch fit of the first third".to_owned(),
-            StartAt::Theta(_) => "given".to_owned(),
-            StartAt::Nothing => "nothing".to_owned(),
-        },
-    ));
+    let words = match &options.start {
+        _ if options.method.starts_itself() => options.start_in_words(),
+        StartAt::Span(Some((from, to))) => format!("batch fit of {from:.2} to {to:.2} s"),
+        StartAt::Span(None) => "batch fit of the first third".to_owned(),
+        StartAt::Theta(_) => "given".to_owned(),
+        StartAt::Nothing => "nothing".to_owned(),
+    };
+    let given = args.recursion.start.is_some() || args.start_span.is_some();
+    settings.push(Setting::new("start", words).given(given));
     if trace.idle_s() > 0.0 {
         let words = format!("{:.2} s, in which neither e nor u moves", trace.idle_s());
-        settings.push(("idle head".to_owned(), words));
+        settings.push(Setting::new("idle head", words));
     }
     if options.method.smooths() {
-        settings.push(("estimate".to_owned(), "two-sided, of the whole record".to_owned()));
+        settings.push(Setting::new("estimate", "two-sided, of the whole record"));
     } else {
-        settings.push((
-            "estimate moves from".to_owned(),
-            format!("{:.2} s", trace.updated_from_s()),
-        ));
+        let words = format!("{:.2} s", trace.updated_from_s());
+        settings.push(Setting::new("estimate moves from", words).given(args.update_from.is_some()));
     }
     if rows > 1 {
         let lag = (rows - 1) as f64 / 2.0 * every as f64 * record.sample_time().s();
-        settings.push(("moving average".to_owned(), format!("{rows} rows, lags by {lag:.3} s")));
+        settings.push(Setting::new("moving average", format!("{rows} rows, lags by {lag:.3} s")).given(true));
     }
-    settings.extend(reading::rows(reading.settings(rate)));
-    settings.push(("rows of the trace".to_owned(), format!("every {every} samples")));
+    settings.extend(reading.settings(rate));
+    settings.push(Setting::new("rows of the trace", format!("every {every} samples")).given(args.every != 1));
 
     let verdict = trace.verdict(record, choice.as_ref())?;
     let verdict = verdict.behind(findings_of_quality(account, record));

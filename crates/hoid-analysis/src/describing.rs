@@ -1,0 +1,99 @@
+//! From recordings to a describing function and its verdict: repaired, at their rate, over whole periods.
+//!
+//! A channel that was recorded late is a phase of what is periodic: an offset is not taken out by moving rows,
+//! which would cost the last whole period, but given to the ratio at each line ([`without_offsets`]). So is what
+//! a decimation moved the input by for its hold: a ratio of samples knows no hold.
+//!
+//! [`without_offsets`]: crate::without_offsets
+
+use std::collections::BTreeMap;
+
+use hoid_ident::frequency::{Description, DescriptionOptions, describe_runs};
+use hoid_io::{Offset, Step};
+use hoid_model::{Decimation, FaultHandling};
+
+use crate::{AnalysisError, offset::late_samples, reading::Reading, recordings::Recordings, settings::Setting};
+
+/// How recordings are described.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Describing {
+    /// Excitation, lines, period, element, span. Its offset, in samples of the recordings, adds to the offsets.
+    pub options: DescriptionOptions,
+    /// Offsets of channels by their names, which were not taken out in reading.
+    pub offsets: BTreeMap<String, Offset>,
+    /// What is done about faults of the recordings.
+    pub faults: FaultHandling,
+    /// Whether a high rate is lowered.
+    pub rate: Decimation,
+}
+
+/// What was described.
+#[derive(Debug, Clone)]
+pub struct Described {
+    /// The describing function; its verdict knows what was wrong with the recordings.
+    pub found: Description,
+    /// The recordings as they were described.
+    pub data: Recordings,
+    /// The settings that were used.
+    pub settings: Vec<Setting>,
+}
+
+impl Describing {
+    /// Repairs the recordings, brings them to their rate, describes them and forms the verdict.
+    ///
+    /// # Errors
+    /// [`AnalysisError`] where there is no result: no lines, no whole period, no such channel.
+    pub fn run(&self, recordings: Recordings) -> Result<Described, AnalysisError> {
+        let read = recordings.repaired(self.faults)?;
+        let first = read.records.first().ok_or(AnalysisError::NoRecordings)?;
+        let late = self.options.offset_samples + late_samples(first, &self.offsets)?;
+        let late_s = late * first.sample_time().s();
+        let data = read.at_rate(self.rate, false)?;
+        let steps = data.accounts.iter().flat_map(|account| &account.steps);
+        let moved_s = steps.into_iter().find_map(|step| match step {
+            Step::Rate { input_lead_s, .. } => Some(*input_lead_s),
+            _ => None,
+        });
+        let options = DescriptionOptions {
+            offset_samples: (late_s + moved_s.unwrap_or(0.0)) / data.records[0].sample_time().s(),
+            ..self.options.clone()
+        };
+        let mut found = describe_runs(&data.records, &options)?;
+        found.verdict = data.judged(found.verdict);
+        let settings = self.settings(&data, late, &found);
+        Ok(Described { found, data, settings })
+    }
+
+    fn settings(&self, data: &Recordings, late_samples: f64, found: &Description) -> Vec<Setting> {
+        let reading = data.source.as_ref().map(|source| &source.reading);
+        let mut list = match reading {
+            Some(reading) => reading.settings(self.rate),
+            None => vec![Setting::new("decimate", self.rate.to_string()).given(self.rate != Decimation::default())],
+        };
+        if late_samples != 0.0 {
+            let words = format!("{late_samples} samples, as a phase");
+            list.push(Setting::new("offset of the output", words).given(true));
+        }
+        let is_default = self.faults == FaultHandling::default();
+        list.push(Setting::new("faults", self.faults.to_string()).given(!is_default));
+        list.extend(reading.and_then(Reading::masked).map(|masked| masked.given(true)));
+        let given = self.options.lines_rad_s.is_some();
+        let lines = match (given, &found.channel) {
+            (true, None) => "given".to_owned(),
+            (true, Some(channel)) => format!("given, in {channel}"),
+            (false, channel) => format!("found in {}", channel.as_deref().unwrap_or("nothing")),
+        };
+        let average = match &found.channel {
+            Some(channel) => format!("cross spectra with {channel}"),
+            None => "ratios of u and e".to_owned(),
+        };
+        list.extend([
+            Setting::new("lines", lines).given(given),
+            Setting::new("average", average),
+            Setting::new("delay taken out between lines", format!("{:.3} s", found.delay_s)),
+        ]);
+        let element = self.options.controlled_element.as_ref();
+        list.extend(element.map(|element| Setting::new("controlled element", element.to_string()).given(true)));
+        list
+    }
+}

@@ -1,0 +1,280 @@
+//! Results as JSON objects, the contract with other programs, and back.
+//!
+//! Every result has the same envelope: `hoid` (the version), `kind`, `records`, `data` (what was done to the
+//! records), `settings` (each with its value, given or not) and `verdict`; the rest is of its kind. What a batch
+//! fit is, so that it can predict again without its recordings, is in `state` ([`state`]). Values are those of
+//! `serde_json`, which keeps the order of keys.
+//!
+//! | file | kind |
+//! |---|---|
+//! | `operator` | `operator`: of a person, its form by evidence |
+//! | `change` | `operator` whose gains change once |
+//! | `description` | `description`: the describing function |
+//! | `polynomials` | `polynomial`; `operator` with its remnant of order m, which is written by its polynomials |
+//! | `result` | what they share, to text and back |
+
+mod change;
+mod description;
+mod operator;
+mod polynomials;
+mod result;
+pub mod state;
+
+use hoid_ident::{
+    MarginEstimates, Termination,
+    validation::{GoodnessOfFit, LjungBox},
+};
+use hoid_model::{
+    Fault, Finding, NotConvertible, Orders, Record, Verdict,
+    margins::Margins,
+    uncertainty::{Estimate, OperatorEstimate},
+};
+use serde::Serialize;
+use serde_json::{Map, Value, json};
+
+pub use polynomials::{PolynomialAnswer, of_family};
+pub use result::{Answer, BatchAnswer};
+
+use crate::{recordings::Account, settings::Setting};
+
+/// The envelope of a result: version, kind, records, what was done to them, settings, verdict.
+pub fn envelope(
+    kind: &str,
+    files: &[String],
+    of_records: &[Record],
+    accounts: &[Account],
+    verdict_of: &Verdict,
+    settings_of: &[Setting],
+) -> Map<String, Value> {
+    let mut map = Map::new();
+    let mut set = |key: &str, value: Value| map.insert(key.to_owned(), value);
+    set("hoid", json!(env!("CARGO_PKG_VERSION")));
+    set("kind", json!(kind));
+    set("verdict", verdict(verdict_of));
+    set("records", records(files, of_records, accounts));
+    set(
+        "data",
+        json!({"faults": faults(files, accounts), "warnings": warnings(files, accounts)}),
+    );
+    // Names of before, for one release.
+    set("warnings", warnings(files, accounts));
+    set("faults", faults(files, accounts));
+    set("settings", settings(settings_of));
+    map
+}
+
+/// Settings, each with its value, and whether it was given.
+pub fn settings(all: &[Setting]) -> Value {
+    all.iter()
+        .map(|one| json!({"name": one.name, "value": one.value, "given": one.given}))
+        .collect()
+}
+
+/// A number, or null where there is none: JSON has no NaN.
+pub fn number(value: f64) -> Value {
+    serde_json::Number::from_f64(value).map_or(Value::Null, Value::Number)
+}
+
+/// A number, or null.
+pub fn optional(value: Option<f64>) -> Value {
+    value.map_or(Value::Null, number)
+}
+
+/// An estimate with its standard error.
+pub fn estimate(e: &Estimate) -> Value {
+    json!({"value": number(e.value), "standard_error": optional(e.standard_error)})
+}
+
+/// The same with its interval of 95 %, null where there is none.
+pub fn estimate_within(e: &Estimate, interval: Option<(f64, f64)>) -> Value {
+    json!({
+        "value": number(e.value),
+        "standard_error": optional(e.standard_error),
+        "interval": interval.map(|(low, high)| [number(low), number(high)]),
+    })
+}
+
+/// What a result is worth: the level, what speaks against it, what is worth knowing besides, and
+/// all of it with its names for programs.
+pub fn verdict(v: &Verdict) -> Value {
+    json!({
+        "level": v.level.name(),
+        "reasons": v.reasons().collect::<Vec<_>>(),
+        "notes": v.notes().collect::<Vec<_>>(),
+        "findings": v.findings().iter().map(finding).collect::<Vec<_>>(),
+    })
+}
+
+/// What makes a result doubtful, or is worth knowing.
+pub fn finding(f: &Finding) -> Value {
+    json!({"kind": f.kind, "severity": f.severity.name(), "message": f.words, "words": f.words})
+}
+
+/// Orders by name.
+pub fn orders(o: &Orders) -> Value {
+    json!({"na": o.na, "nb": o.nb, "nc": o.nc, "nd": o.nd, "nf": o.nf, "nk": o.nk})
+}
+
+/// The operator, or why there is none.
+pub fn operator(found: &Result<OperatorEstimate, NotConvertible>) -> Value {
+    match found {
+        Ok(o) => {
+            let mut map = Map::new();
+            map.insert("convertible".to_owned(), json!(true));
+            map.insert("stable".to_owned(), json!(o.parameters().is_stable()));
+            for (name, _, e) in o.rows() {
+                map.insert(name.to_owned(), estimate(&e));
+            }
+            Value::Object(map)
+        }
+        // Another order has no meaning as an operator at all.
+        Err(NotConvertible::OtherOrders { .. } | NotConvertible::PolesInBoth { .. }) => Value::Null,
+        Err(reason) => json!({"convertible": false, "reason": reason.to_string()}),
+    }
+}
+
+/// Crossover and margins of a loop that is known.
+pub fn margins(m: &Margins) -> Map<String, Value> {
+    let mut map = Map::new();
+    map.insert("crossover_rad_s".to_owned(), optional(m.crossover_rad_s));
+    map.insert("phase_margin_deg".to_owned(), optional(m.phase_margin_deg));
+    map.insert("gain_margin_db".to_owned(), optional(m.gain_margin_db));
+    map.insert("phase_crossover_rad_s".to_owned(), optional(m.phase_crossover_rad_s));
+    map
+}
+
+/// The same of a loop that was estimated.
+pub fn margin_estimates(m: &MarginEstimates) -> Value {
+    let or_null = |e: &Option<Estimate>| e.as_ref().map_or(Value::Null, estimate);
+    json!({
+        "crossover_rad_s": or_null(&m.crossover_rad_s),
+        "phase_margin_deg": or_null(&m.phase_margin_deg),
+        "gain_margin_db": or_null(&m.gain_margin_db),
+        "phase_crossover_rad_s": or_null(&m.phase_crossover_rad_s),
+    })
+}
+
+/// A test of whiteness.
+pub fn ljung_box(test: Option<&LjungBox>) -> Value {
+    test.map_or(Value::Null, |t| {
+        json!({
+            "statistic": number(t.statistic),
+            "degrees_of_freedom": t.degrees_of_freedom,
+            "p_value": number(t.p_value),
+        })
+    })
+}
+
+/// How well a model tells the records that it was fitted to, or others.
+pub fn goodness(q: &GoodnessOfFit) -> Map<String, Value> {
+    let rows = [
+        ("vaf_simulation", q.vaf_simulation),
+        ("vaf_prediction", q.vaf_prediction),
+        ("nrmse_simulation", q.nrmse_simulation),
+        ("nrmse_prediction", q.nrmse_prediction),
+    ];
+    rows.into_iter()
+        .map(|(name, value)| (name.to_owned(), number(value)))
+        .collect()
+}
+
+/// The same on another file.
+pub fn validation(file: &str, q: &GoodnessOfFit) -> Value {
+    let file = std::iter::once(("file".to_owned(), json!(file)));
+    Value::Object(file.chain(goodness(q)).collect())
+}
+
+/// How a search ended.
+pub fn termination(t: &Termination) -> Value {
+    json!({
+        "reason": t.reason.to_string(),
+        "converged": t.converged(),
+        "iterations": t.iterations,
+    })
+}
+
+/// A parameter with its name.
+pub fn named(name: &str, e: &Estimate) -> Value {
+    json!({"name": name, "value": number(e.value), "standard_error": optional(e.standard_error)})
+}
+
+/// Files and sampling of the records, and what was done to them.
+pub fn records(files: &[String], records: &[Record], accounts: &[Account]) -> Value {
+    let record = |((file, r), account): ((&String, &Record), &Account)| {
+        let mut one = json!({
+            "file": file,
+            "samples": r.len(),
+            "sample_time": number(r.sample_time().s()),
+            "units": {
+                "input": r.input_channel().map_or("", |channel| &channel.unit),
+                "output": r.output_channel().unit,
+            },
+            "preparation": list(&account.steps),
+            "trouble": list(&account.quality_issues),
+        });
+        if let Some(level) = &account.level {
+            one["level"] = estimate(level);
+        }
+        one
+    };
+    files.iter().zip(records).zip(accounts).map(record).collect()
+}
+
+/// What is wrong with the sampling, in words.
+pub fn warnings(files: &[String], accounts: &[Account]) -> Value {
+    let all = files.iter().zip(accounts);
+    all.flat_map(|(file, account)| {
+        account
+            .quality_issues
+            .iter()
+            .map(move |one| json!(format!("{file}: {one}")))
+    })
+    .collect()
+}
+
+/// All faults of the records, and what is wrong with their files, one object each.
+pub fn faults(files: &[String], accounts: &[Account]) -> Value {
+    let all = files.iter().zip(accounts);
+    all.flat_map(|(file, account)| {
+        let faults = account.faults.iter().map(move |one| fault(file, one));
+        let issues = account.quality_issues.iter().map(move |issue| {
+            let (first, last) = (issue.places.first(), issue.places.last());
+            json!({
+                "record": file,
+                "kind": issue.kind.name(),
+                "channel": issue.channel,
+                "from": optional(first.and_then(|place| place.from_s)),
+                "to": optional(last.and_then(|place| place.to_s)),
+                "samples": issue.rows,
+                "size": number(issue.size),
+                "deviations": Value::Null,
+                "action": "reported",
+                "words": issue.text,
+            })
+        });
+        faults.chain(issues)
+    })
+    .collect()
+}
+
+/// One fault as an object.
+pub fn fault(record: &str, fault: &Fault) -> Value {
+    json!({
+        "record": record,
+        "kind": fault.kind.name(),
+        "channel": fault.channel,
+        "from": number(fault.from_s),
+        "to": number(fault.to_s),
+        "samples": fault.samples,
+        "size": number(fault.size),
+        "deviations": optional(fault.deviations),
+        "action": fault.action.name(),
+        "words": fault.to_string(),
+    })
+}
+
+/// What the library writes about itself, one object each.
+pub fn list<T: Serialize>(items: &[T]) -> Value {
+    // Numbers that JSON does not have become null; nothing else can fail.
+    serde_json::to_value(items).unwrap_or(Value::Null)
+}

@@ -1,0 +1,236 @@
+//! The operator of a person as JSON: form, parameters with intervals, the other methods, covariance.
+
+use hoid_ident::{
+    family::{
+        AgreementMethod, AgreementPair, AgreementRow, ClusterKind, FamilyFit, FormFigures, LoopMeasures,
+        OperatorOfRecord, Parameter,
+    },
+    registry,
+};
+use hoid_model::{FamilyOperator, uncertainty::Estimate};
+use serde_json::{Map, Value, json};
+
+use super::{
+    envelope, estimate_within, goodness, named, number, optional, orders,
+    result::{BatchAnswer, OPERATOR},
+    termination,
+};
+use crate::{AnalysisError, identified::Identified};
+
+impl BatchAnswer for FamilyFit {
+    const ESTIMATOR: &'static str = registry::OPERATOR;
+
+    fn object(found: &Identified<Self>) -> Result<Map<String, Value>, AnalysisError> {
+        let (fit, data) = (&found.fit, &found.data);
+        let of = fit.operator(0);
+        let mut map = envelope(
+            OPERATOR,
+            &data.names,
+            &data.records,
+            &data.accounts,
+            &found.verdict,
+            &found.settings,
+        );
+        let mut set = |key: &str, value: Value| map.insert(key.to_owned(), value);
+        set("structure", json!(OPERATOR));
+        set("form", json!(fit.form.name()));
+        set("neuromuscular", json!(fit.neuromuscular));
+        set("orders", orders(&of.polynomial_fit.orders()));
+        set("parameters", of.parameters.iter().map(parameter).collect());
+        if let Some(element) = &found.controlled_element {
+            set("open_loop", open_loop(fit.loop_measures(0, element).as_ref()));
+        }
+        set("loss", number(fit.loss));
+        set("innovation_variance", number(fit.innovation_variance));
+        set("residuals", json!(fit.residuals));
+        set("termination", termination(&fit.termination));
+        let mut quality = goodness(&found.quality()?);
+        quality.insert("coherent_share".to_owned(), optional(fit.coherent_share));
+        set("fit", Value::Object(quality));
+        set("operator", operator(of));
+        if fit.operators.len() > 1 {
+            set("operators", fit.operators.iter().map(operator).collect());
+        }
+        set("remnant", Value::Null);
+        set("noise", json!({"c": fit.noise.0, "d": fit.noise.1}));
+        set("forms", fit.forms.iter().map(form_figures).collect());
+        set("lines", lines(found));
+        set("riv_bj", instrumental(found));
+        set("agreement", agreement(found));
+        set(
+            "box_jenkins",
+            fit.free_model.map_or(Value::Null, |free| {
+                json!({
+                    "loss": number(free.loss),
+                    "likelihood_ratio": number(free.likelihood_ratio),
+                    "degrees_of_freedom": free.degrees_of_freedom,
+                    "p_value": number(free.p_value),
+                })
+            }),
+        );
+        set("covariance", covariance(&of.operator, of.covariance.as_deref()));
+        set(
+            "errors",
+            json!({
+                "clusters": fit.clusters,
+                "kind": match fit.cluster_kind {
+                    ClusterKind::Runs => "runs",
+                    ClusterKind::Blocks => "blocks",
+                },
+                "inflation": number(fit.inflation),
+                "largest_ratio_to_model_based": optional(fit.error_ratio),
+                "model_based": covariance(&of.operator, of.model_based.as_deref()),
+            }),
+        );
+        let prior = fit.prior.entries().iter();
+        set(
+            "prior",
+            prior
+                .map(|e| json!({"parameter": e.parameter, "centre": e.centre, "spread": e.spread, "source": e.source}))
+                .collect(),
+        );
+        set("candidates", json!([]));
+        Ok(map)
+    }
+}
+
+fn lines(found: &Identified) -> Value {
+    let Some(lines) = &found.fit.lines else {
+        return why_not(found.fit.no_lines.as_ref());
+    };
+    let mut map = Map::new();
+    map.insert("parameters".to_owned(), all_named(&lines.parameters()));
+    map.insert("chi2".to_owned(), number(lines.chi_squared));
+    map.insert("degrees_of_freedom".to_owned(), json!(lines.degrees_of_freedom));
+    map.insert("held_out".to_owned(), optional(lines.held_out_total()));
+    map.insert("converged".to_owned(), json!(lines.termination.converged()));
+    if let Some(element) = &found.controlled_element {
+        let measures = found.fit.loop_measures_at_lines(element);
+        map.insert("open_loop".to_owned(), open_loop(measures.as_ref()));
+    }
+    Value::Object(map)
+}
+
+fn instrumental(found: &Identified) -> Value {
+    let Some(of) = &found.fit.instrumental else {
+        return why_not(found.fit.no_instrumental.as_ref());
+    };
+    let mut map = Map::new();
+    map.insert("parameters".to_owned(), all_named(&of.parameters()));
+    map.insert("nd".to_owned(), json!(of.noise_order));
+    map.insert("converged".to_owned(), json!(of.termination.converged()));
+    map.insert("termination".to_owned(), json!(of.termination.to_string()));
+    if let Some(element) = &found.controlled_element {
+        let measures = found.fit.loop_measures_by_instruments(element);
+        map.insert("open_loop".to_owned(), open_loop(measures.as_ref()));
+    }
+    Value::Object(map)
+}
+
+fn agreement(found: &Identified) -> Value {
+    found.fit.agreement.as_ref().map_or(Value::Null, |agreement| {
+        let row = |r: &AgreementRow| {
+            let mut map = Map::new();
+            map.insert("coordinate".to_owned(), json!(r.coordinate.name()));
+            for method in [
+                AgreementMethod::PredictionError,
+                AgreementMethod::Lines,
+                AgreementMethod::Instrumental,
+            ] {
+                let pair = r.of(method).map_or(
+                    Value::Null,
+                    |(value, error)| json!({"value": number(value), "standard_error": number(error)}),
+                );
+                map.insert(method.name().to_owned(), pair);
+            }
+            map.insert("difference_in_errors".to_owned(), number(r.difference_in_errors));
+            Value::Object(map)
+        };
+        let pair = |pair: &AgreementPair| {
+            json!({
+                "methods": [pair.methods.0.name(), pair.methods.1.name()],
+                "chi2": number(pair.statistic),
+                "p_value": number(pair.p_value),
+            })
+        };
+        json!({
+            "coordinates": agreement.rows.iter().map(row).collect::<Vec<_>>(),
+            "pairs": agreement.pairs.iter().map(pair).collect::<Vec<_>>(),
+            "chi2": number(agreement.statistic),
+            "p_value": number(agreement.p_value),
+        })
+    })
+}
+
+/// Of a method that gave nothing: the reason, where there is one.
+fn why_not(reason: Option<&String>) -> Value {
+    reason.map_or(Value::Null, |why| json!({"reason": why}))
+}
+
+/// Estimates in the order of the form, each with its name.
+fn all_named(parameters: &[(&'static str, Estimate)]) -> Value {
+    parameters.iter().map(|(name, e)| named(name, e)).collect()
+}
+
+fn parameter(p: &Parameter) -> Value {
+    json!({
+        "name": p.name,
+        "unit": p.unit,
+        "value": number(p.value),
+        "standard_error": optional(p.standard_error),
+        "interval": p.interval.map_or(Value::Null, |(low, high)| json!([number(low), number(high)])),
+        "prior_share": number(p.prior_share),
+        "determined": p.determined,
+    })
+}
+
+/// The operator by the names of its parameters.
+fn operator(of: &OperatorOfRecord) -> Value {
+    let mut map = Map::new();
+    map.insert("convertible".to_owned(), json!(true));
+    map.insert("form".to_owned(), json!(of.operator.form().name()));
+    for p in &of.parameters {
+        let mut value = parameter(p);
+        if let Some(fields) = value.as_object_mut() {
+            fields.remove("name");
+        }
+        map.insert(p.name.clone(), value);
+    }
+    Value::Object(map)
+}
+
+fn open_loop(found: Option<&LoopMeasures>) -> Value {
+    let of = |value: fn(&LoopMeasures) -> Estimate, interval: fn(&LoopMeasures) -> Option<(f64, f64)>| {
+        found.map(|m| estimate_within(&value(m), interval(m)))
+    };
+    json!({
+        "crossover_rad_s": of(|m| m.crossover_rad_s, LoopMeasures::crossover_interval),
+        "phase_margin_deg": of(|m| m.phase_margin_deg, LoopMeasures::phase_margin_interval),
+    })
+}
+
+fn form_figures(f: &FormFigures) -> Value {
+    json!({
+        "form": f.form.name(),
+        "loss": optional(f.loss),
+        "criterion": optional(f.criterion),
+        "held_out": optional(f.held_out),
+        "chi2": optional(f.chi_squared),
+        "degrees_of_freedom": f.degrees_of_freedom,
+        "converged": f.converged,
+    })
+}
+
+/// Coordinates with their names and the rows of their covariance.
+fn covariance(operator: &FamilyOperator, covariance: Option<&[f64]>) -> Value {
+    let coordinates = operator.form().coordinates(operator.has_neuromuscular());
+    let p = coordinates.len();
+    let names: Vec<&str> = coordinates.iter().map(|c| c.name()).collect();
+    covariance.map_or(Value::Null, |c| {
+        let rows: Vec<Vec<Value>> = c
+            .chunks(p)
+            .map(|row| row.iter().map(|v| number(*v)).collect())
+            .collect();
+        json!({"coordinates": names, "values": operator.coordinates(), "matrix": rows})
+    })
+}

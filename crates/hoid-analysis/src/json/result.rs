@@ -1,0 +1,219 @@
+//! A result to its JSON and back.
+
+use hoid_ident::{GreyBoxFit, SigmoidFit, registry};
+use hoid_model::{ContinuousTransferFunction, Decimation, Detrend, Fault, Verdict, uncertainty::Estimate};
+use serde::{Deserialize, Serialize, de::DeserializeOwned};
+use serde_json::{Map, Value, json};
+
+use super::state;
+use crate::{
+    AnalysisError,
+    estimators::PolynomialFit,
+    identified::Identified,
+    recordings::{Account, Recordings},
+    settings::Setting,
+};
+
+/// Kind of what is an operator.
+pub(super) const OPERATOR: &str = "operator";
+/// Kind of what is a polynomial model.
+pub(super) const POLYNOMIAL: &str = "polynomial";
+
+/// A fit that writes itself.
+pub trait BatchAnswer: Serialize + DeserializeOwned {
+    /// Its estimator in the registry.
+    const ESTIMATOR: &'static str;
+
+    /// The object of the contract, without the state.
+    ///
+    /// # Errors
+    /// Those of a prediction of its records.
+    fn object(found: &Identified<Self>) -> Result<Map<String, Value>, AnalysisError>;
+}
+
+/// Any result of a batch fit.
+#[derive(Debug, Clone)]
+pub enum Answer {
+    /// The operator of a person, its form by evidence.
+    Operator(Identified),
+    /// A gain with a lead, and its remnant of order m.
+    Remnant(Identified<GreyBoxFit>),
+    /// An operator whose gains change once.
+    Change(Identified<SigmoidFit>),
+    /// A polynomial model.
+    Polynomials(Identified<PolynomialFit>),
+}
+
+impl Answer {
+    /// Reads a result that [`Identified::to_json`] wrote.
+    ///
+    /// # Errors
+    /// [`AnalysisError::NotAResult`] for a text that is none, is damaged, or is of another version.
+    pub fn from_json(text: &str) -> Result<Self, AnalysisError> {
+        let object = parsed(text)?;
+        let estimator = object.get("estimator").and_then(Value::as_str).unwrap_or_default();
+        match estimator {
+            registry::OPERATOR => restored(object).map(Self::Operator),
+            registry::REMNANT => restored(object).map(Self::Remnant),
+            registry::CHANGE => restored(object).map(Self::Change),
+            registry::PEM => restored(object).map(Self::Polynomials),
+            other => Err(not_a_result(format!("its estimator is {other:?}"))),
+        }
+    }
+}
+
+/// What is kept of the account of a record.
+#[derive(Serialize, Deserialize)]
+struct FoundIn {
+    faults: Vec<Fault>,
+    level: Option<Estimate>,
+}
+
+/// What is written of a result, and read.
+#[derive(Serialize)]
+struct Written<'a, F> {
+    fit: &'a F,
+    verdict: &'a Verdict,
+    names: &'a [String],
+    origins: &'a [usize],
+    found_in: Vec<FoundIn>,
+    settings: &'a [Setting],
+    controlled_element: &'a Option<ContinuousTransferFunction>,
+    excitation: &'a Option<String>,
+    taken_out: Detrend,
+    rate: Decimation,
+    counts_samples: bool,
+}
+
+#[derive(Deserialize)]
+struct Read<F> {
+    fit: F,
+    verdict: Verdict,
+    names: Vec<String>,
+    origins: Vec<usize>,
+    found_in: Vec<FoundIn>,
+    settings: Vec<Setting>,
+    controlled_element: Option<ContinuousTransferFunction>,
+    excitation: Option<String>,
+    taken_out: Detrend,
+    rate: Decimation,
+    counts_samples: bool,
+}
+
+impl FoundIn {
+    fn of(account: &Account) -> Self {
+        Self {
+            faults: account.faults.clone(),
+            level: account.level,
+        }
+    }
+
+    fn account(self) -> Account {
+        Account {
+            faults: self.faults,
+            level: self.level,
+            ..Account::default()
+        }
+    }
+}
+
+impl<F: BatchAnswer> Identified<F> {
+    /// The result as an object: the contract with other programs, and its state.
+    ///
+    /// # Errors
+    /// Those of a prediction of its records.
+    pub fn json(&self) -> Result<Map<String, Value>, AnalysisError> {
+        if let Some(written) = &self.written {
+            return Ok(written.clone());
+        }
+        Ok(self.with_state(F::object(self)?))
+    }
+
+    /// An object of the contract of this result, with the state from which the result is made again.
+    pub fn with_state(&self, mut map: Map<String, Value>) -> Map<String, Value> {
+        map.insert("estimator".to_owned(), json!(F::ESTIMATOR));
+        let state = Written {
+            fit: &self.fit,
+            verdict: &self.verdict,
+            names: &self.data.names,
+            origins: &self.data.origins,
+            found_in: self.data.accounts.iter().map(FoundIn::of).collect(),
+            settings: &self.settings,
+            controlled_element: &self.controlled_element,
+            excitation: &self.excitation,
+            taken_out: self.taken_out,
+            rate: self.rate,
+            counts_samples: self.counts_samples,
+        };
+        let state = state::written(&state).map_or(Value::Null, Value::String);
+        map.insert("state".to_owned(), state);
+        map
+    }
+
+    /// The same as text, indented.
+    ///
+    /// # Errors
+    /// As [`Self::json`].
+    pub fn to_json(&self) -> Result<String, AnalysisError> {
+        Ok(format!("{:#}", Value::Object(self.json()?)))
+    }
+
+    /// Reads what [`Self::to_json`] wrote: everything but the samples of its recordings. The model predicts,
+    /// simulates and validates as before, on records that are given to it.
+    ///
+    /// # Errors
+    /// [`AnalysisError::NotAResult`] for a text that is none, is damaged, is of another version or estimator.
+    pub fn from_json(text: &str) -> Result<Self, AnalysisError> {
+        restored(parsed(text)?)
+    }
+}
+
+/// Results are equal when all that is written of them is.
+impl<F: BatchAnswer> PartialEq for Identified<F> {
+    fn eq(&self, other: &Self) -> bool {
+        matches!((self.json(), other.json()), (Ok(one), Ok(two)) if one == two)
+    }
+}
+
+fn not_a_result(found: String) -> AnalysisError {
+    AnalysisError::NotAResult { found }
+}
+
+fn parsed(text: &str) -> Result<Map<String, Value>, AnalysisError> {
+    match serde_json::from_str(text) {
+        Ok(Value::Object(object)) => Ok(object),
+        Ok(_) => Err(not_a_result("it is no object".to_owned())),
+        Err(error) => Err(not_a_result(format!("it is no JSON: {error}"))),
+    }
+}
+
+fn restored<F: BatchAnswer>(object: Map<String, Value>) -> Result<Identified<F>, AnalysisError> {
+    let estimator = object.get("estimator").and_then(Value::as_str).unwrap_or_default();
+    if estimator != F::ESTIMATOR {
+        return Err(not_a_result(format!(
+            "its estimator is {estimator:?}, expected {:?}",
+            F::ESTIMATOR
+        )));
+    }
+    let text = object.get("state").and_then(Value::as_str);
+    let text = text.ok_or_else(|| not_a_result("it has no state".to_owned()))?;
+    let read: Read<F> = state::read(text).map_err(not_a_result)?;
+    Ok(Identified {
+        fit: read.fit,
+        verdict: read.verdict,
+        data: Recordings {
+            names: read.names,
+            origins: read.origins,
+            accounts: read.found_in.into_iter().map(FoundIn::account).collect(),
+            ..Recordings::default()
+        },
+        described: None,
+        settings: read.settings,
+        controlled_element: read.controlled_element,
+        excitation: read.excitation,
+        rate: read.rate,
+        counts_samples: read.counts_samples,
+        taken_out: read.taken_out,
+        written: Some(object),
+    })
+}

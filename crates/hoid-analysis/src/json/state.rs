@@ -1,0 +1,77 @@
+//! What a result is, as text: so that it comes back as it was and predicts again.
+//!
+//! The numbers of the contract are for people and other programs; a model has more (covariances of what is not
+//! printed, states, what was held). All of it is written as TOML, which has what JSON lacks, infinite numbers and
+//! NaN, and stands in JSON as one text; floats are written with as many digits as give back every bit. The first
+//! eight bytes of its SHA-256 stand before it: a file that was cut or changed by hand is refused. They guard
+//! against damage, not against somebody who means to deceive.
+
+use serde::{Deserialize, Serialize, de::DeserializeOwned};
+use sha2::{Digest, Sha256};
+
+/// Digits of the sum.
+const DIGITS: usize = 16;
+
+/// A value of any type as a table.
+#[derive(Serialize, Deserialize)]
+struct Table<T> {
+    value: T,
+}
+
+/// A value as text; none where it cannot be written.
+pub fn written<T: Serialize>(value: &T) -> Option<String> {
+    let text = toml::to_string(&Table { value }).ok()?;
+    Some(format!("{}{text}", sum(&text)))
+}
+
+/// The value of a text, or why there is none.
+///
+/// # Errors
+/// For a text that was cut or changed, or is of another version.
+pub fn read<T: DeserializeOwned>(text: &str) -> Result<T, String> {
+    let (stated, text) = text.split_at_checked(DIGITS).ok_or("its state is cut")?;
+    if stated != sum(text) {
+        return Err("its state is not the one that was written: it was cut or changed".to_owned());
+    }
+    let version = env!("CARGO_PKG_VERSION");
+    let table: Table<T> = toml::from_str(text).map_err(|error| {
+        format!(
+            "its state is that of another version than {version}: {}",
+            error.message()
+        )
+    })?;
+    Ok(table.value)
+}
+
+fn sum(text: &str) -> String {
+    let bytes = Sha256::digest(text.as_bytes());
+    bytes
+        .iter()
+        .take(DIGITS / 2)
+        .map(|byte| format!("{byte:02x}"))
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    #[test]
+    fn every_bit_comes_back() {
+        let numbers = [0.1, -0.0, 1.0 / 3.0, f64::INFINITY, f64::MIN_POSITIVE / 3.0];
+        let back: Vec<f64> = read(&written(&numbers.to_vec()).unwrap()).unwrap();
+        assert!(numbers.iter().zip(&back).all(|(a, b)| a.to_bits() == b.to_bits()));
+        let nan: f64 = read(&written(&f64::NAN).unwrap()).unwrap();
+        assert!(nan.is_nan());
+    }
+
+    #[test]
+    fn damage_is_refused() {
+        let whole = written(&vec![1.0, 2.0]).unwrap();
+        for text in ["", "0123", &whole[..whole.len() - 4], &whole.replacen("2", "3", 1)] {
+            assert!(read::<Vec<f64>>(text).is_err(), "{text}");
+        }
+        assert!(read::<String>(&whole).unwrap_err().contains("another version"));
+    }
+}

@@ -1,0 +1,120 @@
+//! Results as JSON and back, in Rust.
+#![allow(clippy::unwrap_used)]
+
+use hoid_analysis::{
+    BatchEstimator, Identification, Identified, Polynomials, Recordings,
+    json::{Answer, BatchAnswer},
+};
+use hoid_ident::{GreyBox, SigmoidChange, family::FamilyEstimator};
+use hoid_model::{
+    Form, Record, Structure,
+    scenario::{Condition, Scenario},
+};
+use hoid_sim::{RunSeed, Simulator};
+use serde_json::Value;
+
+fn run(seed: u64) -> Record {
+    let simulator = Simulator::new(&Scenario::condition(Condition::C1)).unwrap();
+    let run = RunSeed {
+        seed,
+        ..RunSeed::default()
+    };
+    simulator.run(run, false).unwrap().span(0.0, 50.0).unwrap()
+}
+
+/// What is written comes back equal, and as the result that it was.
+fn back<E: BatchEstimator>(with: Identification<E>) -> (Identified<E::Fit>, Identified<E::Fit>)
+where
+    E::Fit: BatchAnswer,
+{
+    let found = with.run(Recordings::of_records([run(1)])).unwrap();
+    let text = found.to_json().unwrap();
+    let again = Identified::<E::Fit>::from_json(&text).unwrap();
+    assert!(again == found);
+    assert_eq!(again.to_json().unwrap(), text);
+    assert_eq!(again.verdict, found.verdict);
+    assert_eq!(again.settings, found.settings);
+    assert!(again.data.records.is_empty());
+    // The text that is printed is one of JSON numbers: no state is lost by a program that writes it again.
+    let value: Value = serde_json::from_str(&text).unwrap();
+    assert!(Identified::<E::Fit>::from_json(&value.to_string()).unwrap() == found);
+    let other = Identified::<E::Fit>::from_json(&text.replacen("\"state\": \"", "\"state\": \"0", 1));
+    assert!(other.is_err());
+    (found, again)
+}
+
+fn quick() -> FamilyEstimator {
+    FamilyEstimator {
+        forms: vec![Form::Lead, Form::Gain],
+        nd: 0..=4,
+        ..FamilyEstimator::default()
+    }
+}
+
+#[test]
+fn each_result_comes_back_and_predicts_as_before() {
+    let other = run(2);
+    let (one, two) = back(Identification::of(quick()));
+    let models = [&one, &two].map(|found| &found.fit.operator(0).polynomial_fit);
+    assert_eq!(models[0].predict(&other).unwrap(), models[1].predict(&other).unwrap());
+    let (one, two) = back(Identification::of(GreyBox::new(1..=2)));
+    assert_eq!(
+        one.fit.polynomial_fit(0).simulate(&other).unwrap(),
+        two.fit.polynomial_fit(0).simulate(&other).unwrap()
+    );
+    let (one, two) = back(Identification::of(SigmoidChange::default()));
+    assert_eq!(one.fit.residuals(&other).unwrap(), two.fit.residuals(&other).unwrap());
+    let (one, two) = back(Identification::of(Polynomials {
+        orders: [("nd".to_owned(), 1..=2), ("nk".to_owned(), 28..=30)].into(),
+        ..Polynomials::new(Structure::BoxJenkins)
+    }));
+    assert_eq!(one.fit.fit, two.fit.fit);
+    assert_eq!(one.fit.choice, two.fit.choice);
+}
+
+#[test]
+fn the_kind_is_found_and_another_is_refused() {
+    let found = Identification::of(quick())
+        .run(Recordings::of_records([run(1)]))
+        .unwrap();
+    let text = found.to_json().unwrap();
+    assert!(matches!(Answer::from_json(&text), Ok(Answer::Operator(again)) if again == found));
+    let words = Identified::<hoid_ident::SigmoidFit>::from_json(&text)
+        .unwrap_err()
+        .to_string();
+    assert!(words.contains("operator change=sigmoid"), "{words}");
+    for wrong in [
+        "",
+        "null",
+        "{}",
+        "{\"estimator\": \"operator\"}",
+        "{\"estimator\": \"operator\", \"state\": \"\"}",
+    ] {
+        let words = Answer::from_json(wrong).unwrap_err().to_string();
+        assert!(words.contains("no result of a fit"), "{words}");
+    }
+}
+
+#[test]
+fn a_setting_is_given_where_it_is_not_the_default() {
+    let with = Identification {
+        controlled_element: Some("1/s".parse().unwrap()),
+        ..Identification::of(quick())
+    };
+    let found = with.run(Recordings::of_records([run(1)])).unwrap();
+    let given = |name: &str| {
+        let one = found.settings.iter().find(|one| one.name == name);
+        one.unwrap().given
+    };
+    for (name, expected) in [
+        ("structure", false),
+        ("form", true),
+        ("noise orders", true),
+        ("prior", false),
+        ("search", false),
+        ("controlled element", true),
+        ("faults", false),
+    ] {
+        assert_eq!(given(name), expected, "{name}");
+    }
+}

@@ -1,0 +1,82 @@
+"""Results as JSON: the same for all, as the command line writes it, and back."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import pyhoid
+
+CALLS: list[dict[str, Any]] = [
+    {"form": "lead", "nd": (0, 4)},
+    {"form": "lead", "nd": 2, "controlled_element": "1/s"},
+    {"noise": "remnant", "remnant_order": 1},
+    {"change": "sigmoid"},
+    {"structure": "bj", "nb": 2, "nd": (1, 2), "nf": 2, "nk": (28, 30)},
+    {"structure": "arx", "nk": 29},
+]
+
+
+@pytest.mark.parametrize("call", CALLS, ids=lambda call: "-".join(map(str, call.values())))
+def test_a_result_is_equal_to_what_comes_back(call: dict[str, Any], c1: pyhoid.Record) -> None:
+    record = c1.span(0, 50)
+    fit = pyhoid.identify(record, **call)
+    text = fit.to_json()
+    back = pyhoid.from_json(text)
+    assert type(back) is type(fit) and back == fit and back.to_json() == text
+    assert back.records == () and back.verdict == fit.verdict and back.faults == fit.faults
+    assert back.parameters == fit.parameters and back.settings == fit.settings
+    assert back.given == fit.given and back.units == fit.units
+    other = pyhoid.simulate("C1", seed=5).span(0, 20)
+    assert back != pyhoid.identify(other, "arx", nk=29)
+    if isinstance(fit, pyhoid.Fit):
+        assert back.quality == fit.quality
+    one, two = (f.fit if isinstance(f, pyhoid.OperatorFit) else f for f in (fit, back))
+    assert np.array_equal(one.simulate(other).values, two.simulate(other).values)
+    assert np.array_equal(one.residuals(other).values, two.residuals(other).values)
+
+
+def test_every_result_has_the_same_envelope(c1: pyhoid.Record) -> None:
+    for call in CALLS:
+        found = json.loads(pyhoid.identify(c1.span(0, 50), **call).to_json())
+        polynomial = call.get("structure") in ("bj", "arx")
+        assert found["kind"] == ("polynomial" if polynomial else "operator")
+        assert {"hoid", "records", "data", "settings", "verdict", "parameters"} <= set(found)
+        settings = {one["name"]: (one["value"], one["given"]) for one in found["settings"]}
+        assert settings["structure"] == (call.get("structure", "operator"), polynomial)
+        assert settings["faults"] == ("bridge", False)
+        assert ("controlled element" in settings) == ("controlled_element" in call)
+        if "controlled_element" in call:
+            assert settings["controlled element"][1]
+
+
+def test_what_is_no_result_is_refused(fit: pyhoid.Fit) -> None:
+    text = fit.to_json()
+    for wrong in ("", "[1]", "{}", '{"estimator": "pem"}', text[: len(text) // 2]):
+        with pytest.raises(pyhoid.DataError, match="no result of a fit"):
+            pyhoid.from_json(wrong)
+    changed = json.loads(text)
+    changed["estimator"] = "operator"
+    with pytest.raises(pyhoid.DataError):
+        pyhoid.from_json(json.dumps(changed))
+
+
+def test_a_part_says_whose_it_is(c1: pyhoid.Record) -> None:
+    operator = pyhoid.identify(c1.span(0, 50), form="lead", nd=2)
+    with pytest.raises(pyhoid.DataError, match="part of another result"):
+        operator.fit.to_json()
+
+
+def test_a_file_is_read_with_its_units(tmp_path: Path, c1: pyhoid.Record) -> None:
+    path = tmp_path / "person.json"
+    fit = pyhoid.identify(c1.span(0, 50), form="lead", nd=2)
+    path.write_text(fit.to_json())
+    back = pyhoid.from_json(path.read_text())
+    assert isinstance(back, pyhoid.OperatorFit)
+    assert {name: p.unit for name, p in back.parameters.items()} == {
+        name: p.unit for name, p in fit.parameters.items()
+    }
