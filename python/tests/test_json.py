@@ -80,3 +80,28 @@ def test_a_file_is_read_with_its_units(tmp_path: Path, c1: pyhoid.Record) -> Non
     assert {name: p.unit for name, p in back.parameters.items()} == {
         name: p.unit for name, p in fit.parameters.items()
     }
+
+
+def test_an_operator_does_what_polynomials_do(c1: pyhoid.Record, tmp_path: Path) -> None:
+    record = c1.span(0, 50)
+    person = pyhoid.identify(record, form="lead", nd=2, controlled_element="1/s")
+    for name in ("predict", "simulate", "residuals"):
+        one, two = getattr(person, name)(record), getattr(person.fit, name)(record)
+        assert one.first == two.first and np.array_equal(one.values, two.values)
+    assert person.quality == person.fit.quality_on(person.records)
+    assert person.validate(person.records[0]).quality == person.quality_on(person.records)
+    # The response is that of the polynomials, and its errors are those of the operator's intervals.
+    omega = [0.5, 1.0, 2.0, 4.0]
+    one, two = person.frequency_response(omega), person.fit.frequency_response(omega)
+    assert np.allclose(one.magnitude_db, two.magnitude_db, atol=0.02)
+    assert np.allclose(one.phase_deg, two.phase_deg, atol=0.2)
+    assert np.all(one.magnitude_db_se > 0) and np.all(np.isfinite(one.phase_deg_se))
+    loop, again = person.open_loop, person.margins("1/s")
+    assert loop is not None
+    assert again["crossover_rad_s"] == loop["crossover_rad_s"]
+    assert again["phase_margin_deg"] == loop["phase_margin_deg"]
+    assert list(person.to_xarray()["parameter"].values) == list(person.parameters)
+    back = pyhoid.from_json(person.to_json())
+    assert isinstance(back, pyhoid.OperatorFit)
+    assert back.quality == person.quality
+    assert np.array_equal(back.frequency_response(omega).phase_deg_se, one.phase_deg_se)

@@ -2,14 +2,15 @@
 
 use hoid_analysis::Identified;
 use hoid_ident::family::{AgreementMethod, ClusterKind, FormFigures, LoopMeasures, Parameter};
-use numpy::{PyArray1, PyArray2};
+use numpy::{PyArray1, PyArray2, PyReadonlyArray1};
 use pyo3::{prelude::*, types::PyDict};
 
 use crate::{
     arrays::{array, matrix},
+    controlled_element::ControlledElement,
     errors::Outcome,
     faults::{UsedRecord, faults_of, used_records},
-    figures::{self, Pair, VerdictParts, pair, verdict},
+    figures::{self, Pair, VerdictParts, pair, response_columns, verdict},
     fit::PyFit,
 };
 
@@ -205,6 +206,26 @@ impl PyOperatorFit {
         all.set_item("chi2", agreement.statistic)?;
         all.set_item("p_value", agreement.p_value)?;
         Ok(Some(all))
+    }
+
+    /// Magnitude in dB and phase in deg at these frequencies, each with its standard error (NaN where there is
+    /// none), of the operator of a record.
+    fn frequency_response<'py>(
+        &self,
+        py: Python<'py>,
+        omega: PyReadonlyArray1<'py, f64>,
+        record: usize,
+    ) -> PyResult<[Bound<'py, PyArray1<f64>>; 4]> {
+        Ok(response_columns(
+            py,
+            &self.0.fit.frequency_response(record, omega.as_slice()?),
+        ))
+    }
+
+    /// Crossover and phase margin with another controlled element.
+    fn margins<'py>(&self, py: Python<'py>, element: ControlledElement) -> Outcome<Bound<'py, PyDict>> {
+        let element = element.transfer_function()?;
+        Ok(loop_parts(py, self.0.fit.loop_measures(0, &element))?)
     }
 
     /// Crossover and phase margin; none without a controlled element.

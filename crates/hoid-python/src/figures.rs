@@ -1,7 +1,7 @@
 //! Small figures as Python has them: estimates as pairs, operators as dictionaries.
 
 use hoid_ident::{
-    MarginEstimates, Termination,
+    MarginEstimates, ResponsePoint, Termination,
     validation::{GoodnessOfFit, LjungBox},
 };
 use hoid_model::{
@@ -9,7 +9,10 @@ use hoid_model::{
     margins::Margins,
     uncertainty::{Estimate, OperatorEstimate, RemnantEstimate},
 };
+use numpy::PyArray1;
 use pyo3::{prelude::*, types::PyDict};
+
+use crate::arrays::array;
 
 /// A span that the guard of a recursion found.
 pub fn track_fault<'py>(py: Python<'py>, fault: &hoid_track::TrackFault) -> PyResult<Bound<'py, PyDict>> {
@@ -145,4 +148,15 @@ pub fn ljung_box<'py>(py: Python<'py>, test: Option<&LjungBox>) -> PyResult<Opti
     all.set_item("degrees_of_freedom", test.degrees_of_freedom)?;
     all.set_item("p_value", test.p_value)?;
     Ok(Some(all))
+}
+
+/// Magnitude in dB and phase in deg of points, each with its standard error (NaN where there is none).
+pub fn response_columns<'py>(py: Python<'py>, points: &[ResponsePoint]) -> [Bound<'py, PyArray1<f64>>; 4] {
+    let column = |of: &dyn Fn(&ResponsePoint) -> f64| array(py, points.iter().map(of).collect());
+    [
+        column(&|p| p.magnitude_db.value),
+        column(&|p| error_or_nan(p.magnitude_db)),
+        column(&|p| p.phase_deg.value),
+        column(&|p| error_or_nan(p.phase_deg)),
+    ]
 }

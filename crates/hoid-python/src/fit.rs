@@ -371,14 +371,10 @@ impl PyFit {
         py: Python<'py>,
         omega: PyReadonlyArray1<'py, f64>,
     ) -> PyResult<[Bound<'py, PyArray1<f64>>; 4]> {
-        let points = self.fit.frequency_response(omega.as_slice()?);
-        let column = |of: &dyn Fn(&hoid_ident::ResponsePoint) -> f64| array(py, points.iter().map(of).collect());
-        Ok([
-            column(&|p| p.magnitude_db.value),
-            column(&|p| figures::error_or_nan(p.magnitude_db)),
-            column(&|p| p.phase_deg.value),
-            column(&|p| figures::error_or_nan(p.phase_deg)),
-        ])
+        Ok(figures::response_columns(
+            py,
+            &self.fit.frequency_response(omega.as_slice()?),
+        ))
     }
 
     #[getter]

@@ -6,21 +6,20 @@ import json
 from collections.abc import Mapping, Sequence
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
 from . import _options, _pyhoid, _text
-from ._arrays import FloatArray, signal
-from .errors import DataError, NotConvertibleError
+from ._arrays import FloatArray
+from ._model import QUALITY, Correlation, FrequencyResponse, Model, Series, Validation
+from .errors import DataError
 from .estimates import Estimate, Operator, Remnant, estimates, unit_of
 from .record import Record
 from ._results import Result
 from .verdict import Verdict
 
 if TYPE_CHECKING:
-    import control
     import pandas as pd
     import xarray as xr
     from matplotlib.axes import Axes
@@ -28,79 +27,7 @@ if TYPE_CHECKING:
 __all__ = ["Correlation", "Fit", "FrequencyResponse", "Series", "Validation"]
 
 
-class Series(NamedTuple):
-    """Values on the time axis of a record, from sample `first` on.
-
-    ``record.u[first:]`` has the same times as `values`.
-
-    Examples
-    --------
-    >>> first, values = fit.predict(record)
-    """
-
-    first: int
-    values: FloatArray
-
-
-class FrequencyResponse(NamedTuple):
-    """Frequency response from e to u with its standard errors.
-
-    All arrays have shape (n,). Standard errors are NaN where there are none.
-
-    Examples
-    --------
-    >>> fit.frequency_response([0.5, 1.0, 2.0]).magnitude_db
-    """
-
-    omega: FloatArray
-    magnitude_db: FloatArray
-    magnitude_db_se: FloatArray
-    phase_deg: FloatArray
-    phase_deg_se: FloatArray
-
-    @property
-    def response(self) -> npt.NDArray[np.complex128]:
-        """The complex response."""
-        phase = np.deg2rad(self.phase_deg)
-        return np.asarray(
-            10.0 ** (self.magnitude_db / 20.0) * (np.cos(phase) + 1j * np.sin(phase)),
-            dtype=np.complex128,
-        )
-
-
-class Correlation(NamedTuple):
-    """Correlation by lag, with the bound that 99 % of white residuals stay within."""
-
-    lags: npt.NDArray[np.int64]
-    values: FloatArray
-    bound_99: float
-
-
-class Validation(NamedTuple):
-    """A model validated on a record: simulation, prediction, and tests of the residuals.
-
-    Examples
-    --------
-    >>> fit.validate(record).quality["vaf_prediction"]
-    """
-
-    first: int
-    simulated: FloatArray
-    predicted: FloatArray
-    quality: dict[str, float]
-    autocorrelation: Correlation
-    cross_correlation: Correlation
-    ljung_box: dict[str, float] | None
-    coloured_residuals: bool
-    under_modelled: bool
-    feedback: bool
-
-
-#: Figures of its quality.
-_QUALITY = ("vaf_simulation", "vaf_prediction", "nrmse_simulation", "nrmse_prediction")
-
-
-class Fit(Result):
+class Fit(Model, Result):
     """A fitted model. `identify` makes it.
 
     Attributes
@@ -128,6 +55,10 @@ class Fit(Result):
         super().__init__(native, records, settings, units)
         self._quality: dict[str, float] | None = None
         self._verdict: Verdict | None = None
+
+    @property
+    def _model(self) -> _pyhoid.Fit:
+        return self._native
 
     @property
     def structure(self) -> str:
@@ -262,7 +193,7 @@ class Fit(Result):
             known = (
                 self._native.quality(list(self.records))
                 if written is None
-                else {name: float(written[name]) for name in _QUALITY}
+                else {name: float(written[name]) for name in QUALITY}
             )
             self._quality = known
         return known
@@ -297,64 +228,6 @@ class Fit(Result):
         """Poles and zeros with standard errors, natural frequency (rad/s) and damping."""
         return self._native.roots
 
-    def predict(self, record: Record, horizon: int = 1) -> Series:
-        """Prediction of u, `horizon` samples ahead.
-
-        Raises
-        ------
-        DataError
-            For a record that is too short or has another sample time.
-
-        >>> fit.predict(record)
-        """
-        return Series(*self._native.predict(record, horizon))
-
-    def simulate(self, record: Record) -> Series:
-        """Response to e alone, from the initial states that fit the record best.
-
-        >>> fit.simulate(record)
-        """
-        return Series(*self._native.simulate(record))
-
-    def residuals(self, record: Record) -> Series:
-        """One-step prediction errors.
-
-        >>> fit.residuals(record).values.std()
-        """
-        return Series(*self._native.residuals(record))
-
-    def validate(self, record: Record) -> Validation:
-        """Simulation, prediction and residual tests on a record.
-
-        >>> fit.validate(record).ljung_box["p_value"]
-        """
-        found = dict(self._native.validate(record))
-        found["autocorrelation"] = Correlation(*found["autocorrelation"])
-        found["cross_correlation"] = Correlation(*found["cross_correlation"])
-        return Validation(**found)
-
-    def quality_on(self, records: Record | Sequence[Record]) -> dict[str, float]:
-        """`quality` on other records.
-
-        >>> fit.quality_on(record)["vaf_simulation"]
-        """
-        return self._native.quality(_options.as_records(records))
-
-    def frequency_response(self, omega: Any = None) -> FrequencyResponse:
-        """Frequency response from e to u.
-
-        Parameters
-        ----------
-        omega : array_like, shape (n,), optional
-            Frequencies in rad/s; default 200 of them, from 0.1 rad/s to the Nyquist frequency.
-
-        >>> fit.frequency_response([1.0, 2.0]).response
-        """
-        if omega is None:
-            omega = np.geomspace(0.1, np.pi / self.sample_time, 200)
-        frequencies = signal(np.atleast_1d(omega) if np.isscalar(omega) else omega, "omega")
-        return FrequencyResponse(frequencies, *self._native.frequency_response(frequencies))
-
     def margins(
         self, num: str | Sequence[float], den: Sequence[float] | None = None
     ) -> dict[str, Estimate | None]:
@@ -366,32 +239,6 @@ class Fit(Result):
         >>> fit.margins("90/(s(s+6))")
         """
         return estimates(self._native.margins(_options.controlled_element(num, den)))
-
-    def to_control(self) -> control.TransferFunction:
-        """The model from e to u as a transfer function of python-control, in z.
-
-        Raises
-        ------
-        NotConvertibleError
-            For a model without an input.
-
-        >>> fit.to_control()
-        """
-        import control
-
-        parts = self.polynomials
-        if not parts["B"].size:
-            raise NotConvertibleError(
-                "the model has no input, and so no transfer function from e to u"
-            )
-        num = parts["B"]
-        den = np.convolve(parts["A"], parts["F"])
-        length = max(len(num), len(den))
-        num, den = (np.pad(p, (0, length - len(p))) for p in (num, den))
-        # Zeros at the front of the numerator are the delay; those at the end of both cancel.
-        while length > 1 and num[-1] == 0 and den[-1] == 0:
-            num, den, length = num[:-1], den[:-1], length - 1
-        return control.TransferFunction(num, den, self.sample_time)
 
     def to_pandas(self) -> pd.DataFrame:
         """Parameters, operator and remnant as a table: value, standard_error, unit.

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import math
+import json
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from . import _pyhoid, _text
+from . import _options, _pyhoid, _text
 from ._arrays import FloatArray
 from ._decimation import said
+from ._model import QUALITY, Model
 from ._results import Result
 from .estimates import Estimate, estimates, unit_of
 from .fit import Fit
@@ -18,10 +19,12 @@ from .verdict import Verdict
 
 if TYPE_CHECKING:
     import pandas as pd
+    import xarray as xr
+    from matplotlib.axes import Axes
 
 __all__ = ["OperatorFit"]
 
-class OperatorFit(Result):
+class OperatorFit(Model, Result):
     """The operator of a person. `identify` makes it.
 
     Attributes
@@ -98,6 +101,8 @@ class OperatorFit(Result):
     >>> fit = pyhoid.identify(records, controlled_element="90/(s(s+6))")
     >>> fit.verdict.level, fit.parameters, fit.open_loop
     """
+
+    _native: _pyhoid.OperatorFit
 
     def __init__(
         self,
@@ -182,6 +187,60 @@ class OperatorFit(Result):
     def fit(self) -> Fit:
         """The model of the first operator as polynomials; it predicts, simulates, and so on."""
         return self.fits[0]
+
+    @property
+    def _model(self) -> _pyhoid.Fit:
+        return self.fits[0]._native
+
+    def _response(self, omega: FloatArray) -> Sequence[FloatArray]:
+        return self._native.frequency_response(omega, 0)
+
+    def margins(
+        self, num: str | Sequence[float], den: Sequence[float] | None = None
+    ) -> dict[str, Estimate | None]:
+        """Crossover frequency and phase margin with a controlled element.
+
+        `num` is the element as text, such as ``"90/(s(s+6))"``; or `num` and `den` are its
+        coefficients by descending powers of s.
+
+        >>> person.margins("90/(s(s+6))")
+        """
+        return estimates(self._native.margins(_options.controlled_element(num, den)))
+
+    @property
+    def quality(self) -> dict[str, float]:
+        """VAF and NRMSE fit (both in %) of simulation and one-step prediction, over its records."""
+        figures = json.loads(self.to_json())["fit"]
+        return {name: float(figures[name]) for name in QUALITY}
+
+    def to_xarray(self) -> xr.Dataset:
+        """Parameters, and the covariance of the coordinates in which the operator is fitted.
+
+        >>> person.to_xarray()
+        """
+        import xarray as xr
+
+        every = self.parameters.values()
+        nothing = float("nan")
+        variables: dict[str, Any] = {
+            "value": ("parameter", [p.value for p in every]),
+            "standard_error": (
+                "parameter",
+                [nothing if p.standard_error is None else p.standard_error for p in every],
+            ),
+        }
+        names = list(self.coordinates)
+        if self.covariance is not None:
+            variables["covariance"] = (("coordinate", "coordinate_"), self.covariance)
+        places = {"parameter": list(self.parameters), "coordinate": names, "coordinate_": names}
+        return xr.Dataset(variables, coords=places, attrs={"form": self.form})
+
+    def plot(self, record: Record | None = None, ax: Axes | None = None) -> Axes:
+        """Plot the time response on a record, by default the first; see `pyhoid.plots`.
+
+        >>> axes = person.plot(person.records[0].span(20, 40))
+        """
+        return self.fit.plot(record, ax)
 
     @property
     def converged(self) -> bool:

@@ -10,7 +10,7 @@ from . import _pyhoid, _text
 from ._arrays import FloatArray, signal
 from ._results import Result
 from .estimates import Estimate, Operator
-from .fit import Series
+from ._model import Series
 from .record import Record
 from .verdict import Verdict
 

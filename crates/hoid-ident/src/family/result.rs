@@ -1,8 +1,11 @@
 //! What a fit of the family found.
 
+use std::f64::consts::{LN_10, PI};
+
 use hoid_model::{
-    ContinuousTransferFunction, FamilyOperator, Finding, Form, SampleTime, Verdict, operator_family::Coordinate,
-    uncertainty::Estimate,
+    Complex64, ContinuousTransferFunction, FamilyOperator, Finding, Form, SampleTime, Verdict,
+    operator_family::Coordinate,
+    uncertainty::{Estimate, variance_along},
 };
 
 use super::{
@@ -16,7 +19,7 @@ use super::{
     prior::OperatorPrior,
     response_fit::hold,
 };
-use crate::{Fit, Termination};
+use crate::{Fit, ResponsePoint, Termination};
 
 /// An operator of one or several records.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -127,6 +130,30 @@ impl FamilyFit {
     pub fn loop_measures(&self, record: usize, element: &ContinuousTransferFunction) -> Option<LoopMeasures> {
         let of = self.operator(record);
         self.measured(&of.operator, of.covariance.as_deref(), element)
+    }
+
+    /// Gain and phase of the operator of a record from e to u at frequencies in rad/s, held over a sample, with
+    /// errors from the covariance of its coordinates: those of its intervals.
+    pub fn frequency_response(&self, record: usize, omega_rad_s: &[f64]) -> Vec<ResponsePoint> {
+        let of = self.operator(record);
+        let point = |&omega: &f64| {
+            let found = of.operator.response_and_gradient(omega);
+            let along = |value: f64, part: fn(Complex64) -> f64, unit: f64| {
+                let gradient = found.gradient.iter().map(|g| unit * part(g / found.value));
+                let gradient: Vec<f64> = gradient.collect();
+                match of.covariance.as_deref() {
+                    Some(covariance) => Estimate::with_variance(value, variance_along(&gradient, covariance)),
+                    None => Estimate::fixed(value),
+                }
+            };
+            let held = found.value * hold(omega, self.sample_time);
+            ResponsePoint {
+                omega_rad_s: omega,
+                magnitude_db: along(20.0 * held.norm().log10(), |z| z.re, 20.0 / LN_10),
+                phase_deg: along(held.arg().to_degrees(), |z| z.im, 180.0 / PI),
+            }
+        };
+        omega_rad_s.iter().map(point).collect()
     }
 
     /// What the loop of a record with a controlled element says against the result: a record that stays
