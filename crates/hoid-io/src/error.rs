@@ -275,7 +275,7 @@ pub enum IoError {
     },
     /// Neither a time column nor a sampling frequency.
     #[error(
-        "{file} has no column t (time in s), and no sampling frequency was given; name the time column t, or give --fs HZ; it has {available}"
+        "{file} has no column t (time in s), and no sampling frequency was given; name the column of the time by --time COLUMN, or give --fs HZ; it has {available}"
     )]
     NoSampling {
         /// The file.

@@ -86,9 +86,10 @@ impl Format {
         options: &ReadOptions,
     ) -> Result<Table<'a>, IoError> {
         match self.reading {
-            Reading::Table { record, .. } => record(bytes, file).map(with_time),
+            Reading::Table { record, .. } => record(bytes, file),
             Reading::Arrays(read) => table_of(read(std::mem::take(bytes), file)?, options, file),
         }
+        .and_then(|table| with_time(table, options.time.as_ref()))
     }
 
     /// A table of results.

@@ -2,6 +2,7 @@
 //! repaired.
 
 use crate::column_expression::ColumnExpression;
+use crate::time_column::TimeChoice;
 
 /// What may be mended in a damaged record. By default nothing is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -22,6 +23,8 @@ pub struct ReadOptions {
     pub input: Option<ColumnExpression>,
     /// Output of the person; `u` by default.
     pub output: ColumnExpression,
+    /// The column of the time and its unit; by default it is found by names and types.
+    pub time: Option<TimeChoice>,
     /// Sampling frequency in Hz. It wins over the column t, which then gives only the time of the
     /// first sample (0 when there is none); with [`Repair::resample`] it is the frequency of the
     /// new grid. By default the sampling is that of t.
@@ -37,6 +40,7 @@ impl Default for ReadOptions {
         Self {
             input: Some(ColumnExpression::column("e")),
             output: ColumnExpression::column("u"),
+            time: None,
             sampling_hz: None,
             span_s: (None, None),
             repair: Repair::default(),

@@ -122,7 +122,7 @@ pub fn survey(path: &Path) -> Result<FileSurvey, IoError> {
     let file = path.display().to_string();
     let (format, mut bytes) = bytes_of(path)?;
     let (columns, notes) = match format.reading {
-        Reading::Table { record, .. } => of_table(with_time(record(&mut bytes, &file)?)),
+        Reading::Table { record, .. } => of_table(with_time(record(&mut bytes, &file)?, None)?),
         Reading::Arrays(read) => of_arrays(&read(bytes, &file)?),
     };
     let is_time = |column: &&Read| TIMES.contains(&column.name.as_str()) && column.rows > 1;

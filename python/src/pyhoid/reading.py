@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
         input: str | None
         output: str
+        time: str | None
         sampling_frequency: float | None
         start: float | None
         stop: float | None
@@ -42,6 +43,7 @@ def read(
     *,
     input: str | None = "e",
     output: str = "u",
+    time: str | None = None,
     sampling_frequency: float | None = None,
     start: float | None = None,
     stop: float | None = None,
@@ -65,6 +67,9 @@ def read(
     input, output : str
         Columns: a name, ``-name``, or a difference such as ``"r-y"``. ``input=None`` reads only an
         output.
+    time : str, optional
+        Column of the time, with its unit where that is not found: ``"clock:ms"`` (s, ms, us, ns,
+        min, h, iso, sec+nanosec). Without it ``t``, or the column with a usual name of a time.
     sampling_frequency : float, optional
         Hz; without it the column ``t`` (s) gives the sampling.
     start, stop : float, optional
@@ -117,6 +122,7 @@ def read(
         0.0,
         input=input,
         output=output,
+        time=time,
         sampling_frequency=sampling_frequency,
         start=start,
         stop=stop,
@@ -179,6 +185,7 @@ def _read(
     *,
     input: str | None = "e",
     output: str = "u",
+    time: str | None = None,
     sampling_frequency: float | None = None,
     start: float | None = None,
     stop: float | None = None,
@@ -197,6 +204,7 @@ def _read(
             file,
             input=input,
             output=output,
+            time=time,
             sampling_frequency=sampling_frequency,
             start=start,
             stop=stop,

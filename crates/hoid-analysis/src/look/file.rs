@@ -81,6 +81,7 @@ fn seen(path: &Path, roles: &Roles, known: &Known) -> Result<Seen, IoError> {
     let options = ReadOptions {
         input: Some(roles.input.column.parse()?),
         output: roles.output.column.parse()?,
+        time: known.time.clone(),
         sampling_hz: known.sampling_hz,
         ..ReadOptions::default()
     };

@@ -229,6 +229,7 @@ const HEADINGS: [(&str, &[&str]); 2] = [
         &[
             "input",
             "output",
+            "time",
             "fs",
             "udp",
             "from",
