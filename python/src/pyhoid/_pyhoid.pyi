@@ -860,6 +860,8 @@ def read(
     input: str | None,
     output: str,
     time: str | None,
+    trial: str | None,
+    all_trials: bool,
     sampling_frequency: float | None,
     start: float | None,
     stop: float | None,

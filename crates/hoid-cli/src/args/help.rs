@@ -230,6 +230,7 @@ const HEADINGS: [(&str, &[&str]); 2] = [
             "input",
             "output",
             "time",
+            "trial",
             "fs",
             "udp",
             "from",

@@ -2,10 +2,10 @@
 
 use clap::Args;
 use hoid::analysis::Known;
-use hoid::io::TimeChoice;
+use hoid::io::{TimeChoice, TrialChoice};
 use hoid::model::ContinuousTransferFunction;
 
-use super::reading::parse_time;
+use super::reading::{parse_time, parse_trial};
 
 /// What is known already, and therefore not looked for.
 #[derive(Debug, Args)]
@@ -27,6 +27,10 @@ pub struct LookArgs {
     /// [default: t, or a usual name of a time]
     #[arg(long, value_name = "COLUMN[:UNIT]", value_parser = parse_time)]
     pub time: Option<TimeChoice>,
+    /// Column that counts the trials of a file, each a record of its own (t: where the time starts again),
+    /// or one of them, as trial=3 [default: where t starts again]
+    #[arg(long, value_name = "COLUMN[=VALUE]", value_parser = parse_trial)]
+    pub trial: Option<TrialChoice>,
     /// Sampling frequency in Hz; replaces the column t
     #[arg(long, value_name = "HZ")]
     pub fs: Option<f64>,
@@ -47,6 +51,7 @@ impl LookArgs {
             excitation: self.excitation.clone(),
             controlled_element: self.controlled_element.clone(),
             time: self.time.clone(),
+            trial: self.trial.clone(),
             sampling_hz: self.fs,
             from_s: self.from,
             to_s: self.to,

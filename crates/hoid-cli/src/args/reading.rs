@@ -1,7 +1,7 @@
 //! The options by which `hoid identify` and `hoid track` read records and prepare them.
 
 use clap::Args;
-use hoid::io::{Offset, QualityIssueKind, Scaling, TimeChoice};
+use hoid::io::{Offset, QualityIssueKind, Scaling, TimeChoice, TrialChoice};
 use hoid::model::{Decimation, Detrend, FaultHandling};
 
 use super::choices::choice_of;
@@ -19,6 +19,10 @@ pub struct ReadArgs {
     /// min, h, iso (dates and times), sec+nanosec [default: t, or a usual name of a time]
     #[arg(long, value_name = "COLUMN[:UNIT]", value_parser = parse_time)]
     pub time: Option<TimeChoice>,
+    /// Column that counts the trials of a file, each a record of its own (t: where the time starts again),
+    /// or one of them, as trial=3 [default: where t starts again]
+    #[arg(long, value_name = "COLUMN[=VALUE]", value_parser = parse_trial)]
+    pub trial: Option<TrialChoice>,
     /// Sampling frequency in Hz; without it column t (in s) gives the sampling
     #[arg(long, value_name = "HZ")]
     pub fs: Option<f64>,
@@ -125,6 +129,11 @@ fn pair(text: &str) -> Result<(String, &str), String> {
 /// The column of the time.
 pub(super) fn parse_time(text: &str) -> Result<TimeChoice, String> {
     text.parse::<TimeChoice>().map_err(|error| error.to_string())
+}
+
+/// The trials of a file.
+pub(super) fn parse_trial(text: &str) -> Result<TrialChoice, String> {
+    text.parse::<TrialChoice>().map_err(|error| error.to_string())
 }
 
 fn parse_unit(text: &str) -> Result<(String, String), String> {
