@@ -347,7 +347,7 @@ fn sampling(time: &Read, columns: &[Read]) -> Option<SamplingSurvey> {
             .map(|(_, missing)| missing as u64)
             .fold(0, u64::saturating_add),
         first_gap_s: grid.gaps().next().map(|(i, _)| all[grid.rows[i]]),
-        not_increasing: time.rows - grid.rows.len() - all.iter().filter(|t| !t.is_finite()).count(),
+        not_increasing: t.windows(2).filter(|pair| pair[1] <= pair[0]).count(),
         repeated: if beside.is_empty() {
             0
         } else {
