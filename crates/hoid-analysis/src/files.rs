@@ -23,12 +23,14 @@ impl Reading {
     ) -> Result<Recordings, AnalysisError> {
         let mut all = Recordings::default();
         for path in paths {
-            for read in self.segments(path)? {
+            let reads = self.segments(path)?;
+            let parts = reads.len() > 1 || !self.mask.is_empty();
+            for read in reads {
                 told(path, &read);
                 let (record, account) = with_account(read);
-                // The label of a segment ends in its span.
-                let span = record.label().rfind(" (").filter(|_| !self.mask.is_empty());
-                let span = span.map_or("", |at| &record.label()[at..]);
+                // The label of a trial ends in its name, that of a segment in its span.
+                let stem = path.file_stem().map_or(0, |stem| stem.to_string_lossy().len());
+                let span = record.label().get(stem..).filter(|_| parts).unwrap_or_default();
                 all.push(format!("{}{span}", path.display()), record, account);
             }
         }
@@ -48,13 +50,21 @@ impl Reading {
             .map_err(|error| AnalysisError::of_reading(error, path, &self.options))
     }
 
+    /// Reads the record of one file, which holds one trial.
+    ///
+    /// # Errors
+    /// As [`Reading::files`].
+    pub fn one(&self, path: &Path) -> Result<ReadRecord, AnalysisError> {
+        read_prepared(path, &self.options, &self.preparation)
+            .map_err(|error| AnalysisError::of_reading(error, path, &self.options))
+    }
+
     /// Reads one file, of which nothing is left out.
     ///
     /// # Errors
     /// As [`Reading::files`].
     pub fn file(&self, path: &Path, told: impl FnOnce(&Path, &ReadRecord)) -> Result<Recordings, AnalysisError> {
-        let read = read_prepared(path, &self.options, &self.preparation);
-        let read = read.map_err(|error| AnalysisError::of_reading(error, path, &self.options))?;
+        let read = self.one(path)?;
         told(path, &read);
         let (record, account) = with_account(read);
         let mut one = Recordings::default();

@@ -58,9 +58,11 @@ impl Reading {
     fn rows(&self, decimation: Decimation) -> Vec<Setting> {
         let options = &self.options;
         let or_all = |bound: Option<f64>, all: &str| bound.map_or(all.to_owned(), |v| v.to_string());
-        let sampling = options
-            .sampling_hz
-            .map_or("column t".to_owned(), |fs| format!("{fs} Hz"));
+        let of_time = || {
+            let time = options.time.as_ref();
+            time.map_or("column t".to_owned(), |time| format!("column {time}"))
+        };
+        let sampling = options.sampling_hz.map_or_else(of_time, |fs| format!("{fs} Hz"));
         let (from, to) = options.span_s;
         let mut list: Vec<Setting> = Vec::new();
         list.extend(

@@ -275,7 +275,7 @@ pub enum IoError {
     },
     /// Neither a time column nor a sampling frequency.
     #[error(
-        "{file} has no column t (time in s), and no sampling frequency was given; name the time column t, or give --fs HZ; it has {available}"
+        "{file} has no column t (time in s), and no sampling frequency was given; name the column of the time by --time COLUMN, or give --fs HZ; it has {available}"
     )]
     NoSampling {
         /// The file.
@@ -299,9 +299,33 @@ pub enum IoError {
         /// How many there are.
         found: usize,
     },
+    /// Several trials where one is read.
+    #[error("{file} holds {} trials by {by}: {list}; read one of them with --trial {one}", .trials.len())]
+    SeveralTrials {
+        /// The file.
+        file: String,
+        /// The column that counts them, or t.
+        by: String,
+        /// Their names.
+        trials: Vec<String>,
+        /// The names in words.
+        list: String,
+        /// The first, as it is asked for.
+        one: String,
+    },
+    /// A trial that is not there.
+    #[error("{file}: there is no trial {asked}; it has {available}")]
+    NoSuchTrial {
+        /// The file.
+        file: String,
+        /// What was asked for.
+        asked: String,
+        /// The names that exist.
+        available: String,
+    },
     /// Time that stands still or runs back.
     #[error(
-        "{file}, {place}: t = {found} s after {previous} s, expected increasing time; remove the rows that were written twice, write t with more decimals, or give --fs HZ to count samples instead"
+        "{file}, {place}: t = {found} s after {previous} s, expected increasing time; drop rows that were written twice with --drop-repeated, read trials whose time starts again with --trial t, write t with more decimals, or give --fs HZ to count samples instead"
     )]
     NotIncreasing {
         /// The file.

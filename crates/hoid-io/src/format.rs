@@ -14,6 +14,7 @@ use crate::output_table::{OutputTable, TableSchema, Values};
 use crate::read_options::ReadOptions;
 use crate::table::Table;
 use crate::time_column::with_time;
+use crate::trials;
 
 /// A file format.
 pub(crate) struct Format {
@@ -85,10 +86,21 @@ impl Format {
         file: &'a str,
         options: &ReadOptions,
     ) -> Result<Table<'a>, IoError> {
-        match self.reading {
-            Reading::Table { record, .. } => record(bytes, file).map(with_time),
-            Reading::Arrays(read) => table_of(read(std::mem::take(bytes), file)?, options, file),
+        let (table, is_trial) = match self.reading {
+            Reading::Table { record, .. } => (record(bytes, file)?, false),
+            Reading::Arrays(read) => {
+                let contents = read(std::mem::take(bytes), file)?;
+                let (contents, is_trial) = trials::of_contents(contents, options.trial.as_ref(), file)?;
+                (table_of(contents, options, file)?, is_trial)
+            }
+        };
+        let table = with_time(table, options.time.as_ref())?;
+        // Samples that are counted need no time, and one that starts again is none of them.
+        let by_itself = options.trial.is_none() && options.sampling_hz.is_some();
+        if is_trial || by_itself {
+            return Ok(table);
         }
+        trials::of_table(table, options.trial.as_ref())
     }
 
     /// A table of results.

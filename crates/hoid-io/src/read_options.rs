@@ -2,6 +2,8 @@
 //! repaired.
 
 use crate::column_expression::ColumnExpression;
+use crate::time_column::TimeChoice;
+use crate::trials::TrialChoice;
 
 /// What may be mended in a damaged record. By default nothing is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -22,6 +24,11 @@ pub struct ReadOptions {
     pub input: Option<ColumnExpression>,
     /// Output of the person; `u` by default.
     pub output: ColumnExpression,
+    /// The column of the time and its unit; by default it is found by names and types.
+    pub time: Option<TimeChoice>,
+    /// Which trials of the file are read; by default they are known by a t that starts again. A record
+    /// is one of them, [`read_segments`](crate::read_segments) gives all.
+    pub trial: Option<TrialChoice>,
     /// Sampling frequency in Hz. It wins over the column t, which then gives only the time of the
     /// first sample (0 when there is none); with [`Repair::resample`] it is the frequency of the
     /// new grid. By default the sampling is that of t.
@@ -37,6 +44,8 @@ impl Default for ReadOptions {
         Self {
             input: Some(ColumnExpression::column("e")),
             output: ColumnExpression::column("u"),
+            time: None,
+            trial: None,
             sampling_hz: None,
             span_s: (None, None),
             repair: Repair::default(),

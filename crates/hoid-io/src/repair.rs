@@ -93,6 +93,11 @@ pub(crate) fn drop_repeated(table: Table<'_>) -> (Table<'_>, Option<Step>) {
     let rows: Vec<usize> = (0..table.rows)
         .filter(|row| repeated.binary_search(row).is_err())
         .collect();
+    (kept(table, rows), Some(step))
+}
+
+/// Some rows of a table.
+pub(crate) fn kept(table: Table<'_>, rows: Vec<usize>) -> Table<'_> {
     let Table {
         mut columns, source, ..
     } = table;
@@ -101,14 +106,13 @@ pub(crate) fn drop_repeated(table: Table<'_>) -> (Table<'_>, Option<Step>) {
         let texts = (0..rows.len()).filter(|row| column.texts.binary_search(&rows[*row]).is_ok());
         column.texts = texts.collect();
     }
-    let table = Table {
+    Table {
         columns,
         rows: rows.len(),
         source: Box::new(Kept { source, rows }),
         sample_time_s: table.sample_time_s,
         notes: table.notes,
-    };
-    (table, Some(step))
+    }
 }
 
 fn next_run(values: &[f64], from: usize) -> Option<Range<usize>> {

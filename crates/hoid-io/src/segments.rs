@@ -17,16 +17,63 @@ use crate::preparation::{Preparation, Step};
 use crate::read_options::ReadOptions;
 use crate::record_file::read_prepared;
 use crate::record_from_table::ReadRecord;
-use crate::wording::decimal;
+use crate::trials::TrialChoice;
+use crate::wording::{decimal, list};
 
 /// Reads the segments of a file between faults of these kinds that last `shortest_s` or more, in
 /// their order; the whole record where no kind is named. The first carries what is wrong with the
 /// file as a whole.
 ///
+/// Of a file with several trials each is read so, one behind the other.
+///
 /// # Errors
 /// As [`read_prepared`]; [`IoError::Preparation`] for kinds that are no places (a clock, a
 /// constant), for a run-in, and where no segment is left.
 pub fn read_segments(
+    path: &Path,
+    options: &ReadOptions,
+    preparation: &Preparation,
+    mask: &[QualityIssueKind],
+    shortest_s: f64,
+) -> Result<Vec<ReadRecord>, IoError> {
+    let read = read_trial(path, options, preparation, mask, shortest_s);
+    let (by, trials) = match read {
+        Err(IoError::SeveralTrials { by, trials, .. }) if !options.trial.as_ref().is_some_and(TrialChoice::is_one) => {
+            (by, trials)
+        }
+        read => return read,
+    };
+    let mut all = Vec::new();
+    for trial in &trials {
+        let one = ReadOptions {
+            trial: Some(TrialChoice::one(&by, trial)),
+            ..options.clone()
+        };
+        for mut read in read_trial(path, &one, preparation, mask, shortest_s)? {
+            let label = format!("{} ({by} {trial})", read.record.label());
+            read.record = read.record.labelled(label);
+            if all.is_empty() {
+                let count = trials.len();
+                read.notes.push(format!(
+                    "{count} trials by {by} ({}): each is a record of its own",
+                    list_of(&trials)
+                ));
+            } else {
+                // What is said of the file was said of its first trial.
+                read.notes.clear();
+            }
+            all.push(read);
+        }
+    }
+    Ok(all)
+}
+
+fn list_of(trials: &[String]) -> String {
+    list(&trials.iter().map(String::as_str).collect::<Vec<_>>())
+}
+
+/// The segments of a file with one trial.
+fn read_trial(
     path: &Path,
     options: &ReadOptions,
     preparation: &Preparation,

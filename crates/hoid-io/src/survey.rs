@@ -122,7 +122,7 @@ pub fn survey(path: &Path) -> Result<FileSurvey, IoError> {
     let file = path.display().to_string();
     let (format, mut bytes) = bytes_of(path)?;
     let (columns, notes) = match format.reading {
-        Reading::Table { record, .. } => of_table(with_time(record(&mut bytes, &file)?)),
+        Reading::Table { record, .. } => of_table(with_time(record(&mut bytes, &file)?, None)?),
         Reading::Arrays(read) => of_arrays(&read(bytes, &file)?),
     };
     let is_time = |column: &&Read| TIMES.contains(&column.name.as_str()) && column.rows > 1;
@@ -347,7 +347,7 @@ fn sampling(time: &Read, columns: &[Read]) -> Option<SamplingSurvey> {
             .map(|(_, missing)| missing as u64)
             .fold(0, u64::saturating_add),
         first_gap_s: grid.gaps().next().map(|(i, _)| all[grid.rows[i]]),
-        not_increasing: time.rows - grid.rows.len() - all.iter().filter(|t| !t.is_finite()).count(),
+        not_increasing: t.windows(2).filter(|pair| pair[1] <= pair[0]).count(),
         repeated: if beside.is_empty() {
             0
         } else {

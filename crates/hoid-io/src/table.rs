@@ -98,6 +98,11 @@ impl Precision {
         self.significant = self.significant.max(digits(mantissa) - leading_zeros);
     }
 
+    /// Takes one more number with so many decimals into account.
+    pub(crate) fn add_decimals(&mut self, decimals: usize) {
+        self.decimals = Some(self.decimals.unwrap_or(0).max(decimals as i32));
+    }
+
     /// That of the same numbers times a power of ten.
     pub(crate) fn shifted(self, power: i32) -> Self {
         Self {
@@ -130,6 +135,8 @@ pub(crate) struct Column {
     pub(crate) values: Vec<f64>,
     /// Rows that hold text, in increasing order.
     pub(crate) texts: Vec<usize>,
+    /// Whether the values are moments of a clock, in s from the first.
+    pub(crate) moments: bool,
     /// How exactly the values are printed; only kept for the time.
     pub(crate) precision: Precision,
 }
@@ -185,7 +192,7 @@ impl Table<'_> {
             let remedy = if has_decimal_comma(&found) {
                 DECIMAL_COMMA
             } else if is_moment(&found) {
-                "dates and times of a clock are not read: give t as a number of s, or --fs HZ where the samples are even"
+                "a date or time of a clock among numbers: write the whole column in one way, or give --fs HZ where the samples are even"
             } else if row == 0 && self.rows > 1 && self.has_no_number_in(row) {
                 UNITS_ROW
             } else if is_last_cell && self.source.is_open(row) {

@@ -218,8 +218,8 @@ fn errors_name_line_column_and_remedy() {
         &["line 2, column t: found \"s\"", "remove it and say them with --unit"],
     );
     says(
-        "t,e,u\n2024-03-01 10:00:00.00,1,2\n2024-03-01 10:00:00.02,1,2\n",
-        &["line 2, column t", "dates and times of a clock are not read", "--fs HZ"],
+        "t,e,u\n2024-03-01 10:00:00.00,1,2\n0.02,1,2\n",
+        &["line 2, column t", "a date or time of a clock among numbers", "--fs HZ"],
     );
     says(
         "t e u\n0.00 1.5 2\n0.01 1.6 2\n",

@@ -5,7 +5,7 @@
 mod common;
 
 use common::{Desk, defaults};
-use hoid_io::{IoError, ReadOptions, Repair, read_record};
+use hoid_io::{IoError, ReadOptions, ReadRecord, Repair, read_record};
 
 const FILL: Repair = Repair {
     resample: false,
@@ -30,7 +30,10 @@ fn the_time_may_have_the_name_that_a_recorder_gives_it() {
     let found = read("Time [ms];e;u", 1000.0).unwrap();
     assert!((found.record.sample_time().s() - 1.0 / 60.0).abs() < 1e-6);
     assert!(
-        found.notes.iter().any(|note| note == "Time [ms] is taken as t, in s"),
+        found
+            .notes
+            .iter()
+            .any(|note| note == "Time [ms] is taken as t, in s, from ms"),
         "{:?}",
         found.notes
     );
@@ -39,7 +42,82 @@ fn the_time_may_have_the_name_that_a_recorder_gives_it() {
     let path = directory.path().join("two.csv");
     std::fs::write(&path, "time,time_ms,e,u\n0,0,1,2\n0.01,10,1,2\n").unwrap();
     let message = read_record(&path, &ReadOptions::default()).unwrap_err().to_string();
-    assert!(message.contains("has no column t"), "{message}");
+    assert!(
+        message.contains("has no column t") && message.contains("--time"),
+        "{message}"
+    );
+}
+
+/// The record under a header, of 40 rows at 50 Hz whose times are written by `time`.
+fn record_with(header: &str, time: impl Fn(i64) -> String, choice: Option<&str>) -> Result<ReadRecord, IoError> {
+    let rows: String = (0..40).map(|k| format!("{},{k},{}\n", time(k), 2 * k)).collect();
+    let options = ReadOptions {
+        time: choice.map(|choice| choice.parse().unwrap()),
+        ..defaults()
+    };
+    Desk::new().read(format!("{header},e,u\n{rows}"), &options)
+}
+
+#[test]
+fn times_in_any_unit_and_form_are_the_same_record() {
+    let ms = |k: i64| (20 * k).to_string();
+    let ns = |k: i64| (1_718_000_000_123_456_789 + 20_000_000 * k).to_string();
+    let stamp = |k: i64| {
+        format!(
+            "{},{}",
+            1_718_000_000 + (980 + 20 * k) / 1000,
+            (980 + 20 * k) % 1000 * 1_000_000
+        )
+    };
+    let iso = |k: i64| {
+        format!(
+            "2024-03-05T10:{:02}:{:02}.{:03}Z",
+            11 + (59_900 + 20 * k) / 60_000,
+            (59_900 + 20 * k) / 1000 % 60,
+            (59_900 + 20 * k) % 1000
+        )
+    };
+    let s = |k: i64| format!("{:.2}", 0.02 * k as f64);
+    let found: [(&str, &dyn Fn(i64) -> String, Option<&str>); 14] = [
+        ("Zeit [s]", &s, None),
+        ("elapsed", &s, None),
+        ("elapsed", &ms, None),
+        ("t", &ms, None),
+        ("time", &|k| (20_000 * k).to_string(), None),
+        ("%time", &ns, None),
+        ("header.stamp", &ns, None),
+        ("time_ns", &|k| (20_000_000 * k).to_string(), None),
+        ("stamp.sec,stamp.nanosec", &stamp, None),
+        ("timestamp", &iso, None),
+        ("", &s, None),
+        ("clock", &ms, Some("clock:ms")),
+        (
+            "clock",
+            &|k| format!("{:.9}", 0.02 * k as f64 / 60.0),
+            Some("clock:min"),
+        ),
+        ("t", &ms, Some("t:ms")),
+    ];
+    for (header, time, choice) in found {
+        let read = record_with(header, time, choice).unwrap_or_else(|error| panic!("{header} {choice:?}: {error}"));
+        assert!(
+            (read.record.sample_time().s() - 0.02).abs() < 1e-9,
+            "{header} {choice:?}"
+        );
+        assert!(read.record.time_s(0).abs() < 1e-9, "{header} {choice:?}");
+        assert_eq!(read.record.len(), 40);
+    }
+    // A row number is no time, and a unit that is asked for wins over the one that is found.
+    assert!(record_with("", |k| k.to_string(), None).is_err());
+    assert_eq!(
+        record_with("t", ms, Some("t:s")).unwrap().record.sample_time().s(),
+        20.0
+    );
+    let message = record_with("clock", ms, Some("cloc")).unwrap_err().to_string();
+    assert!(
+        message.contains("no column \"cloc\"") && message.contains("clock"),
+        "{message}"
+    );
 }
 
 #[test]
@@ -59,7 +137,9 @@ fn a_given_frequency_wins_over_t() {
     );
     let clock = desk.read("t,e,u\n12:00:01,1,0\n12:00:02,2,0\n", &with(2.0)).unwrap();
     assert_eq!(clock.record.time_s(1), 0.5);
-    assert!(clock.notes[0].contains("t is no number on line 2"), "{:?}", clock.notes);
+    assert_eq!(clock.notes[0], "t is in s from its first moment");
+    let none = desk.read("t,e,u\nx,1,0\n12:00:02,2,0\n", &with(2.0)).unwrap();
+    assert!(none.notes[0].contains("t is no number on line 2"), "{:?}", none.notes);
     assert_eq!(desk.read("e,u\n1,2\n", &with(2.0)).unwrap().record.len(), 1);
     assert!(
         desk.error("e,u\n1,2\n", &defaults())

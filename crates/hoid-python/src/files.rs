@@ -19,7 +19,7 @@ type Read<'py> = (Bound<'py, PyDict>, Vec<String>, Vec<String>);
 
 /// The record of a file, or the records between what is masked.
 #[pyfunction]
-#[pyo3(signature = (path, *, input, output, sampling_frequency, start, stop, resample, fill, detrend, drop_repeated, scale, offset, decimate,
+#[pyo3(signature = (path, *, input, output, time, trial, all_trials, sampling_frequency, start, stop, resample, fill, detrend, drop_repeated, scale, offset, decimate,
     new_sampling_frequency, run_in, mask, shortest))]
 #[allow(clippy::too_many_arguments)]
 pub fn read<'py>(
@@ -27,6 +27,9 @@ pub fn read<'py>(
     path: PathBuf,
     input: Option<String>,
     output: &str,
+    time: Option<&str>,
+    trial: Option<&str>,
+    all_trials: bool,
     sampling_frequency: Option<f64>,
     start: Option<f64>,
     stop: Option<f64>,
@@ -48,6 +51,8 @@ pub fn read<'py>(
             None => None,
         },
         output: output.parse()?,
+        trial: trial.map(str::parse).transpose()?,
+        time: time.map(str::parse).transpose()?,
         sampling_hz: sampling_frequency,
         span_s: (start, stop),
         repair: Repair { resample, fill },
@@ -76,7 +81,13 @@ pub fn read<'py>(
         mask,
         shortest_s: shortest,
     };
-    let found = py.detach(|| reading.segments(&path))?;
+    let found = py.detach(|| {
+        if all_trials {
+            reading.segments(&path)
+        } else {
+            reading.one(&path).map(|read| vec![read])
+        }
+    })?;
     found
         .into_iter()
         .map(|read| {

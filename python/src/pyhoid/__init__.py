@@ -38,7 +38,7 @@ from .groups import group, group_manifest, simulate_group, simulate_people
 from .identification import from_json, identify, identify_operator
 from .operator_fit import OperatorFit
 from .operator_parameters import OperatorParameter
-from .reading import info, read, read_segments, write
+from .reading import info, read, read_segments, read_trials, write
 from .record import Record
 from .reproduction import Reproduction, reproduce
 from .simulation import margins, simulate
@@ -105,6 +105,7 @@ __all__ = [
     "plans",
     "read",
     "read_segments",
+    "read_trials",
     "reproduce",
     "results",
     "simulate",

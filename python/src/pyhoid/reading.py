@@ -11,7 +11,7 @@ from . import _pyhoid
 from ._other_files import readable
 from .record import Record
 
-__all__ = ["info", "read", "read_segments", "write"]
+__all__ = ["info", "read", "read_segments", "read_trials", "write"]
 
 if TYPE_CHECKING:
     from typing_extensions import TypedDict, Unpack
@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 
         input: str | None
         output: str
+        time: str | None
+        trial: str | None
         sampling_frequency: float | None
         start: float | None
         stop: float | None
@@ -42,6 +44,8 @@ def read(
     *,
     input: str | None = "e",
     output: str = "u",
+    time: str | None = None,
+    trial: str | None = None,
     sampling_frequency: float | None = None,
     start: float | None = None,
     stop: float | None = None,
@@ -65,6 +69,11 @@ def read(
     input, output : str
         Columns: a name, ``-name``, or a difference such as ``"r-y"``. ``input=None`` reads only an
         output.
+    time : str, optional
+        Column of the time, with its unit where that is not found: ``"clock:ms"`` (s, ms, us, ns,
+        min, h, iso, sec+nanosec). Without it ``t``, or the column with a usual name of a time.
+    trial : str, optional
+        The trial to read of a file with several: ``"trial=3"``. `read_trials` reads all.
     sampling_frequency : float, optional
         Hz; without it the column ``t`` (s) gives the sampling.
     start, stop : float, optional
@@ -115,8 +124,11 @@ def read(
         path,
         (),
         0.0,
+        False,
         input=input,
         output=output,
+        time=time,
+        trial=trial,
         sampling_frequency=sampling_frequency,
         start=start,
         stop=stop,
@@ -169,16 +181,45 @@ def read_segments(
     --------
     >>> fit = pyhoid.identify(pyhoid.read_segments("run1.csv", ["missing", "stalled"]))
     """
-    return _read(path, [mask] if isinstance(mask, str) else mask, shortest, **options)
+    return _read(path, [mask] if isinstance(mask, str) else mask, shortest, True, **options)
+
+
+def read_trials(path: str | PathLike[str], **options: Unpack[ReadOptions]) -> list[Record]:
+    """Read the trials of one file, each as a record of its own.
+
+    Parameters
+    ----------
+    path : path
+    **options
+        As in `read`. ``trial="trial"`` names the column that counts the trials, ``"t"`` the places
+        where the time starts again, which are found without it too.
+
+    Returns
+    -------
+    list of Record
+
+    Raises
+    ------
+    FileError, FormatError
+        As in `read`.
+
+    Examples
+    --------
+    >>> fit = pyhoid.identify(pyhoid.read_trials("session.csv", trial="trial"))
+    """
+    return _read(path, (), 0.0, True, **options)
 
 
 def _read(
     path: str | PathLike[str],
     mask: Sequence[str],
     shortest: float,
+    all_trials: bool,
     *,
     input: str | None = "e",
     output: str = "u",
+    time: str | None = None,
+    trial: str | None = None,
     sampling_frequency: float | None = None,
     start: float | None = None,
     stop: float | None = None,
@@ -197,6 +238,9 @@ def _read(
             file,
             input=input,
             output=output,
+            time=time,
+            trial=trial,
+            all_trials=all_trials,
             sampling_frequency=sampling_frequency,
             start=start,
             stop=stop,

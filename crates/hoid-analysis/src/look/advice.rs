@@ -1,6 +1,7 @@
 //! How a file is to be read, and the command to type: in words, since nothing is chosen silently.
 
 use hoid_ident::frequency::USUAL_EXCITATIONS;
+use hoid_io::{TimeChoice, TrialChoice};
 
 use super::{columns::Role, file::Look};
 
@@ -11,6 +12,10 @@ pub struct Advice {
     pub input: Option<String>,
     /// Column of the output.
     pub output: Option<String>,
+    /// The column of the time and its unit.
+    pub time: Option<TimeChoice>,
+    /// The trials of the file.
+    pub trial: Option<TrialChoice>,
     /// Sampling frequency, Hz.
     pub sampling_hz: Option<f64>,
     /// Begin of the span of whole periods, s.
@@ -53,6 +58,8 @@ impl Look {
         Some(Advice {
             input: named(input),
             output: named(output),
+            time: self.known.time.clone(),
+            trial: self.known.trial.clone(),
             sampling_hz: self.known.sampling_hz,
             from_s,
             to_s,
@@ -72,6 +79,8 @@ impl Advice {
         let all = [
             ("--input", self.input.clone()),
             ("--output", self.output.clone()),
+            ("--time", self.time.as_ref().map(ToString::to_string)),
+            ("--trial", self.trial.as_ref().map(ToString::to_string)),
             ("--fs", number(self.sampling_hz)),
             ("--from", number(self.from_s)),
             ("--to", number(self.to_s)),

@@ -81,10 +81,19 @@ fn seen(path: &Path, roles: &Roles, known: &Known) -> Result<Seen, IoError> {
     let options = ReadOptions {
         input: Some(roles.input.column.parse()?),
         output: roles.output.column.parse()?,
+        time: known.time.clone(),
+        trial: known.trial.clone(),
         sampling_hz: known.sampling_hz,
         ..ReadOptions::default()
     };
-    let record = read_record(path, &options)?.record;
+    // Of several trials the first is looked at.
+    let record = match read_record(path, &options) {
+        Err(IoError::SeveralTrials { one, .. }) => {
+            let trial = Some(one.parse()?);
+            read_record(path, &ReadOptions { trial, ..options })?.record
+        }
+        read => read?.record,
+    };
     let periods = periods::search(&record, known);
     let lag = match (known.offset_samples, &periods, &known.controlled_element) {
         (None, Ok(found), Some((_, element))) => Some(lag::of_control(&record, found, element)),

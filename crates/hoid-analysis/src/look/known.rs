@@ -1,5 +1,6 @@
 //! What is known of a file before it is looked at.
 
+use hoid_io::{TimeChoice, TrialChoice};
 use hoid_model::ContinuousTransferFunction;
 
 /// What is known already, and therefore not looked for.
@@ -13,6 +14,10 @@ pub struct Known {
     pub excitation: Option<String>,
     /// The controlled element, as it was typed, and as it is meant.
     pub controlled_element: Option<(String, ContinuousTransferFunction)>,
+    /// The column of the time and its unit; found by itself where it is left out.
+    pub time: Option<TimeChoice>,
+    /// The trials of a file; known by a time that starts again where they are left out.
+    pub trial: Option<TrialChoice>,
     /// Sampling frequency, Hz; that of the column t where it is left out.
     pub sampling_hz: Option<f64>,
     /// Begin of the span that counts, s.

@@ -229,6 +229,8 @@ const HEADINGS: [(&str, &[&str]); 2] = [
         &[
             "input",
             "output",
+            "time",
+            "trial",
             "fs",
             "udp",
             "from",

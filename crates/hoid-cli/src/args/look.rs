@@ -2,7 +2,10 @@
 
 use clap::Args;
 use hoid::analysis::Known;
+use hoid::io::{TimeChoice, TrialChoice};
 use hoid::model::ContinuousTransferFunction;
+
+use super::reading::{parse_time, parse_trial};
 
 /// What is known already, and therefore not looked for.
 #[derive(Debug, Args)]
@@ -20,6 +23,14 @@ pub struct LookArgs {
     /// many samples the control was recorded late
     #[arg(long, value_name = "ELEMENT", value_parser = parse_element, allow_hyphen_values = true)]
     pub controlled_element: Option<(String, ContinuousTransferFunction)>,
+    /// Column of the time, and its unit behind a colon: s, ms, us, ns, min, h, iso, sec+nanosec
+    /// [default: t, or a usual name of a time]
+    #[arg(long, value_name = "COLUMN[:UNIT]", value_parser = parse_time)]
+    pub time: Option<TimeChoice>,
+    /// Column that counts the trials of a file, each a record of its own (t: where the time starts again),
+    /// or one of them, as trial=3 [default: where t starts again]
+    #[arg(long, value_name = "COLUMN[=VALUE]", value_parser = parse_trial)]
+    pub trial: Option<TrialChoice>,
     /// Sampling frequency in Hz; replaces the column t
     #[arg(long, value_name = "HZ")]
     pub fs: Option<f64>,
@@ -39,6 +50,8 @@ impl LookArgs {
             output: self.output.clone(),
             excitation: self.excitation.clone(),
             controlled_element: self.controlled_element.clone(),
+            time: self.time.clone(),
+            trial: self.trial.clone(),
             sampling_hz: self.fs,
             from_s: self.from,
             to_s: self.to,

@@ -1,7 +1,7 @@
 //! The options by which `hoid identify` and `hoid track` read records and prepare them.
 
 use clap::Args;
-use hoid::io::{Offset, QualityIssueKind, Scaling};
+use hoid::io::{Offset, QualityIssueKind, Scaling, TimeChoice, TrialChoice};
 use hoid::model::{Decimation, Detrend, FaultHandling};
 
 use super::choices::choice_of;
@@ -15,6 +15,14 @@ pub struct ReadArgs {
     /// Column of the output (control): a name, -name, or a difference
     #[arg(long, value_name = "COLUMN", default_value = "u", allow_hyphen_values = true)]
     pub output: String,
+    /// Column of the time, and its unit behind a colon where it is not found by itself: s, ms, us, ns,
+    /// min, h, iso (dates and times), sec+nanosec [default: t, or a usual name of a time]
+    #[arg(long, value_name = "COLUMN[:UNIT]", value_parser = parse_time)]
+    pub time: Option<TimeChoice>,
+    /// Column that counts the trials of a file, each a record of its own (t: where the time starts again),
+    /// or one of them, as trial=3 [default: where t starts again]
+    #[arg(long, value_name = "COLUMN[=VALUE]", value_parser = parse_trial)]
+    pub trial: Option<TrialChoice>,
     /// Sampling frequency in Hz; without it column t (in s) gives the sampling
     #[arg(long, value_name = "HZ")]
     pub fs: Option<f64>,
@@ -116,6 +124,16 @@ fn pair(text: &str) -> Result<(String, &str), String> {
         .filter(|(name, _)| !name.trim().is_empty())
         .ok_or_else(|| format!("{text:?} names no channel; write CHANNEL=VALUE"))?;
     Ok((name.trim().to_owned(), value))
+}
+
+/// The column of the time.
+pub(super) fn parse_time(text: &str) -> Result<TimeChoice, String> {
+    text.parse::<TimeChoice>().map_err(|error| error.to_string())
+}
+
+/// The trials of a file.
+pub(super) fn parse_trial(text: &str) -> Result<TrialChoice, String> {
+    text.parse::<TrialChoice>().map_err(|error| error.to_string())
 }
 
 fn parse_unit(text: &str) -> Result<(String, String), String> {

@@ -46,6 +46,8 @@ fn options(args: &ReadArgs, with_input: bool) -> Result<ReadOptions, CliError> {
     Ok(ReadOptions {
         input: if with_input { Some(column(&args.input)?) } else { None },
         output: column(&args.output)?,
+        time: args.time.clone(),
+        trial: args.trial.clone(),
         sampling_hz: args.fs,
         span_s: (args.from, args.to),
         repair: Repair {

@@ -25,4 +25,4 @@ pub(crate) use column_path::{ColumnPath, Holds};
 pub(crate) use contents::{COMMENTS, Contents, Entry, Indexing, OBJECT, Value};
 pub(crate) use numbers::{Kind, Numbers};
 pub(crate) use results::output_table_of;
-pub(crate) use selection::{TIMES, table_of};
+pub(crate) use selection::{MOMENTS, TIMES, table_of};

@@ -146,6 +146,11 @@ impl Numbers {
         }
     }
 
+    /// The whole number of eight bytes at a place.
+    pub(crate) fn whole(&self, at: usize) -> Option<i64> {
+        self.bytes_of(at).map(i64::from_le_bytes)
+    }
+
     /// All as `f64`.
     pub(crate) fn values(&self) -> Vec<f64> {
         (0..self.len).map(|at| self.value(at)).collect()

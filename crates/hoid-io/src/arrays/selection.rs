@@ -21,6 +21,9 @@ use crate::wording::{list, shown};
 /// The names of the time, the first that is there.
 pub(crate) const TIMES: [&str; 2] = ["t", "time"];
 
+/// The unit of moments of a clock, in s from the first.
+pub(crate) const MOMENTS: &str = "s from the first";
+
 /// More columns than this are not the channels of a record; the others are left out.
 const MOST_COLUMNS: usize = 1024;
 
@@ -160,7 +163,11 @@ fn column(name: &str, column_path: &ColumnPath, numbers: &Numbers) -> Column {
     let values = numbers.values();
     Column {
         name: name.to_owned(),
-        unit: column_path.unit.clone(),
+        unit: if column_path.unit == MOMENTS {
+            String::from("s")
+        } else {
+            column_path.unit.clone()
+        },
         precision: if is_time(name) {
             Precision::of_times(&values, numbers.kind().is_single())
         } else {
@@ -168,6 +175,7 @@ fn column(name: &str, column_path: &ColumnPath, numbers: &Numbers) -> Column {
         },
         values,
         texts: Vec::new(),
+        moments: column_path.unit == MOMENTS,
     }
 }
 

@@ -27,7 +27,16 @@ pub(super) fn standing(signals: &Signals<'_>, grid: &Grid, found: &mut Vec<Quali
                 .all(|signal| signal.values[*row] == signal.values[row - 1] || signal.values[*row].is_nan())
     };
     let (repeated, others): (Vec<usize>, Vec<usize>) = grid.standing.iter().copied().partition(same);
-    let mut others: Vec<usize> = others.into_iter().chain(grid.back.iter().copied()).collect();
+    // Of rows behind a time that was set back the first alone is earlier than the row before.
+    let falls = |row: &usize| {
+        signals
+            .time
+            .is_none_or(|time| *row == 0 || time.values[*row] <= time.values[row - 1])
+    };
+    let mut others: Vec<usize> = others
+        .into_iter()
+        .chain(grid.back.iter().copied().filter(falls))
+        .collect();
     others.sort_unstable();
     for (kind, rows) in [
         (QualityIssueKind::Repeated, repeated),

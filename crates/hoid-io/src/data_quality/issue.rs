@@ -46,7 +46,7 @@ impl QualityIssueKind {
     pub fn remedy(self) -> &'static str {
         match self {
             Self::Missing => "bridge with --fill, or leave out with --from and --to or --mask missing",
-            Self::Unordered => "look at how the file was joined, or count the samples with --fs",
+            Self::Unordered => "read trials whose time starts again with --trial t, or count the samples with --fs",
             Self::Repeated => "drop them with --drop-repeated",
             Self::Gap => "interpolate with --resample, or leave out with --mask gap",
             Self::Jitter => "interpolate with --resample, or count the samples with --fs if only t is wrong",

@@ -12,6 +12,12 @@ pub struct ReadSettings {
     pub input: String,
     /// Column of the output.
     pub output: String,
+    /// Column of the time and its unit, as `clock:ms`; t, or a usual name of a time, where it is left out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub time: Option<String>,
+    /// The trial of each file that is read, as `trial=3`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub trial: Option<String>,
     /// Sampling frequency, Hz; that of the column t where it is left out.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sampling_hz: Option<f64>,
@@ -75,6 +81,8 @@ impl Default for ReadSettings {
         Self {
             input: "e".to_owned(),
             output: "u".to_owned(),
+            time: None,
+            trial: None,
             sampling_hz: None,
             from_s: None,
             to_s: None,

@@ -32,6 +32,8 @@ fn read_file(manifest: &Manifest, condition: &str, path: &Path, pairing: Pairing
     let options = ReadOptions {
         input: Some(reading.input.parse().map_err(text)?),
         output: reading.output.parse().map_err(text)?,
+        trial: reading.trial.as_deref().map(str::parse).transpose().map_err(text)?,
+        time: reading.time.as_deref().map(str::parse).transpose().map_err(text)?,
         sampling_hz: reading.sampling_hz,
         span_s: (reading.from_s, reading.to_s),
         repair: Repair {

@@ -2,12 +2,14 @@
 //!
 //! | module | what it holds |
 //! |---|---|
+//! | `foreign` | what other programs write, made plain |
 //! | `text` | encoding, comments, separator, lines |
 //! | `table` | the columns of a record |
 //! | `record` | a record into CSV |
 //! | `columns` | tables of results, out and in |
 
 mod columns;
+mod foreign;
 mod record;
 mod table;
 mod text;
@@ -35,6 +37,11 @@ pub(super) const TSV: Format = Format {
 };
 
 const READING: Reading = Reading::Table {
-    record: |bytes, file| table::parse(bytes, file),
+    record: |bytes, file| {
+        let notes = foreign::made_plain(bytes);
+        let mut table = table::parse(bytes, file)?;
+        table.notes.extend(notes);
+        Ok(table)
+    },
     results: |bytes, file| columns::read(&bytes, file),
 };

@@ -18,6 +18,7 @@ use super::text::{
     text,
 };
 use crate::IoError;
+use crate::moment::Moments;
 use crate::table::{Cell, Column, Source, Table, asides, check_names, check_number, with_decimal_point};
 use crate::time_column::is_time;
 use crate::wording::shown;
@@ -75,7 +76,7 @@ pub(crate) fn parse<'a>(bytes: &'a [u8], file: &'a str) -> Result<Table<'a>, IoE
     let mut reader = reader(text.as_bytes(), separator);
     let mut record = csv::ByteRecord::new();
     let mut columns: Vec<Column> = Vec::new();
-    let mut times: Vec<bool> = Vec::new();
+    let mut times: Vec<(bool, Moments)> = Vec::new();
     let mut starts = Vec::new();
     let mut notes = Vec::new();
     let mut empty_at_end = 0;
@@ -90,7 +91,10 @@ pub(crate) fn parse<'a>(bytes: &'a [u8], file: &'a str) -> Result<Table<'a>, IoE
         let mut line = || place(text.as_bytes(), start);
         if columns.is_empty() {
             columns = header(&record, commas, file, &mut line, &mut notes)?;
-            times = columns.iter().map(|column| is_time(&column.name)).collect();
+            times = columns
+                .iter()
+                .map(|column| (is_time(&column.name), Moments::default()))
+                .collect();
             continue;
         }
         if record.len() < columns.len() && open.is_some_and(|open| start >= open) {
@@ -110,26 +114,23 @@ pub(crate) fn parse<'a>(bytes: &'a [u8], file: &'a str) -> Result<Table<'a>, IoE
             });
         }
         empty_at_end = if blank { empty_at_end + 1 } else { 0 };
-        let row = starts.len();
         starts.push(start);
-        for ((column, &is_time), cell) in columns.iter_mut().zip(&times).zip(&record) {
+        for ((column, (is_time, moments)), cell) in columns.iter_mut().zip(&mut times).zip(&record) {
             // The text is UTF-8 as a whole and the separators are ASCII, so that each cell is as
             // well.
             let cell = std::str::from_utf8(cell).unwrap_or("\u{fffd}");
             let cell = &*with_decimal_point(cell, commas);
-            column.values.push(match Cell::parse(cell) {
+            match Cell::parse(cell) {
                 Cell::Number(value) => {
-                    if is_time {
+                    moments.refuse(column);
+                    if *is_time {
                         column.precision.add(cell);
                     }
-                    value
+                    column.values.push(value);
                 }
-                Cell::Missing => f64::NAN,
-                Cell::Text => {
-                    column.texts.push(row);
-                    f64::NAN
-                }
-            });
+                Cell::Missing => column.values.push(f64::NAN),
+                Cell::Text => moments.push(column, cell),
+            }
         }
     }
     // Spreadsheets leave rows of bare separators behind the table.
@@ -213,11 +214,23 @@ fn header(
         });
     }
     check_names(&names, file, notes)?;
-    let column = |name| Column {
+    let column = |name: String| Column {
+        unit: unit_in(&name).unwrap_or_default().to_owned(),
         name,
         ..Column::default()
     };
     Ok(names.into_iter().map(column).collect())
+}
+
+/// The unit at the end of a name: `Stick [V]`, `e (deg)`. Numbers are an index or a part.
+fn unit_in(name: &str) -> Option<&str> {
+    let (before, unit) = match name.strip_suffix(']') {
+        Some(inside) => inside.rsplit_once('[')?,
+        None => name.strip_suffix(')')?.rsplit_once('(')?,
+    };
+    let unit = unit.trim();
+    let is_unit = !before.trim().is_empty() && (1..=12).contains(&unit.chars().count()) && !unit.contains(' ');
+    (is_unit && !unit.starts_with(|c: char| c.is_ascii_digit() || c == ':')).then_some(unit)
 }
 
 #[cfg(test)]
@@ -278,6 +291,36 @@ mod tests {
         let none = parse(b"# sample_time: -1 s\nt,e\n0,1\n# units: t h\n", "run.csv").unwrap();
         assert_eq!(none.sample_time_s, None);
         assert_eq!(none.columns[0].unit, "");
+    }
+
+    #[test]
+    fn units_in_names() {
+        let header = "t,Fehler [deg],Knüppel (V),x(1),x[2],[deg],y (left hand),z (°/s)";
+        let text = format!("{header}\n0,1,2,3,4,5,6,7\n");
+        let table = parse(text.as_bytes(), "run.csv").unwrap();
+        let units: Vec<&str> = table.columns.iter().map(|c| c.unit.as_str()).collect();
+        assert_eq!(units, ["", "deg", "V", "", "", "", "", "°/s"]);
+    }
+
+    #[test]
+    fn moments_are_s_from_the_first() {
+        let values = |cells: &str| {
+            let text = format!("t,e\n{cells}");
+            let table = parse(text.as_bytes(), "run.csv").unwrap();
+            let [t, _] = table.columns.as_slice() else {
+                panic!("two columns")
+            };
+            (t.values.clone(), t.texts.clone(), t.moments)
+        };
+        let (t, texts, moments) = values("10:11:59.98,1\n10:12:00.00,1\n,1\n10:12:00.04,1\n");
+        assert_eq!((t[0], t[1], t[3]), (0.0, 0.02, 0.06));
+        assert!(t[2].is_nan() && texts.is_empty() && moments);
+        // A number or another text among them: the column is none of moments.
+        for other in ["1", "abc"] {
+            let (t, texts, moments) = values(&format!("10:11:59,1\n,1\n{other},1\n10:12:00,1\n"));
+            assert_eq!(texts, if other == "1" { vec![0, 3] } else { vec![0, 2, 3] });
+            assert!(!moments && (t[0].is_nan() && t[3].is_nan()));
+        }
     }
 
     #[test]

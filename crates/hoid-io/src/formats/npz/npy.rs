@@ -3,7 +3,7 @@
 use std::rc::Rc;
 
 use super::header::{self, Descr, Header};
-use crate::arrays::{Array, Entry, Kind, Numbers, Value};
+use crate::arrays::{Array, Entry, Kind, MOMENTS, Numbers, Value};
 use crate::output_table::Values;
 use crate::wording::shown;
 
@@ -34,6 +34,12 @@ enum Item {
     /// Characters of one byte.
     Bytes {
         length: usize,
+    },
+    /// Whole numbers of a unit, which is a power of ten of s: moments, or times between such.
+    Clock {
+        big_endian: bool,
+        unit_s: f64,
+        moments: bool,
     },
     Unread {
         what: &'static str,
@@ -66,11 +72,29 @@ impl Item {
             ('S' | 'a', Some(length)) => return Self::Bytes { length },
             ('f', size) => return unread("numbers of extended precision", size),
             ('c', size) => return unread("complex numbers", size),
-            ('M' | 'm', _) => return unread("dates or times", Some(8)),
+            ('M' | 'm', _) => {
+                return match clock_unit(plain) {
+                    Some(unit_s) => Self::Clock {
+                        big_endian,
+                        unit_s,
+                        moments: letter == 'M',
+                    },
+                    None => unread("dates or times", Some(8)),
+                };
+            }
             ('O', _) => return unread("Python objects", None),
             (_, size) => return unread("an unknown type", size),
         };
         Self::Numbers { kind, big_endian }
+    }
+
+    /// The unit that a type says.
+    fn unit(&self) -> String {
+        String::from(match self {
+            Self::Clock { moments: true, .. } => MOMENTS,
+            Self::Clock { moments: false, .. } => "s",
+            _ => "",
+        })
     }
 
     fn size(&self) -> Option<usize> {
@@ -78,6 +102,7 @@ impl Item {
             Self::Numbers { kind, .. } => Some(kind.size()),
             Self::Unicode { length, .. } => length.checked_mul(4),
             Self::Bytes { length } => Some(*length),
+            Self::Clock { .. } => Some(8),
             Self::Unread { size, .. } => *size,
         }
     }
@@ -89,7 +114,13 @@ pub(super) fn entries(bytes: Vec<u8>, name: &str, alone: bool) -> Result<Vec<Ent
     let (header, at) = header_of(&bytes)?;
     let data = || bytes[at..].to_vec();
     let entries = match &header.descr {
-        Descr::Plain(descr) => vec![Entry::new(name, plain(&Item::of(descr), &header, data())?)],
+        Descr::Plain(descr) => {
+            let item = Item::of(descr);
+            vec![Entry {
+                unit: item.unit(),
+                ..Entry::new(name, plain(&item, &header, data())?)
+            }]
+        }
         Descr::Fields(fields) => structured(fields, &header, data())?
             .into_iter()
             .map(|(field, value)| Entry::field(if alone { "" } else { name }, &field, value))
@@ -167,8 +198,54 @@ fn plain(item: &Item, header: &Header, data: Vec<u8>) -> Result<Value, NpyError>
             Value::Texts(data.chunks_exact(size).map(|text| unicode(text, *big_endian)).collect())
         }
         Item::Bytes { .. } => Value::Texts(data.chunks_exact(size).map(latin).collect()),
+        Item::Clock {
+            big_endian,
+            unit_s,
+            moments,
+        } => Value::Array(Array {
+            numbers: clock(&Numbers::new(data, Kind::I64, *big_endian), *unit_s, *moments),
+            dims: header.shape.clone(),
+            last_fastest: !header.fortran_order,
+        }),
         Item::Unread { .. } => unread(item),
     })
+}
+
+/// The unit in `M8[ns]` and `m8[10us]`, s. Months and years have no fixed length.
+fn clock_unit(descr: &str) -> Option<f64> {
+    let unit = descr.strip_prefix(['M', 'm'])?.strip_prefix("8[")?.strip_suffix(']')?;
+    let from = unit.find(|c: char| !c.is_ascii_digit())?;
+    let count = if from == 0 { 1.0 } else { unit[..from].parse().ok()? };
+    let unit_s = match &unit[from..] {
+        "D" => 86_400.0,
+        "h" => 3600.0,
+        "m" => 60.0,
+        "s" => 1.0,
+        "ms" => 1e-3,
+        "us" => 1e-6,
+        "ns" => 1e-9,
+        _ => return None,
+    };
+    Some(count * unit_s)
+}
+
+/// The numbers of a clock in s, moments from the first; those that are none (NaT) are NaN.
+fn clock(counts: &Numbers, unit_s: f64, moments: bool) -> Numbers {
+    let known: Vec<Option<i64>> = (0..counts.len())
+        .map(|at| counts.whole(at).filter(|n| *n != i64::MIN))
+        .collect();
+    let first = known.iter().flatten().next().copied().filter(|_| moments).unwrap_or(0);
+    // A quotient keeps the digits that a product with 1e-9 loses.
+    let seconds = |count: i64| {
+        let count = (i128::from(count) - i128::from(first)) as f64;
+        if unit_s < 1.0 {
+            count / (1.0 / unit_s).round()
+        } else {
+            count * unit_s
+        }
+    };
+    let values: Vec<f64> = known.into_iter().map(|count| count.map_or(f64::NAN, seconds)).collect();
+    Numbers::from_f64(&values)
 }
 
 fn unread(item: &Item) -> Value {

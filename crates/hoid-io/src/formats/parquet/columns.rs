@@ -10,6 +10,8 @@ pub(super) enum Data {
     Signed(Vec<i64>),
     Unsigned(Vec<u64>),
     Text(Vec<String>),
+    /// Moments of a clock, or times of day, ns.
+    Moments(Vec<i64>),
     /// What is not read, in words.
     Unread(&'static str),
 }

@@ -5,10 +5,11 @@
 
 use bytes::Bytes;
 use half::f16;
-use parquet::basic::{Compression, ConvertedType, LogicalType, Type};
+use parquet::basic::{Compression, ConvertedType, LogicalType, TimeUnit, Type};
 use parquet::column::reader::get_typed_column_reader;
 use parquet::data_type::{
-    BoolType, ByteArrayType, DataType, DoubleType, FixedLenByteArrayType, FloatType, Int32Type, Int64Type,
+    BoolType, ByteArrayType, DataType, DoubleType, FixedLenByteArrayType, FloatType, Int32Type, Int64Type, Int96,
+    Int96Type,
 };
 use parquet::errors::ParquetError;
 use parquet::file::reader::{FileReader, SerializedFileReader};
@@ -26,6 +27,9 @@ const MAGIC: &[u8; 4] = b"PAR1";
 /// A month at 100 samples/s; more rows are taken for damage before they take all memory.
 const MOST_ROWS: usize = 1 << 28;
 const TIME: &str = "a date or time";
+/// ns in a µs and in a ms.
+const MICRO: i64 = 1_000;
+const MILLI: i64 = 1_000_000;
 /// What a value takes as a number and as its place among those that are none, and a text beside its
 /// letters, bytes.
 const VALUE: u64 = 16;
@@ -147,7 +151,6 @@ impl ColumnPath<'_> {
         use ConvertedType as C;
         let unit = 10_f64.powi(column.type_scale());
         let logical = column.logical_type_ref();
-        let time = matches!(logical, Some(LogicalType::Time(_) | LogicalType::Timestamp(_)));
         if column.max_rep_level() > 0 {
             return Ok(Data::Unread("a list"));
         }
@@ -155,10 +158,14 @@ impl ColumnPath<'_> {
             (Type::BOOLEAN, _) => Data::Signed(self.values::<BoolType, _>(|value| i64::from(*value))?),
             (Type::FLOAT, _) => Data::Real(self.values::<FloatType, _>(|value| f64::from(*value))?),
             (Type::DOUBLE, _) => Data::Real(self.values::<DoubleType, _>(|value| *value)?),
-            (Type::INT96, _) | (_, C::DATE | C::TIME_MILLIS | C::TIME_MICROS) => Data::Unread(TIME),
-            (_, C::TIMESTAMP_MILLIS | C::TIMESTAMP_MICROS) => Data::Unread(TIME),
-            // Nanoseconds have no converted type.
-            _ if time => Data::Unread(TIME),
+            (Type::INT96, _) => Data::Moments(self.values::<Int96Type, _>(Int96::to_nanos)?),
+            (Type::INT32, C::TIME_MILLIS) => Data::Moments(self.values::<Int32Type, _>(|ms| i64::from(*ms) * MILLI)?),
+            (Type::INT64, _) if let Some(unit_ns) = clock_ns(column) => {
+                Data::Moments(self.values::<Int64Type, _>(|value| value.saturating_mul(unit_ns))?)
+            }
+            (_, C::DATE | C::TIME_MILLIS | C::TIME_MICROS | C::TIMESTAMP_MILLIS | C::TIMESTAMP_MICROS) => {
+                Data::Unread(TIME)
+            }
             (Type::INT32, C::DECIMAL) => Data::Real(self.values::<Int32Type, _>(|value| f64::from(*value) / unit)?),
             (Type::INT64, C::DECIMAL) => Data::Real(self.values::<Int64Type, _>(|value| *value as f64 / unit)?),
             (Type::INT32, C::UINT_8 | C::UINT_16 | C::UINT_32) => {
@@ -291,6 +298,26 @@ impl Weight for String {
     fn bytes(&self) -> u64 {
         TEXT + self.len() as u64
     }
+}
+
+/// ns in the unit of a column of moments.
+fn clock_ns(column: &ColumnDescriptor) -> Option<i64> {
+    let unit = match column.logical_type_ref() {
+        Some(LogicalType::Timestamp(clock)) => &clock.unit,
+        Some(LogicalType::Time(clock)) => &clock.unit,
+        _ => {
+            return match column.converted_type() {
+                ConvertedType::TIMESTAMP_MILLIS => Some(MILLI),
+                ConvertedType::TIMESTAMP_MICROS | ConvertedType::TIME_MICROS => Some(MICRO),
+                _ => None,
+            };
+        }
+    };
+    Some(match unit {
+        TimeUnit::MILLIS => MILLI,
+        TimeUnit::MICROS => MICRO,
+        TimeUnit::NANOS => 1,
+    })
 }
 
 /// What is correct and not read here.

@@ -6,6 +6,7 @@
 use super::columns::{Data, ReadColumn};
 use super::read::read;
 use crate::IoError;
+use crate::moment::{Moments, seconds};
 use crate::table::{Cell, Column, Precision, Source, Table, asides, check_names};
 use crate::time_column::is_time;
 use crate::wording::shown;
@@ -26,6 +27,9 @@ enum Cells {
         texts: Vec<String>,
         nulls: Vec<usize>,
     },
+    Moments {
+        nulls: Vec<usize>,
+    },
     Unread(&'static str),
 }
 
@@ -40,7 +44,9 @@ impl Source for ParquetSource<'_> {
 
     fn cell(&self, row: usize, column: usize) -> String {
         match self.columns.get(column) {
-            Some(Cells::Numbers { nulls, .. } | Cells::Texts { nulls, .. }) if nulls.binary_search(&row).is_ok() => {
+            Some(Cells::Numbers { nulls, .. } | Cells::Texts { nulls, .. } | Cells::Moments { nulls })
+                if nulls.binary_search(&row).is_ok() =>
+            {
                 String::from("null")
             }
             Some(Cells::Numbers { infinite, .. }) => match infinite.binary_search_by_key(&row, |cell| cell.0) {
@@ -48,6 +54,7 @@ impl Source for ParquetSource<'_> {
                 Err(_) => String::from("NaN"),
             },
             Some(Cells::Texts { texts, .. }) => texts.get(row).map_or_else(String::new, |text| shown(text)),
+            Some(Cells::Moments { .. }) => String::from("a date or time"),
             Some(Cells::Unread(what)) => String::from(*what),
             None => String::new(),
         }
@@ -88,17 +95,28 @@ fn column_of(read: ReadColumn, rows: usize) -> (Column, Cells) {
         Data::Signed(values) => values.into_iter().map(|value| value as f64).collect(),
         Data::Unsigned(values) => values.into_iter().map(|value| value as f64).collect(),
         Data::Text(texts) => {
-            for (row, text) in texts.iter().enumerate() {
-                let cell = Cell::parse(text);
-                if cell == Cell::Text {
-                    column.texts.push(row);
+            let mut moments = Moments::default();
+            for text in &texts {
+                match Cell::parse(text) {
+                    Cell::Number(value) => {
+                        moments.refuse(&mut column);
+                        column.values.push(value);
+                    }
+                    Cell::Missing => column.values.push(f64::NAN),
+                    Cell::Text => moments.push(&mut column, text),
                 }
-                column.values.push(match cell {
-                    Cell::Number(value) => value,
-                    Cell::Missing | Cell::Text => f64::NAN,
-                });
             }
             return (column, Cells::Texts { texts, nulls });
+        }
+        Data::Moments(moments) => {
+            let known = |row: &usize| nulls.binary_search(row).is_err();
+            let first = (0..moments.len()).find(known).map_or(0, |row| moments[row]);
+            column.moments = true;
+            column.unit = String::from("s");
+            column.values = moments.into_iter().map(|ns| seconds(ns, first)).collect();
+            nulls.iter().for_each(|row| column.values[*row] = f64::NAN);
+            column.precision = Precision::of_times(&column.values, single);
+            return (column, Cells::Moments { nulls });
         }
         Data::Unread(what) => {
             column.values = vec![f64::NAN; rows];

@@ -9,6 +9,11 @@ use crate::wording::shown;
 /// The columns of a file, with the kinds that they were written with.
 pub(super) fn read(bytes: Vec<u8>, file: &str) -> Result<OutputTable, IoError> {
     let read = read_columns(bytes, file)?;
+    let unread = |name: &str, what: &str| IoError::Unsupported {
+        file: file.to_owned(),
+        found: format!("column {} holds {what}", shown(name)),
+        remedy: "write the table without it",
+    };
     let mut columns = Vec::with_capacity(read.columns.len());
     for ReadColumn { name, data, nulls, .. } in read.columns {
         let real = |mut values: Vec<f64>| {
@@ -25,13 +30,8 @@ pub(super) fn read(bytes: Vec<u8>, file: &str) -> Result<OutputTable, IoError> {
             Data::Unsigned(values) => real(values.into_iter().map(|value| value as f64).collect()),
             // A missing text was read as an empty one.
             Data::Text(values) => ColumnValues::Text(values),
-            Data::Unread(what) => {
-                return Err(IoError::Unsupported {
-                    file: file.to_owned(),
-                    found: format!("column {} holds {what}", shown(&name)),
-                    remedy: "write the table without it",
-                });
-            }
+            Data::Moments(_) => return Err(unread(&name, "a date or time")),
+            Data::Unread(what) => return Err(unread(&name, what)),
         };
         columns.push(OutputColumn { name, values });
     }

@@ -66,6 +66,8 @@ fn options(draw: &mut Draw) -> ReadOptions {
     ReadOptions {
         input: (draw.below(8) > 0).then(|| input.parse().unwrap()),
         output: output.parse().unwrap(),
+        time: None,
+        trial: None,
         sampling_hz: [None, None, Some(100.0), Some(1e-6), Some(1e6)][draw.below(5)],
         span_s: [(None, None), (Some(0.005), Some(0.025)), (Some(-1e300), Some(1e300))][draw.below(3)],
         repair: Repair {

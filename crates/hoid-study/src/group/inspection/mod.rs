@@ -58,6 +58,8 @@ pub fn inspect(manifest: &mut Manifest, directory: &Path, known: &Known) -> Resu
         ..known.clone()
     };
     (manifest.read.input, manifest.read.output) = (input.column, output.column);
+    manifest.read.trial = known.trial.as_ref().map(ToString::to_string);
+    manifest.read.time = known.time.as_ref().map(ToString::to_string);
     manifest.read.sampling_hz = known.sampling_hz;
     (manifest.read.from_s, manifest.read.to_s) = (known.from_s, known.to_s);
     let mut of_first = first.seen.as_ref().ok().map(|seen| seen.record.clone());

@@ -1,0 +1,177 @@
+//! Text of other programs, made what the reader of tables takes: UTF-16 and Latin 1, lines above the
+//! header, columns between blanks.
+//!
+//! All of it is done in the bytes, line by line, so that messages still name the lines of the file.
+
+use super::text::{is_aside, separator};
+use crate::table::{Cell, with_decimal_point};
+
+/// Lines among which the header is looked for.
+const LINES: usize = 60;
+
+/// Letters and signs of Latin 1 that units and names of columns have; other bytes are damage.
+const LATIN: &[u8] = b"\xb0\xb2\xb3\xb5\xc4\xc9\xd6\xdc\xdf\xe0\xe4\xe7\xe8\xe9\xea\xf1\xf6\xfc";
+
+/// Rewrites the bytes of a table, and says what was done.
+pub(super) fn made_plain(bytes: &mut Vec<u8>) -> Vec<String> {
+    let mut notes = Vec::new();
+    if let Some(text) = utf16(bytes) {
+        *bytes = text.into_bytes();
+        notes.push(String::from("the text is in UTF-16"));
+    } else if std::str::from_utf8(bytes).is_err() && is_latin(bytes) {
+        *bytes = bytes
+            .iter()
+            .map(|byte| char::from(*byte))
+            .collect::<String>()
+            .into_bytes();
+        notes.push(String::from("the text is taken as Latin 1"));
+    }
+    let Ok(text) = std::str::from_utf8(bytes) else {
+        return notes;
+    };
+    if let Some(tabs) = between_tabs(text) {
+        *bytes = tabs.into_bytes();
+        notes.push(String::from("blanks divide its columns"));
+    } else if let Some((lines, without)) = without_preamble(text) {
+        *bytes = without.into_bytes();
+        notes.push(format!("lines above the header are left out: {lines}"));
+    }
+    notes
+}
+
+/// Text in UTF-16, which a mark at its beginning says.
+fn utf16(bytes: &[u8]) -> Option<String> {
+    let unit: fn([u8; 2]) -> u16 = match bytes {
+        [0xff, 0xfe, ..] => u16::from_le_bytes,
+        [0xfe, 0xff, ..] => u16::from_be_bytes,
+        _ => return None,
+    };
+    let rest = &bytes[2..];
+    let units: Vec<u16> = rest.chunks_exact(2).map(|pair| unit([pair[0], pair[1]])).collect();
+    String::from_utf16(&units).ok().filter(|_| rest.len() % 2 == 0)
+}
+
+/// Whether each byte that is no ASCII is one of a name or a unit.
+fn is_latin(bytes: &[u8]) -> bool {
+    bytes.iter().all(|byte| byte.is_ascii() || LATIN.contains(byte))
+}
+
+fn is_number(cell: &str) -> bool {
+    matches!(
+        Cell::parse(&with_decimal_point(cell.trim().trim_matches('"'), true)),
+        Cell::Number(_)
+    )
+}
+
+/// A table whose columns blanks divide, with tabs in their place: as many words in the header as
+/// numbers in each line.
+fn between_tabs(text: &str) -> Option<String> {
+    let mut lines = text.lines().filter(|line| !is_aside(line));
+    let header = lines.next()?;
+    let count = header.split_whitespace().count();
+    let is_row = |line: &str| line.split_whitespace().count() == count;
+    let numbers = |line: &str| {
+        line.split_whitespace()
+            .all(|word| matches!(Cell::parse(word), Cell::Number(_) | Cell::Missing))
+    };
+    if count < 2 || header.contains([',', ';', '\t', '"']) || header.split_whitespace().any(is_number) {
+        return None;
+    }
+    let mut rows = lines.peekable();
+    (rows.peek().is_some() && rows.all(|line| is_row(line) && numbers(line))).then(|| {
+        let line = |line: &str| match is_aside(line) {
+            true => line.to_owned(),
+            false => line.split_whitespace().collect::<Vec<_>>().join("\t"),
+        };
+        text.lines().map(|text| line(text) + "\n").collect()
+    })
+}
+
+/// The text with a mark of comments in front of the lines above its header, and how many those are. The
+/// header is the first line of words over a line of as many cells, most of them numbers.
+fn without_preamble(text: &str) -> Option<(usize, String)> {
+    let lines: Vec<&str> = text.lines().take(LINES).collect();
+    let filled: Vec<usize> = (0..lines.len()).filter(|at| !is_aside(lines[*at])).collect();
+    let is_header = |pair: &&[usize]| {
+        let (header, row) = (lines[pair[0]], lines[pair[1]]);
+        let mark = char::from(separator(header));
+        let names = header.split(mark).count();
+        let cells: Vec<&str> = row.split(mark).collect();
+        let numbers = cells.iter().filter(|cell| is_number(cell)).count();
+        names > 1 && names == cells.len() && 2 * numbers > names && !header.split(mark).any(is_number)
+    };
+    let header = filled.windows(2).find(is_header)?[0];
+    let above: Vec<usize> = filled.into_iter().filter(|at| *at < header).collect();
+    let mark = char::from(separator(lines[header]));
+    let cells = |at: usize| lines[at].split(mark).count();
+    // A line of as many cells is the header, and that of the units stands below it.
+    if above.is_empty() || above.iter().any(|at| cells(*at) == cells(header)) {
+        return None;
+    }
+    // A break of lines is kept as it is.
+    let marked = |(at, line): (usize, &str)| {
+        if above.contains(&at) {
+            format!("#{line}")
+        } else {
+            line.to_owned()
+        }
+    };
+    let text: String = text.split_inclusive('\n').enumerate().map(marked).collect();
+    Some((above.len(), text))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn plain(bytes: &[u8]) -> (String, usize) {
+        let mut bytes = bytes.to_vec();
+        let notes = made_plain(&mut bytes);
+        (String::from_utf8_lossy(&bytes).into_owned(), notes.len())
+    }
+
+    #[test]
+    fn encodings() {
+        let text = "t\te\n0\t1\n";
+        for (mark, order) in [
+            (0xfeff_u16, u16::to_le_bytes as fn(u16) -> [u8; 2]),
+            (0xfeff, u16::to_be_bytes),
+        ] {
+            let bytes: Vec<u8> = std::iter::once(mark)
+                .chain(text.encode_utf16())
+                .flat_map(order)
+                .collect();
+            assert_eq!(plain(&bytes), (text.to_owned(), 1));
+        }
+        assert_eq!(plain(b"t,e [\xb0]\n0,1\n"), (String::from("t,e [°]\n0,1\n"), 1));
+        // Damage stays damage: half a unit, other bytes.
+        for bytes in [&b"\xff\xfet\0e"[..], b"t,e\n0,\xff1\n", b"t,e\n0,\x801\n"] {
+            assert_eq!(plain(bytes).1, 0);
+        }
+    }
+
+    #[test]
+    fn lines_above_the_header_and_blanks() {
+        let text = "Name;Session 4\nDate;05.03.2024\n\nRate;50 Hz\nt;e;u\n0,00;1;2\n";
+        let (found, notes) = plain(text.as_bytes());
+        assert_eq!(
+            found,
+            "#Name;Session 4\n#Date;05.03.2024\n\n#Rate;50 Hz\nt;e;u\n0,00;1;2\n"
+        );
+        assert_eq!(notes, 1);
+        assert_eq!(
+            plain(b"  t   e\n 0.0  1\n 0.1 -2\n"),
+            (String::from("t\te\n0.0\t1\n0.1\t-2\n"), 1)
+        );
+        for same in [
+            "t,e,u\n0,1,2\n",
+            "t,e,u\ns,deg,deg\n0,1,2\n",
+            "t e u\n0 1\n",
+            "",
+            "1,2\n3,4\n",
+            "a\nb\n",
+        ] {
+            assert_eq!(plain(same.as_bytes()), (same.to_owned(), 0), "{same:?}");
+        }
+    }
+}
