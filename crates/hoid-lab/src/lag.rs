@@ -3,7 +3,7 @@
 //! The tracker acts in a basis whose lag stays where it began: nothing of it says what T_I is. So the
 //! samples of the measurement since the last declared change are fitted as `hoid identify` does, each
 //! 10 s, on a thread of its own: all forms of the operator, the one that held-out data choose,
-//! and its T_I where the data determine it ([`hoid_ident::family`]). Of a form without a lag, or one
+//! and its T_I where the data determine it ([`hoid_analysis::identify`]). Of a form without a lag, or one
 //! whose interval reaches a pure integration, T_I is not determined, and no number is told.
 //!
 //! A form with a lag is chosen now and then for who has none, a short lag beside a longer lead: for 13 of
@@ -15,7 +15,6 @@ use std::{
     thread,
 };
 
-use hoid_ident::family::FamilyEstimator;
 use hoid_model::{Channel, Record, SampleTime, uncertainty::Estimate};
 use hoid_track::Sample;
 
@@ -40,9 +39,9 @@ pub enum Lag {
 impl Lag {
     /// Of a record of one person who does not change.
     pub fn of(record: Record) -> Self {
-        let fit = FamilyEstimator::default().fit(&[record]);
-        let parameter = fit.ok().and_then(|fit| {
-            let all = &fit.operator(0).parameters;
+        let found = hoid_analysis::identify(&[record]);
+        let parameter = found.ok().and_then(|found| {
+            let all = &found.fit.operator(0).parameters;
             all.iter().find(|p| p.name == "T_I" && p.determined).cloned()
         });
         match parameter.map(|p| (p.value, p.standard_error)) {

@@ -54,6 +54,7 @@ const ALLOWED: [(&str, &[&str]); 19] = [
     (
         "hoid-lab",
         &[
+            "hoid-analysis",
             "hoid-model",
             "hoid-ident",
             "hoid-sim",
