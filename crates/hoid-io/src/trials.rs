@@ -116,8 +116,6 @@ pub(crate) fn of_table<'a>(table: Table<'a>, choice: Option<&TrialChoice>) -> Re
 fn several(file: String, by: &str, names: Vec<&str>) -> IoError {
     IoError::SeveralTrials {
         file,
-        list: list(&names),
-        one: format!("{by}={}", names.first().unwrap_or(&"")),
         by: by.to_owned(),
         trials: names.into_iter().map(str::to_owned).collect(),
     }
