@@ -3,6 +3,8 @@
 use hoid_model::ModelError;
 use thiserror::Error;
 
+use crate::wording::list;
+
 /// Why a file could not be read or written. Each message names the file, the place in it, what was
 /// found, what was expected and the remedy. A `place` is "line 12" where the format has lines, else
 /// "row 12".
@@ -300,18 +302,14 @@ pub enum IoError {
         found: usize,
     },
     /// Several trials where one is read.
-    #[error("{file} holds {} trials by {by}: {list}; read one of them with --trial {one}", .trials.len())]
+    #[error("{file} holds {} trials by {by}: {}; read one of them with --trial {by}={}", .trials.len(), listed(.trials), .trials.first().map_or("", |name| name.as_str()))]
     SeveralTrials {
         /// The file.
         file: String,
         /// The column that counts them, or t.
         by: String,
-        /// Their names.
+        /// Their names, two at least.
         trials: Vec<String>,
-        /// The names in words.
-        list: String,
-        /// The first, as it is asked for.
-        one: String,
     },
     /// A trial that is not there.
     #[error("{file}: there is no trial {asked}; it has {available}")]
@@ -570,4 +568,9 @@ fn remedy_of_writing(source: &std::io::Error) -> &'static str {
         ErrorKind::ReadOnlyFilesystem => "name a place on a disk that can be written",
         _ => "check that the directory exists and that you may write there",
     }
+}
+
+/// Names in words.
+fn listed(names: &[String]) -> String {
+    list(&names.iter().map(String::as_str).collect::<Vec<_>>())
 }

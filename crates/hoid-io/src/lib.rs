@@ -36,7 +36,7 @@
 //! | `formats`, `format` | the formats, and what each says of itself |
 //! | `arrays` | files of named arrays: paths, and the columns among them |
 //! | `time_column`, `moment` | [`TimeChoice`]: the time under another name, in another unit; dates and times of a clock |
-//! | `trials` | [`TrialChoice`]: the trials of a file |
+//! | `trial_choice`, `trials` | [`TrialChoice`]: the trials of a file |
 //! | `usual_names` | [`error_among`], [`control_among`]: columns by the names that people give them |
 //! | `table`, `table_reader`, `time_grid`, `record_from_table` | the columns of any format, and the record made of them |
 //! | `column_expression`, `read_options` | [`ColumnExpression`], [`ReadOptions`]: what is read and how |
@@ -84,6 +84,7 @@ mod table_reader;
 mod table_writer;
 mod time_column;
 mod time_grid;
+mod trial_choice;
 mod trials;
 mod usual_names;
 mod wording;
@@ -113,6 +114,6 @@ pub use survey::{ColumnSurvey, FileSurvey, SamplingSurvey, ValueSurvey, survey};
 pub use table_file::{check_table_path, read_table, write_table};
 pub use table_writer::TableWriter;
 pub use time_column::TimeChoice;
-pub use trials::TrialChoice;
+pub use trial_choice::TrialChoice;
 pub use usual_names::{control_among, error_among};
 pub use wording::printable;

@@ -3,7 +3,7 @@
 
 use crate::column_expression::ColumnExpression;
 use crate::time_column::TimeChoice;
-use crate::trials::TrialChoice;
+use crate::trial_choice::TrialChoice;
 
 /// What may be mended in a damaged record. By default nothing is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

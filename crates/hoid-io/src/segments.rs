@@ -17,7 +17,7 @@ use crate::preparation::{Preparation, Step};
 use crate::read_options::ReadOptions;
 use crate::record_file::read_prepared;
 use crate::record_from_table::ReadRecord;
-use crate::trials::TrialChoice;
+use crate::trial_choice::TrialChoice;
 use crate::wording::{decimal, list};
 
 /// Reads the segments of a file between faults of these kinds that last `shortest_s` or more, in

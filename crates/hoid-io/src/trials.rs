@@ -7,79 +7,17 @@
 //! have [`SHORTEST`] rows, and t must fall by half of what it rose at least, which no clock does that
 //! is set. The column that steps with the parts, if there is one, gives them their names.
 
-use std::fmt;
 use std::ops::Range;
-use std::str::FromStr;
 
 use crate::IoError;
 use crate::arrays::Contents;
 use crate::repair::kept;
 use crate::table::{Column, Table};
+use crate::trial_choice::TrialChoice;
 use crate::wording::{did_you_mean, list, shown};
 
 /// Rows of the shortest part that is taken for a trial unasked.
 const SHORTEST: usize = 8;
-
-/// Which trials of a file are read: `COLUMN` for each value of a column (`t`: where the time starts
-/// again), `COLUMN=VALUE` for one.
-///
-/// ```
-/// let trial: hoid_io::TrialChoice = "trial=3".parse()?;
-/// assert_eq!(trial.to_string(), "trial=3");
-/// # Ok::<(), hoid_io::IoError>(())
-/// ```
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct TrialChoice {
-    column: String,
-    value: Option<String>,
-}
-
-impl TrialChoice {
-    /// One trial.
-    pub(crate) fn one(column: &str, value: &str) -> Self {
-        Self {
-            column: column.to_owned(),
-            value: Some(value.to_owned()),
-        }
-    }
-
-    /// Whether it names one trial.
-    pub(crate) fn is_one(&self) -> bool {
-        self.value.is_some()
-    }
-}
-
-impl FromStr for TrialChoice {
-    type Err = IoError;
-
-    /// # Errors
-    /// [`IoError::Expression`] where no column or no value is named.
-    fn from_str(text: &str) -> Result<Self, IoError> {
-        let (column, value) = match text.rsplit_once('=') {
-            Some((column, value)) => (column.trim(), Some(value.trim().to_owned())),
-            None => (text.trim(), None),
-        };
-        if column.is_empty() || value.as_ref().is_some_and(String::is_empty) {
-            return Err(IoError::Expression {
-                found: text.to_owned(),
-                expected: String::from("expected the column that counts the trials, or one of them as trial=3"),
-            });
-        }
-        Ok(Self {
-            column: column.to_owned(),
-            value,
-        })
-    }
-}
-
-impl fmt::Display for TrialChoice {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match &self.value {
-            Some(value) => write!(f, "{}={value}", self.column),
-            None => f.write_str(&self.column),
-        }
-    }
-}
 
 /// Trials that were found: their names and rows.
 type Parts = Vec<(String, Range<usize>)>;
@@ -116,8 +54,6 @@ pub(crate) fn of_table<'a>(table: Table<'a>, choice: Option<&TrialChoice>) -> Re
 fn several(file: String, by: &str, names: Vec<&str>) -> IoError {
     IoError::SeveralTrials {
         file,
-        list: list(&names),
-        one: format!("{by}={}", names.first().unwrap_or(&"")),
         by: by.to_owned(),
         trials: names.into_iter().map(str::to_owned).collect(),
     }

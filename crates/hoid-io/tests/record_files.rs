@@ -118,7 +118,7 @@ fn channels_that_could_not_be_read_back_are_not_written() {
 #[test]
 fn other_extensions_and_places() {
     let desk = Desk::new();
-    for name in ["run.xlsx", "run", "run.csv.gz"] {
+    for name in ["run.xlsx", "run", "run.npz.gz"] {
         fs::write(desk.path(name), "t,e,u\n0,1,2\n").unwrap();
         let message = read_record(&desk.path(name), &defaults()).unwrap_err().to_string();
         assert!(
@@ -222,7 +222,7 @@ fn errors_name_line_column_and_remedy() {
         &["line 2, column t", "a date or time of a clock among numbers", "--fs HZ"],
     );
     says(
-        "t e u\n0.00 1.5 2\n0.01 1.6 2\n",
+        "t e\n0.00 1.5 2\n0.01 1.6 2\n",
         &["3 numbers between blanks", "expected commas, semicolons or tabs"],
     );
     says(

@@ -48,6 +48,9 @@ fn the_time_may_have_the_name_that_a_recorder_gives_it() {
     );
 }
 
+/// A header, how its times are written, and what is asked for.
+type Written<'a> = (&'a str, &'a dyn Fn(i64) -> String, Option<&'a str>);
+
 /// The record under a header, of 40 rows at 50 Hz whose times are written by `time`.
 fn record_with(header: &str, time: impl Fn(i64) -> String, choice: Option<&str>) -> Result<ReadRecord, IoError> {
     let rows: String = (0..40).map(|k| format!("{},{k},{}\n", time(k), 2 * k)).collect();
@@ -78,7 +81,7 @@ fn times_in_any_unit_and_form_are_the_same_record() {
         )
     };
     let s = |k: i64| format!("{:.2}", 0.02 * k as f64);
-    let found: [(&str, &dyn Fn(i64) -> String, Option<&str>); 14] = [
+    let found: [Written<'_>; 14] = [
         ("Zeit [s]", &s, None),
         ("elapsed", &s, None),
         ("elapsed", &ms, None),

@@ -88,8 +88,9 @@ fn seen(path: &Path, roles: &Roles, known: &Known) -> Result<Seen, IoError> {
     };
     // Of several trials the first is looked at.
     let record = match read_record(path, &options) {
-        Err(IoError::SeveralTrials { one, .. }) => {
-            let trial = Some(one.parse()?);
+        Err(IoError::SeveralTrials { by, trials, .. }) => {
+            let first = trials.first().map_or("", String::as_str);
+            let trial = Some(format!("{by}={first}").parse()?);
             read_record(path, &ReadOptions { trial, ..options })?.record
         }
         read => read?.record,

@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::Path;
 
-use super::{ALL, csv};
+use super::{ALL, csv, packed};
 use crate::IoError;
 use crate::format::{Format, Writing};
 
@@ -141,8 +141,17 @@ pub(crate) fn bytes_of(path: &Path) -> Result<(&'static Format, Vec<u8>), IoErro
     if path.is_dir() {
         return Err(IoError::Directory { file: file() });
     }
-    let format = format_to_read(path)?;
-    let bytes = fs::read(path).map_err(|source| IoError::Unreadable { file: file(), source })?;
+    // Text alone is packed: binary formats pack their columns themselves.
+    let inner = packed::inner(path).filter(|inner| format_of(inner).is_some_and(|format| format.name == csv::CSV.name));
+    let plain = inner.as_deref().unwrap_or(path);
+    let format = format_to_read(plain)?;
+    let mut bytes = fs::read(path).map_err(|source| IoError::Unreadable { file: file(), source })?;
+    if inner.is_some() {
+        bytes = packed::unpacked(&bytes, &file())?;
+    }
+    if format.endings == csv::TSV.endings {
+        bytes = packed::with_sidecar(bytes, plain);
+    }
     Ok((format, bytes))
 }
 
@@ -178,7 +187,7 @@ mod tests {
                 .map(|error| error.to_string())
                 .unwrap_or_default()
         };
-        assert!(message("run.csv.gz").ends_with("; unpack it first"));
+        assert!(message("run.npz.gz").ends_with("; unpack it first"));
         assert!(message("run.TDMS").contains("package nptdms"));
         assert!(message("run.abc").ends_with("or .xdf"));
     }

@@ -9,12 +9,14 @@
 //! | `npz` | NPZ and NPY of numpy |
 //! | `mat` | variables of MATLAB, HDF5 |
 //! | `xdf` | streams of the Lab Streaming Layer |
+//! | `packed` | text packed by gzip, and tables of BIDS |
 //! | `lookup` | the format of a file by its extension |
 
 mod csv;
 mod lookup;
 mod mat;
 mod npz;
+mod packed;
 mod parquet;
 mod xdf;
 

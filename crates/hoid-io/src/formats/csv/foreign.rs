@@ -48,7 +48,7 @@ fn utf16(bytes: &[u8]) -> Option<String> {
     };
     let rest = &bytes[2..];
     let units: Vec<u16> = rest.chunks_exact(2).map(|pair| unit([pair[0], pair[1]])).collect();
-    String::from_utf16(&units).ok().filter(|_| rest.len() % 2 == 0)
+    String::from_utf16(&units).ok().filter(|_| rest.len().is_multiple_of(2))
 }
 
 /// Whether each byte that is no ASCII is one of a name or a unit.

@@ -13,6 +13,8 @@
 //! Blank lines are skipped; a byte order mark and CRLF are tolerated. The stated sample time says
 //! without rounding what t can only say up to its last digit; it counts where t agrees with it.
 
+use std::collections::HashMap;
+
 use super::text::{
     as_meant, comments, has_decimal_commas, is_aside, open_line, place, reader, refuse_blanks, row_start, separator,
     text,
@@ -21,7 +23,7 @@ use crate::IoError;
 use crate::moment::Moments;
 use crate::table::{Cell, Column, Source, Table, asides, check_names, check_number, with_decimal_point};
 use crate::time_column::is_time;
-use crate::wording::shown;
+use crate::wording::{list, shown};
 
 /// The text of the file, asked again when an error needs a line or a cell.
 struct CsvSource<'a> {
@@ -213,6 +215,7 @@ fn header(
             found: shown(&names.join(", ")),
         });
     }
+    let names = told_apart(names, notes);
     check_names(&names, file, notes)?;
     let column = |name: String| Column {
         unit: unit_in(&name).unwrap_or_default().to_owned(),
@@ -220,6 +223,32 @@ fn header(
         ..Column::default()
     };
     Ok(names.into_iter().map(column).collect())
+}
+
+/// Names that differ: columns of one name are called by their place, so that a signal can be chosen among
+/// them and the others do no harm.
+fn told_apart(names: Vec<String>, notes: &mut Vec<String>) -> Vec<String> {
+    let mut count: HashMap<&str, usize> = HashMap::new();
+    names.iter().for_each(|name| *count.entry(name).or_default() += 1);
+    let several = |name: &str| !name.is_empty() && count[name] > 1;
+    let different = |(at, name): (usize, &String)| match several(name) {
+        true => format!("{name} (column {})", at + 1),
+        false => name.clone(),
+    };
+    let found: Vec<String> = names.iter().enumerate().map(different).collect();
+    let renamed: Vec<&str> = found
+        .iter()
+        .zip(&names)
+        .filter(|(new, old)| new != old)
+        .map(|(new, _)| new.as_str())
+        .collect();
+    if !renamed.is_empty() {
+        notes.push(format!(
+            "several columns have one name and are called {}",
+            list(&renamed)
+        ));
+    }
+    found
 }
 
 /// The unit at the end of a name: `Stick [V]`, `e (deg)`. Numbers are an index or a part.
@@ -355,7 +384,14 @@ mod tests {
         assert!(message(b"t,e,u\n").contains("no samples"));
         assert!(message(b"t,e,u\n,,\n").contains("no samples"));
         assert!(message(b"# t,e,u\n0,1,2\n").contains("line 2: the first line holds numbers (0, 1, 2)"));
-        assert!(message(b"t,e,u,e\n0,1,2,3\n").contains("columns 2 and 4 are both named \"e\""));
+        let text = b"t,e,u,e,\n0,1,2,3,4\n";
+        let table = parse(text, "run.csv").unwrap();
+        assert_eq!(table.names(), ["t", "e (column 2)", "u", "e (column 4)", ""]);
+        assert!(
+            table.notes[0].contains("called e (column 2), e (column 4)"),
+            "{:?}",
+            table.notes
+        );
         assert!(message(b"t,e\n0,1\xff\n").contains("line 2: the byte 0xFF"));
         assert!(message(b"PK\x03\x04\x00").contains("line 1: a zero byte"));
         let long = format!("t,e\n0,1\n{},2,3\n", "x".repeat(1000));

@@ -27,6 +27,8 @@ pub(super) struct Stream {
     pub(super) offsets: Vec<(f64, f64)>,
     /// None where the recorder has not closed the file, or its end is lost.
     pub(super) footer: Option<Footer>,
+    /// Why a footer that is there cannot be read.
+    pub(super) unread_footer: Option<String>,
 }
 
 /// The values of all channels, sample by sample.
@@ -106,13 +108,18 @@ pub(super) fn streams(bytes: &[u8]) -> Result<(Vec<Stream>, Option<usize>), Stri
                 samples,
                 offsets: Vec::new(),
                 footer: None,
+                unread_footer: None,
             });
             continue;
         }
         let stream = known.get(&id).and_then(|at| streams.get_mut(*at));
         let stream = stream.ok_or_else(|| damaged(String::from("its header is missing")))?;
         if tag == STREAM_FOOTER {
-            stream.footer = Some(header::footer(content.rest).map_err(damaged)?);
+            // The samples do not need it: it is only held against them.
+            match header::footer(content.rest) {
+                Ok(footer) => stream.footer = Some(footer),
+                Err(why) => stream.unread_footer = Some(why),
+            }
             continue;
         }
         let read = if tag == SAMPLES {

@@ -43,7 +43,13 @@ pub(super) fn read(bytes: &[u8], file: &str) -> Result<Contents, IoError> {
             file: file.to_owned(),
             found,
         })?;
-        if stream.footer.is_none() && !stream.stamps.is_empty() {
+        if let Some(why) = &stream.unread_footer {
+            notes.push(format!(
+                "stream {}: {why}; its {} samples are read, and whether they are all is not known",
+                shown(&stream.header.name),
+                stream.stamps.len()
+            ));
+        } else if stream.footer.is_none() && !stream.stamps.is_empty() {
             let (first, last) = (stream.stamps[0], stream.stamps[stream.stamps.len() - 1]);
             notes.push(format!(
                 "stream {} has no footer: the file was cut short, or its recorder never closed it; {} samples over {:.3} s \
@@ -229,6 +235,11 @@ mod tests {
                 "{message}"
             );
         }
+        // A footer that is cut inside its text, in a chunk of the right length: all samples are there.
+        let cut = &footer(50.0, 59.99, 1000)[..70];
+        let contents = read(&file_of(&times, Some(cut)), "a.xdf").unwrap();
+        let said = |n: &String| n.contains("its footer") && n.contains("1000 samples are read");
+        assert!(contents.notes.iter().any(said), "{:?}", contents.notes);
         // The end of the file is lost between two chunks: nothing contradicts itself, but it is told.
         let notes = read(&file_of(&times, None), "a.xdf").unwrap().notes;
         assert!(

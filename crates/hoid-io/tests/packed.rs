@@ -1,0 +1,70 @@
+//! Text packed by gzip, and tables of BIDS with a file of JSON beside them.
+
+#![allow(clippy::unwrap_used, reason = "a test may fail at any line, its helpers as well")]
+
+mod common;
+
+use std::io::Write;
+
+use common::Desk;
+use flate2::{Compression, write::GzEncoder};
+use hoid_io::{ReadOptions, read_record};
+
+fn gzip(text: &[u8]) -> Vec<u8> {
+    let mut packed = GzEncoder::new(Vec::new(), Compression::default());
+    packed.write_all(text).unwrap();
+    packed.finish().unwrap()
+}
+
+#[test]
+fn packed_tables_and_sidecars() {
+    let desk = Desk::new();
+    std::fs::write(desk.path("run.csv.gz"), gzip(b"t,e,u\n0,1,2\n0.02,3,4\n")).unwrap();
+    let read = read_record(&desk.path("run.csv.gz"), &ReadOptions::default()).unwrap();
+    assert_eq!(
+        (read.record.input(), read.record.output()),
+        (&[1.0, 3.0][..], &[2.0, 4.0][..])
+    );
+    // BIDS: rows alone, and what they are beside them.
+    let json = r#"{"SamplingFrequency": 50.0, "StartTime": -2.0, "Columns": ["error", "stick"]}"#;
+    let options = ReadOptions {
+        input: Some("error".parse().unwrap()),
+        output: "stick".parse().unwrap(),
+        ..ReadOptions::default()
+    };
+    for name in ["a_physio.tsv", "a_physio.tsv.gz"] {
+        let rows = b"1\t2\nn/a\t4\n5\t6\n";
+        std::fs::write(desk.path("a_physio.json"), json).unwrap();
+        let bytes = if name.ends_with("gz") {
+            gzip(rows)
+        } else {
+            rows.to_vec()
+        };
+        std::fs::write(desk.path(name), bytes).unwrap();
+        let filled = ReadOptions {
+            repair: hoid_io::Repair {
+                fill: true,
+                ..Default::default()
+            },
+            ..options.clone()
+        };
+        let record = read_record(&desk.path(name), &filled).unwrap().record;
+        assert_eq!(record.input(), [1.0, 3.0, 5.0], "{name}");
+        assert_eq!((record.time_s(0), record.sample_time().s()), (-2.0, 0.02));
+        // Without the file beside it, it is a table without a header.
+        std::fs::remove_file(desk.path("a_physio.json")).unwrap();
+        let message = read_record(&desk.path(name), &options).unwrap_err().to_string();
+        assert!(message.contains("the first line holds numbers"), "{message}");
+    }
+    // Cut, and another format inside.
+    let packed = gzip(b"t,e,u\n0,1,2\n0.02,3,4\n");
+    std::fs::write(desk.path("cut.csv.gz"), &packed[..packed.len() - 6]).unwrap();
+    let message = |name: &str| {
+        read_record(&desk.path(name), &ReadOptions::default())
+            .unwrap_err()
+            .to_string()
+    };
+    assert!(message("cut.csv.gz").contains("no whole gzip file"));
+    std::fs::write(desk.path("run.npz.gz"), &packed).unwrap();
+    assert!(message("run.npz.gz").contains("unpack it first"));
+}
