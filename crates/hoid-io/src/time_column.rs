@@ -404,9 +404,8 @@ fn take(table: &mut Table<'_>, at: usize, unit: Option<Unit>) {
             format!("{name} is {taken}in s{origin}, from {unit}")
         }
     };
-    if unit != Unit::Power(0) {
-        time.unit = String::from("s");
-    }
+    // What is in s, as t is, needs no unit.
+    time.unit = String::from(if unit == Unit::Power(0) { "" } else { "s" });
     table
         .notes
         .retain(|note| note != "column 1 has no name and is left out" || !name.starts_with("the first column"));
