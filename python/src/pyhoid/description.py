@@ -296,7 +296,7 @@ class Description:
     def to_json(self) -> str:
         """The object of ``hoid describe --json`` as text.
 
-        >>> pyhoid.describe(records).to_json()
+        >>> pyhoid.describe(record).to_json()
         """
         return self._json
 
