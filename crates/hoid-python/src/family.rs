@@ -18,18 +18,29 @@ use crate::{
 #[pyclass(name = "OperatorFit", module = "pyhoid._pyhoid", frozen)]
 pub struct PyOperatorFit(pub Identified);
 
-/// Name, unit, value, standard error, interval, share of the prior, whether it is determined.
-type ParameterParts = (String, &'static str, f64, Option<f64>, Option<(f64, f64)>, f64, bool);
+/// Name, unit, value, standard error of the runs and of the person, interval, share of the prior, whether it is
+/// determined, the forms that it is the mean of.
+type ParameterParts = (
+    String,
+    &'static str,
+    f64,
+    [Option<f64>; 2],
+    Option<(f64, f64)>,
+    f64,
+    bool,
+    Vec<&'static str>,
+);
 
 fn parameter(p: &Parameter) -> ParameterParts {
     (
         p.name.clone(),
         p.unit,
         p.value,
-        p.standard_error,
+        [p.standard_error, p.standard_error_person],
         p.interval,
         p.prior_share,
         p.determined,
+        p.averaged_over.iter().map(|form| form.name()).collect(),
     )
 }
 
@@ -43,14 +54,15 @@ fn loop_parts<'py>(py: Python<'py>, measures: Option<LoopMeasures>) -> PyResult<
 /// Their intervals of 95 %, Student's.
 fn loop_intervals<'py>(py: Python<'py>, measures: Option<LoopMeasures>) -> PyResult<Bound<'py, PyDict>> {
     let all = PyDict::new(py);
-    all.set_item("crossover_rad_s", measures.and_then(|m| m.crossover_interval()))?;
-    all.set_item("phase_margin_deg", measures.and_then(|m| m.phase_margin_interval()))?;
+    all.set_item("crossover_rad_s", measures.and_then(|m| m.crossover_interval))?;
+    all.set_item("phase_margin_deg", measures.and_then(|m| m.phase_margin_interval))?;
     Ok(all)
 }
 
 fn form_row<'py>(py: Python<'py>, f: &FormFigures) -> PyResult<Bound<'py, PyDict>> {
     let row = PyDict::new(py);
     row.set_item("form", f.form.name())?;
+    row.set_item("weight", f.weight)?;
     row.set_item("loss", f.loss)?;
     row.set_item("criterion", f.criterion)?;
     row.set_item("held_out", f.held_out)?;
@@ -232,6 +244,16 @@ impl PyOperatorFit {
     #[getter]
     fn open_loop<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
         let of = |element| loop_parts(py, self.0.fit.loop_measures(0, element));
+        self.0.controlled_element.as_ref().map(of).transpose()
+    }
+
+    /// The same with the errors of the person.
+    #[getter]
+    fn open_loop_person<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
+        let of = |element| {
+            let measures = self.0.fit.loop_measures(0, element);
+            loop_parts(py, measures.map(LoopMeasures::as_of_person))
+        };
         self.0.controlled_element.as_ref().map(of).transpose()
     }
 

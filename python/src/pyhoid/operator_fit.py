@@ -42,8 +42,8 @@ class OperatorFit(Model, Result):
     verdict : Verdict
         What the result is worth: `level`, `reasons`, `notes`.
     forms : list of dict
-        The forms that were compared, simplest first: form, loss, criterion, held_out, chi2,
-        degrees_of_freedom, converged.
+        The forms that were compared, simplest first: form, weight (by which estimates are averaged), loss,
+        criterion (Akaike's), held_out, chi2, degrees_of_freedom, converged.
     lines : dict or None
         The fit at the lines of the excitation: parameters (an Estimate each), chi2,
         degrees_of_freedom, held_out, converged; with a controlled element open_loop and
@@ -65,6 +65,8 @@ class OperatorFit(Model, Result):
         None without a controlled element.
     open_loop_intervals : dict or None
         Their intervals of 95 %, (low, high) each, Student's: the errors rest on few runs or blocks.
+    open_loop_person : dict or None
+        The same with the errors of the person, whose gain varies from one run to the next.
     covariance : ndarray or None
         Covariance of the coordinates, from the scatter of runs or blocks, with what the prior
         leaves open.
@@ -117,9 +119,19 @@ class OperatorFit(Model, Result):
             OperatorParameters(
                 {
                     name: OperatorParameter(
-                        value, error, interval, share, determined, unit_of(name, self.units, unit)
+                        value,
+                        error,
+                        interval,
+                        share,
+                        determined,
+                        unit_of(name, self.units, unit),
+                        of_person,
+                        tuple(forms),
                     )
-                    for name, unit, value, error, interval, share, determined in of
+                    for name, unit, value, (
+                        error,
+                        of_person,
+                    ), interval, share, determined, forms in of
                 }
             )
             for of in native.parameters
@@ -150,6 +162,10 @@ class OperatorFit(Model, Result):
         )
         self.open_loop_intervals: dict[str, tuple[float, float] | None] | None = (
             native.open_loop_intervals
+        )
+        of_person = native.open_loop_person
+        self.open_loop_person: dict[str, Estimate | None] | None = (
+            None if of_person is None else estimates(of_person)
         )
         self.covariance: FloatArray | None = native.covariance(0)
         self.coordinates: dict[str, float] = {
@@ -315,15 +331,16 @@ class OperatorFit(Model, Result):
         rows = [
             [
                 f["form"],
+                f"{f['weight']:.2f}" if f["weight"] > 0 else "",
                 _text.number(f["loss"]),
                 _text.DASH if f["criterion"] is None else f"+{f['criterion'] - least:.1f}",
                 _text.number(f["held_out"], 4),
                 _text.number(f["chi2"], 4),
-                "chosen" if f["form"] == self.form else "",
+                "in front" if f["form"] == self.form else "",
             ]
             for f in self.forms
         ]
-        return _text.plain_table(["form", "loss", "criterion", "held out", "chi2", ""], rows)
+        return _text.plain_table(["form", "weight", "loss", "criterion", "held out", "chi2", ""], rows)
 
     def _closing(self) -> str:
         prior = ", ".join(f"{name} = {c:g}:{s:g}" for name, (c, s) in self.prior.items())

@@ -19,7 +19,9 @@ class OperatorParameter(NamedTuple):
     value : float
         Infinite for the lag of a pure integration.
     standard_error : float or None
-        To first order; None where there is none, such as at a bound.
+        To first order, of the operator of these runs; None where there is none, such as at a bound.
+    standard_error_person : float or None
+        That of the person, whose gain varies from one run to the next.
     interval : (float, float) or None
         Interval of 95 %; an end that is open is infinite.
     prior_share : float
@@ -27,6 +29,8 @@ class OperatorParameter(NamedTuple):
     determined : bool
         Whether the data determine the parameter.
     unit : str
+    averaged_over : tuple of str
+        The forms whose estimates it is the mean of; empty where it is that of one form alone.
 
     Examples
     --------
@@ -39,6 +43,8 @@ class OperatorParameter(NamedTuple):
     prior_share: float
     determined: bool
     unit: str
+    standard_error_person: float | None = None
+    averaged_over: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
         return " ".join(part for part in (self._shown(), self.unit, self._remark()) if part)

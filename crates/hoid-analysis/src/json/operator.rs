@@ -178,9 +178,11 @@ fn parameter(p: &Parameter) -> Value {
         "unit": p.unit,
         "value": number(p.value),
         "standard_error": optional(p.standard_error),
+        "standard_error_person": optional(p.standard_error_person),
         "interval": p.interval.map_or(Value::Null, |(low, high)| json!([number(low), number(high)])),
         "prior_share": number(p.prior_share),
         "determined": p.determined,
+        "averaged_over": p.averaged_over.iter().map(|form| form.name()).collect::<Vec<_>>(),
     })
 }
 
@@ -200,18 +202,23 @@ fn operator(of: &OperatorOfRecord) -> Value {
 }
 
 fn open_loop(found: Option<&LoopMeasures>) -> Value {
-    let of = |value: fn(&LoopMeasures) -> Estimate, interval: fn(&LoopMeasures) -> Option<(f64, f64)>| {
-        found.map(|m| estimate_within(&value(m), interval(m)))
+    let of = |estimate: Estimate, interval: Option<(f64, f64)>, of_person: Option<f64>| {
+        let mut value = estimate_within(&estimate, interval);
+        if let Some(fields) = value.as_object_mut() {
+            fields.insert("standard_error_person".to_owned(), optional(of_person));
+        }
+        value
     };
     json!({
-        "crossover_rad_s": of(|m| m.crossover_rad_s, LoopMeasures::crossover_interval),
-        "phase_margin_deg": of(|m| m.phase_margin_deg, LoopMeasures::phase_margin_interval),
+        "crossover_rad_s": found.map(|m| of(m.crossover_rad_s, m.crossover_interval, m.of_person[0])),
+        "phase_margin_deg": found.map(|m| of(m.phase_margin_deg, m.phase_margin_interval, m.of_person[1])),
     })
 }
 
 fn form_figures(f: &FormFigures) -> Value {
     json!({
         "form": f.form.name(),
+        "weight": number(f.weight),
         "loss": optional(f.loss),
         "criterion": optional(f.criterion),
         "held_out": optional(f.held_out),

@@ -1,5 +1,5 @@
-//! From the search of the chosen form to the result: operators with their errors, what both methods
-//! say of each other, and the verdict.
+//! From the searches of the forms that count to the result: operators with their errors, averaged over
+//! forms; for the form in front what the methods say of each other; and the verdict.
 //!
 //! The order matters: both methods are compared with their own errors, and only then does their
 //! difference become a part of the errors of the operator (`Covariances::add_bias`).
@@ -13,13 +13,13 @@ use super::{
     agreement::{Agreement, AgreementMethod, Side, agreement, with_level},
     choice::FormFigures,
     covariances::BAND_RAD_S,
-    estimated::{Errors, Estimated, operator_of},
+    estimated::{Errors, Estimated, in_form, operator_of},
     instrumental::{Instrumental, InstrumentalFit},
     judgement::{Judged, findings},
     line_fit::LineFit,
     prediction::Prediction,
     prediction_fit::PredictionFit,
-    result::{FamilyFit, FreeModel, OperatorOfRecord},
+    result::{FamilyFit, FreeModel, OperatorOfRecord, WeighedForm},
     sensitivity::{LARGEST_SHARE_AT_LINES, MORE_WITHOUT_LINES, UNSEEN_WITHOUT_LINES, rivals},
 };
 use crate::{
@@ -42,10 +42,20 @@ pub(super) struct AtLines<'d> {
     pub why_none: Option<String>,
 }
 
-/// The search of the chosen form, and what its result is made from beside it.
+/// The search of a form that counts beside the one in front.
+pub(super) struct Beside<'a> {
+    pub fit: PredictionFit<'a>,
+    pub lines: Option<LineFit>,
+    pub weight: f64,
+}
+
+/// The search of the form in front, and what its result is made from beside it.
 pub(super) struct Chosen<'p, 'a> {
     pub fit: PredictionFit<'a>,
+    pub weight: f64,
     pub lines: AtLines<'p>,
+    /// The other forms that count.
+    pub beside: Vec<Beside<'a>>,
     /// All forms that were compared.
     pub forms: Vec<FormFigures>,
     pub prediction: &'p Prediction<'a>,
@@ -88,10 +98,14 @@ impl Chosen<'_, '_> {
             instrumental.as_ref().filter(|found| found.termination.converged()),
             &others,
         );
-        self.add_bias(&mut errors, separate, &others);
+        add_bias(&mut errors, fit, self.lines.fit.as_ref(), separate, &others);
+        let mut weighed = vec![in_form(fit, &errors, self.weight, separate)?];
+        for other in &self.beside {
+            weighed.push(self.weighed(other, separate, workspace)?);
+        }
         let mut operators = Vec::with_capacity(separate);
         for record in 0..separate {
-            operators.push(operator_of(fit, &errors, record)?);
+            operators.push(operator_of(fit, &errors, &weighed, record)?);
         }
         let free_model = free_model(fit, workspace);
         let residuals = residuals(fit, workspace);
@@ -115,6 +129,7 @@ impl Chosen<'_, '_> {
             clusters: fit.clusters.parts.len(),
             has_covariance: errors.covariances.is_some(),
             response_error: response_error(&operators[0]),
+            weighed: &weighed,
         }));
         let noise = &fit.eta()[layout.operator_elements()..];
         Ok(FamilyFit {
@@ -125,6 +140,8 @@ impl Chosen<'_, '_> {
             operators,
             prior: self.prediction.prior.clone(),
             forms: self.forms,
+            weighed,
+            run_to_run: errors.run_to_run,
             coherent_share: self.lines.describing.and_then(coherent_share),
             lines: self.lines.fit,
             no_lines: self.lines.why_none,
@@ -161,39 +178,52 @@ impl Chosen<'_, '_> {
         Some(found.and_then(|method| method.fit(&auxiliary, workspace)))
     }
 
-    /// What the fit may be off by becomes a part of its errors: its difference to the fit at the
-    /// lines, and, for what the lines leave to the prior or without lines, its differences to fits
-    /// with other noise models ([`super::sensitivity`]).
-    fn add_bias(&self, errors: &mut Errors, separate: usize, others: &[Vec<f64>]) {
-        let fit = &self.fit;
-        let Some(covariances) = &mut errors.covariances else {
-            return;
-        };
-        match &self.lines.fit {
-            Some(lines) if separate == 1 => {
-                let owes: Vec<bool> = (lines.prior_shares.iter())
-                    .map(|share| *share > LARGEST_SHARE_AT_LINES)
-                    .collect();
-                covariances.add_bias(fit, lines.operator.coordinates());
-                if owes.contains(&true) {
-                    for other in others {
-                        covariances.add_besides(fit, other, 1.0, |place| owes[place]);
-                    }
-                }
-            }
-            _ => {
+    /// Another form with its errors, made as those of the form in front.
+    fn weighed(&self, of: &Beside<'_>, separate: usize, workspace: &mut Workspace) -> Result<WeighedForm, IdentError> {
+        let mut errors = Errors::of(&of.fit, self.run_to_run, workspace);
+        let others = rivals(self.prediction, &of.fit, self.highest_order, workspace);
+        add_bias(&mut errors, &of.fit, of.lines.as_ref(), separate, &others);
+        in_form(&of.fit, &errors, of.weight, separate)
+    }
+}
+
+/// What the fit may be off by becomes a part of its errors: its difference to the fit at the
+/// lines, and, for what the lines leave to the prior or without lines, its differences to fits
+/// with other noise models ([`super::sensitivity`]).
+fn add_bias(
+    errors: &mut Errors,
+    fit: &PredictionFit<'_>,
+    lines: Option<&LineFit>,
+    separate: usize,
+    others: &[Vec<f64>],
+) {
+    let Some(covariances) = &mut errors.covariances else {
+        return;
+    };
+    match lines {
+        Some(lines) if separate == 1 => {
+            let owes: Vec<bool> = (lines.prior_shares.iter())
+                .map(|share| *share > LARGEST_SHARE_AT_LINES)
+                .collect();
+            covariances.add_bias(fit, lines.operator.coordinates());
+            if owes.contains(&true) {
                 for other in others {
-                    covariances.add_bias(fit, other);
-                    covariances.add_besides(fit, other, MORE_WITHOUT_LINES, |_| true);
-                }
-                for (place, (coordinate, _)) in fit.layout().elements.iter().enumerate() {
-                    let unseen = UNSEEN_WITHOUT_LINES.iter().find(|(of, _)| of == coordinate);
-                    covariances.besides[place] += unseen.map_or(0.0, |(_, deviation)| deviation * deviation);
+                    covariances.add_besides(fit, other, 1.0, |place| owes[place]);
                 }
             }
         }
-        covariances.widen(fit, &mut errors.profiles);
+        _ => {
+            for other in others {
+                covariances.add_bias(fit, other);
+                covariances.add_besides(fit, other, MORE_WITHOUT_LINES, |_| true);
+            }
+            for (place, (coordinate, _)) in fit.layout().elements.iter().enumerate() {
+                let unseen = UNSEEN_WITHOUT_LINES.iter().find(|(of, _)| of == coordinate);
+                covariances.besides[place] += unseen.map_or(0.0, |(_, deviation)| deviation * deviation);
+            }
+        }
     }
+    covariances.widen(fit, &mut errors.profiles);
 }
 
 /// All methods beside each other, over the coordinates whose parameters are determined and owe

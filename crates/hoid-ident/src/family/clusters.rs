@@ -26,10 +26,14 @@ const BLOCKS: usize = 8;
 /// Shortest block, s.
 const SHORTEST_BLOCK_S: f64 = 4.0;
 
+/// Degrees of freedom of errors from the scatter of n clusters.
+pub(super) fn freedom(clusters: usize) -> f64 {
+    clusters.saturating_sub(1).max(1) as f64
+}
+
 /// Quantile of Student's distribution for 95 % with n clusters.
 pub(super) fn quantile(clusters: usize) -> f64 {
-    let freedom = clusters.saturating_sub(1).max(1) as f64;
-    StudentsT::new(0.0, 1.0, freedom).map_or(1.96, |t| t.inverse_cdf(0.975))
+    StudentsT::new(0.0, 1.0, freedom(clusters)).map_or(1.96, |t| t.inverse_cdf(0.975))
 }
 
 /// What the clusters are.

@@ -1,24 +1,18 @@
-//! Which form of those that were tried: what [`super::choice`] decides by.
+//! What the forms that were tried are worth: what [`super::choice`] weighs them by.
 //!
 //! Where an excitation was recorded, forms are compared at its lines; else by their prediction
-//! errors, all in units of one inflation kappa and one innovation variance, so that a form does not
-//! look well by its own large variance.
+//! errors, all in units of one inflation kappa, so that a form does not look well by its own large
+//! variance. A form whose parameters the data leave open counts only where all are so.
 
 use hoid_model::{FamilyOperator, Form};
 
 use super::{
-    choice::{Candidate, FormFigures, choose},
-    clusters::ClusterKind,
-    covariances,
+    choice::{FormFigures, weigh},
     judgement::MOST_DAMPED,
     line_fit::LineFit,
-    lines::LineData,
     prediction_fit::PredictionFit,
 };
-use crate::{IdentError, criterion::Workspace};
-
-/// Runs from which on each can be held out.
-const FEWEST_HELD_OUT: usize = 3;
+use crate::IdentError;
 
 /// A form with what was found of it.
 pub(super) struct Tried<'a> {
@@ -27,33 +21,38 @@ pub(super) struct Tried<'a> {
     pub fit: Result<PredictionFit<'a>, IdentError>,
 }
 
-/// What all forms are worth, and which of them is the choice.
+/// What all forms are worth, and which of them stands in front.
 pub(super) struct Comparison {
-    /// Place of the choice among the forms; `None` where none could be fitted.
-    pub chosen: Option<usize>,
+    /// Place of the form in front; `None` where none could be fitted.
+    pub front: Option<usize>,
     /// Of each form, in their order.
     pub figures: Vec<FormFigures>,
 }
 
 impl Comparison {
     /// The forms are ordered from the simplest.
-    pub fn of(tried: &[Tried<'_>], lines: Option<&LineData<'_>>, workspace: &mut Workspace) -> Self {
-        let scale = CommonScale::of(tried);
-        let mut candidates: Vec<(usize, Candidate)> = tried
-            .iter()
-            .enumerate()
-            .filter_map(|(i, t)| Some((i, candidate(t, lines, &scale, workspace)?)))
-            .collect();
-        let figures = tried.iter().map(|t| figures(t, &candidates)).collect();
+    pub fn of(tried: &[Tried<'_>]) -> Self {
+        let inflation = common_inflation(tried);
+        let criteria: Vec<Option<f64>> = tried.iter().map(|t| criterion(t, inflation)).collect();
+        let mut counting = criteria.clone();
         // A form that lacks a lag, where there is one, takes the neuromuscular poles for it.
-        if candidates.iter().any(|(i, _)| !has_lost_its_muscles(&tried[*i])) {
-            candidates.retain(|(i, _)| !has_lost_its_muscles(&tried[*i]));
-        }
-        let (places, only): (Vec<usize>, Vec<Candidate>) = candidates.into_iter().unzip();
+        retain(&mut counting, |i| !has_lost_its_muscles(&tried[i]));
+        retain(&mut counting, |i| tried[i].fit.as_ref().is_ok_and(|fit| fit.ridge == 0.0));
+        let (front, weights) = weigh(&counting).map_or((None, Vec::new()), |(front, weights)| (Some(front), weights));
+        let figures = tried.iter().zip(criteria).enumerate();
+        let figures = figures.map(|(i, (t, criterion))| figures_of(t, criterion, weights.get(i).copied().unwrap_or(0.0)));
         Self {
-            chosen: choose(&only).and_then(|i| places.get(i).copied()),
-            figures,
+            front,
+            figures: figures.collect(),
         }
+    }
+}
+
+/// Leaves those that are good, where any of those that count is.
+fn retain(counting: &mut [Option<f64>], is_good: impl Fn(usize) -> bool) {
+    let good: Vec<bool> = (0..counting.len()).map(|i| counting[i].is_some() && is_good(i)).collect();
+    if good.contains(&true) {
+        counting.iter_mut().zip(good).filter(|(_, good)| !good).for_each(|(c, _)| *c = None);
     }
 }
 
@@ -68,79 +67,31 @@ fn has_lost_its_muscles(tried: &Tried<'_>) -> bool {
     of_fit.is_some_and(|operator| lags(&operator)) || tried.lines.as_ref().is_some_and(|l| lags(&l.operator))
 }
 
-/// One kappa and one innovation variance for all forms, so that their figures can be compared: the
-/// median of the one, the least of the other.
-struct CommonScale {
-    inflation: f64,
-    innovation_variance: f64,
+/// One kappa for all forms, so that their criteria can be compared: the median.
+fn common_inflation(tried: &[Tried<'_>]) -> f64 {
+    let fits = tried.iter().filter_map(|t| t.fit.as_ref().ok());
+    let mut all: Vec<f64> = fits.map(|fit| fit.inflation).collect();
+    all.sort_by(f64::total_cmp);
+    all.get(all.len() / 2).copied().unwrap_or(1.0)
 }
 
-impl CommonScale {
-    fn of(tried: &[Tried<'_>]) -> Self {
-        let fits = || tried.iter().filter_map(|t| t.fit.as_ref().ok());
-        let mut all: Vec<f64> = fits().map(|fit| fit.inflation).collect();
-        all.sort_by(f64::total_cmp);
-        Self {
-            inflation: all.get(all.len() / 2).copied().unwrap_or(1.0),
-            innovation_variance: fits().map(|fit| fit.innovation_variance).fold(f64::INFINITY, f64::min),
-        }
-    }
-}
-
-/// What a parameter costs: Schwarz's `ln n`, and Akaike's 2 where there are too few runs to hold
-/// any out. The form is then chosen to predict, since one that is too simple bends the response.
-fn cost(n: f64, runs: usize) -> f64 {
-    if runs >= FEWEST_HELD_OUT { n.ln() } else { 2.0 }
-}
-
-fn candidate(
-    tried: &Tried<'_>,
-    lines: Option<&LineData<'_>>,
-    scale: &CommonScale,
-    workspace: &mut Workspace,
-) -> Option<Candidate> {
+/// Akaike's criterion; `None` for a form that could not be fitted.
+fn criterion(tried: &Tried<'_>, inflation: f64) -> Option<f64> {
     let fit = tried.fit.as_ref().ok()?;
-    let elements = fit.layout().operator_elements() as f64;
-    let (held_out, criterion) = match (&tried.lines, lines) {
-        (Some(of_lines), Some(lines)) => {
-            let equations = (2 * lines.points.len() * lines.runs()) as f64;
-            (
-                of_lines.held_out.clone(),
-                of_lines.chi_squared + elements * cost(equations, lines.runs()),
-            )
-        }
-        _ => {
-            let n = fit.residuals as f64;
-            let held_out = held_out(fit, scale, workspace);
-            let runs = held_out.as_ref().map_or(1, Vec::len);
-            (held_out, n * fit.loss.ln() / scale.inflation + elements * cost(n, runs))
-        }
+    let misfit = match &tried.lines {
+        Some(of_lines) => of_lines.chi_squared,
+        None => fit.residuals as f64 * fit.loss.ln() / inflation,
     };
-    Some(Candidate {
-        form: tried.form,
-        held_out,
-        criterion,
-    })
+    Some(misfit + 2.0 * fit.layout().operator_elements() as f64)
 }
 
-/// Squared prediction errors of each run under the fit without it, in units of the innovation
-/// variance; for clusters that are runs.
-fn held_out(fit: &PredictionFit<'_>, scale: &CommonScale, workspace: &mut Workspace) -> Option<Vec<f64>> {
-    if fit.clusters.kind != ClusterKind::Runs {
-        return None;
-    }
-    let others = covariances::without_each(fit)?;
-    let of = |(run, eta): (usize, &Vec<f64>)| Some(fit.squares_of(eta, run, workspace)? / scale.innovation_variance);
-    others.iter().enumerate().map(of).collect()
-}
-
-fn figures(tried: &Tried<'_>, candidates: &[(usize, Candidate)]) -> FormFigures {
-    let own = candidates.iter().find(|(_, c)| c.form == tried.form).map(|(_, c)| c);
+fn figures_of(tried: &Tried<'_>, criterion: Option<f64>, weight: f64) -> FormFigures {
     FormFigures {
         form: tried.form,
         loss: tried.fit.as_ref().ok().map(|f| f.loss),
-        criterion: own.map(|c| c.criterion),
-        held_out: own.and_then(|c| c.held_out.as_ref()).map(|h| h.iter().sum()),
+        criterion,
+        weight,
+        held_out: tried.lines.as_ref().and_then(LineFit::held_out_total),
         chi_squared: tried.lines.as_ref().map(|l| l.chi_squared),
         degrees_of_freedom: tried.lines.as_ref().map(|l| l.degrees_of_freedom),
         converged: tried.fit.as_ref().is_ok_and(|f| f.minimum.termination.converged()),

@@ -14,7 +14,7 @@
 //! **The prior** P is a measurement that no cluster holds: what it leaves open is added,
 //! `kappa sigma^2 H^-1 P H^-1`, H = G + P.
 
-use hoid_model::{Complex64, operator_family::Coordinate, uncertainty::variance_along};
+use hoid_model::{Complex64, uncertainty::variance_along};
 
 use super::{
     clusters::ClusterKind,
@@ -81,21 +81,6 @@ impl Covariances {
         }
     }
 
-    /// Adds what people's gain varies by from one run to the next, where blocks of few runs cannot
-    /// show it: `(share x gain)^2` over the number of records.
-    pub fn add_run_to_run(&mut self, fit: &PredictionFit<'_>, share: f64) {
-        if fit.clusters.kind == ClusterKind::Runs {
-            return;
-        }
-        let p = fit.parameters();
-        let records = fit.criterion.data.len() as f64;
-        for (place, (coordinate, record)) in fit.layout().elements.iter().enumerate() {
-            if *coordinate == Coordinate::Gain {
-                let runs = if record.is_some() { 1.0 } else { records };
-                self.clustered[place * p + place] += (share * fit.eta()[place]).powi(2) / runs;
-            }
-        }
-    }
 }
 
 /// What the operator's elements off their bounds differ by from another estimate.
@@ -122,6 +107,11 @@ fn inverse(fit: &PredictionFit<'_>) -> Option<Vec<f64>> {
     Some(inverse)
 }
 
+/// True where the data and the prior determine all parameters.
+pub(super) fn is_regular(fit: &PredictionFit<'_>) -> bool {
+    inverse(fit).is_some()
+}
+
 /// The covariances of a fit; `None` where its information is singular.
 pub(super) fn covariances(fit: &PredictionFit<'_>) -> Option<Covariances> {
     let p = fit.parameters();
@@ -133,8 +123,11 @@ pub(super) fn covariances(fit: &PredictionFit<'_>) -> Option<Covariances> {
             // H^-1 P H^-1: the prior is weighed as the inflated data are.
             let mut open = vec![0.0; p * p];
             add_open_part(&mut open, 1.0, &fit.criterion.penalty, fit.eta(), &inverse);
-            let by_runs = over_clusters(fit)?;
-            by_runs.iter().zip(&open).map(|(j, open)| j + scale * open).collect()
+            match over_clusters(fit) {
+                Some(by_runs) => by_runs.iter().zip(&open).map(|(j, open)| j + scale * open).collect(),
+                // One run alone determines a combination: its scatter is not known.
+                None => inverse.iter().map(|g| scale * g).collect(),
+            }
         }
         // H^-1 G H^-1 + H^-1 P H^-1 = H^-1, all of it inflated.
         ClusterKind::Blocks => inverse.iter().map(|g| scale * g).collect(),
@@ -153,17 +146,6 @@ fn over_clusters(fit: &PredictionFit<'_>) -> Option<Vec<f64>> {
         .map(|(g, big)| fit.solve(&sought, Some(big), g))
         .collect();
     jackknife(&steps?)
-}
-
-/// The estimates without each of the clusters.
-pub(super) fn without_each(fit: &PredictionFit<'_>) -> Option<Vec<Vec<f64>>> {
-    let (limits, free) = (&fit.criterion.limits, fit.free());
-    let of = |(g, big): &(Vec<f64>, Vec<f64>)| {
-        let step = fit.solve(&free, Some(big), g)?;
-        let moved = fit.eta().iter().zip(step).zip(limits);
-        Some(moved.map(|((x, s), (low, high))| (x - s).clamp(*low, *high)).collect())
-    };
-    fit.clusters.parts.iter().map(of).collect()
 }
 
 /// kappa: clustered over model-based variance of the frequency response, gain and phase, the mean

@@ -1,16 +1,16 @@
 //! The operator of a record with its errors, out of eta and what is known of it.
 
 use hoid_model::{
-    FamilyOperator, NotConvertible, PolynomialModel, Structure, operator_family::Coordinate, uncertainty::Estimate,
+    FamilyOperator, NotConvertible, PolynomialModel, Structure, operator_family::Coordinate,
 };
 
 use super::{
-    clusters::quantile,
+    clusters::{ClusterKind, quantile},
     covariances::{self, Covariances},
     parameter::{Known, Parameter},
     prediction_fit::PredictionFit,
     profile::profile_interval,
-    result::{OperatorOfRecord, title},
+    result::{OperatorInForm, OperatorOfRecord, WeighedForm, title},
 };
 use crate::{
     Fit, IdentError,
@@ -27,19 +27,28 @@ pub(super) struct Errors {
     pub profiles: Vec<Option<(f64, f64)>>,
     /// Quantile of Student's distribution for 95 %.
     quantile: f64,
+    /// What the gain of the person varies by beyond the runs, as a part of it.
+    pub run_to_run: f64,
 }
 
 impl Errors {
     pub fn of(fit: &PredictionFit<'_>, run_to_run: f64, workspace: &mut Workspace) -> Self {
-        let mut covariances = covariances::covariances(fit);
-        if let Some(covariances) = &mut covariances {
-            covariances.add_run_to_run(fit, run_to_run);
-        }
+        let covariances = covariances::covariances(fit);
         let quantile = quantile(fit.clusters.parts.len());
+        // The scatter between runs holds what they vary by; blocks of few runs cannot show it.
+        let gain = fit.layout().elements.iter().find(|(c, _)| *c == Coordinate::Gain);
+        let runs = match gain {
+            Some((_, Some(_))) => 1,
+            _ => fit.criterion.data.len(),
+        };
         Self {
             profiles: profiles(fit, covariances.as_ref(), quantile, workspace),
             covariances,
             quantile,
+            run_to_run: match fit.clusters.kind {
+                ClusterKind::Runs => 0.0,
+                ClusterKind::Blocks => run_to_run / (runs as f64).sqrt(),
+            },
         }
     }
 
@@ -125,6 +134,7 @@ impl Estimated {
             limits: &limits,
             profile: &places.iter().map(|&i| errors.profiles[i]).collect::<Vec<_>>(),
             quantile: errors.quantile,
+            run_to_run: errors.run_to_run,
         };
         let parameters = known.parameters();
         Ok(Self {
@@ -156,10 +166,11 @@ fn prior_share(fit: &PredictionFit<'_>, model_based: Option<&[f64]>, places: &[u
     }
 }
 
-/// The operator of a record, as one and as polynomials.
+/// The operator of a record, as one and as polynomials, with its parameters averaged over the forms.
 pub(super) fn operator_of(
     fit: &PredictionFit<'_>,
     errors: &Errors,
+    weighed: &[WeighedForm],
     record: usize,
 ) -> Result<OperatorOfRecord, IdentError> {
     let Estimated {
@@ -168,15 +179,14 @@ pub(super) fn operator_of(
         model_based,
         parameters,
     } = Estimated::of(fit, errors, record)?;
+    let parameters: Vec<Parameter> = (parameters.into_iter())
+        .map(|own| averaged(&own, weighed, record, fit.clusters.parts.len()).unwrap_or(own))
+        .collect();
     let layout = fit.layout();
     let p = fit.parameters();
     let mapped = fit.criterion.model_of(fit.eta(), record)?;
     let of_theta =
         (errors.covariances.as_ref()).map(|c| mapped.covariance_of_theta(&c.clustered, p, layout.positions(record)));
-    let estimate = |q: &Parameter| Estimate {
-        value: q.value,
-        standard_error: q.standard_error,
-    };
     let polynomial_fit = Fit {
         held: vec![false; mapped.theta.len()],
         model: PolynomialModel::new(Structure::BoxJenkins, mapped.orders, layout.sample_time, mapped.theta)?,
@@ -194,7 +204,7 @@ pub(super) fn operator_of(
         searched_delay: None,
         physical: Some(Box::new(Physical {
             title: title(layout.form, layout.neuromuscular, (layout.nc, layout.nd)),
-            parameters: parameters.iter().map(|q| (q.name.clone(), estimate(q))).collect(),
+            parameters: parameters.iter().map(|q| (q.name.clone(), q.estimate())).collect(),
             free: p,
             operator: Err(NotConvertible::OtherForm {
                 form: operator.form().to_string(),
@@ -208,5 +218,37 @@ pub(super) fn operator_of(
         model_based,
         parameters,
         polynomial_fit,
+    })
+}
+
+/// What has the name of a parameter in each of the forms, averaged.
+fn averaged(own: &Parameter, weighed: &[WeighedForm], record: usize, clusters: usize) -> Option<Parameter> {
+    let of = |form: &'_ WeighedForm| -> Option<(_, f64, Parameter)> {
+        let mut all = form.of(record)?.parameters.iter();
+        Some((form.form, form.weight, all.find(|p| p.name == own.name)?.clone()))
+    };
+    let all: Vec<_> = weighed.iter().filter_map(of).collect();
+    let each: Vec<_> = all.iter().map(|(form, weight, p)| (*form, *weight, p)).collect();
+    Parameter::averaged(&each, clusters)
+}
+
+/// The operators of a fit, by its form alone.
+pub(super) fn in_form(
+    fit: &PredictionFit<'_>,
+    errors: &Errors,
+    weight: f64,
+    separate: usize,
+) -> Result<WeighedForm, IdentError> {
+    let of = |record| {
+        Estimated::of(fit, errors, record).map(|found| OperatorInForm {
+            operator: found.operator,
+            covariance: found.covariance,
+            parameters: found.parameters,
+        })
+    };
+    Ok(WeighedForm {
+        form: fit.layout().form,
+        weight,
+        operators: (0..separate).map(of).collect::<Result<_, _>>()?,
     })
 }

@@ -5,7 +5,7 @@ use hoid_model::{Detrend, Form, Record, SampleTime, Structure, operator_family::
 
 use super::{
     arx_response::arx_response,
-    assembly::{AtLines, Chosen},
+    assembly::{AtLines, Beside, Chosen},
     comparison::{Comparison, Tried},
     line_fit::{LineFit, by_simplicity, line_fit},
     lines::LineData,
@@ -204,21 +204,33 @@ impl FamilyEstimator {
             });
         }
         progress::step("forms", count, count);
-        let Comparison { chosen, figures } = Comparison::of(&tried, lines.as_ref(), &mut workspace);
-        let Some(chosen) = chosen else {
+        let Comparison { front, figures } = Comparison::of(&tried);
+        let Some(front) = front else {
             return Err(tried
                 .into_iter()
                 .find_map(|t| t.fit.err())
                 .unwrap_or(IdentError::NoFiniteLoss));
         };
-        let Tried { lines, fit, .. } = tried.swap_remove(chosen);
+        let weight = figures[front].weight;
+        let Tried { lines, fit, .. } = tried.remove(front);
+        let weights = figures.iter().enumerate().filter(|(i, _)| *i != front);
+        let beside = tried.into_iter().zip(weights).filter(|(_, (_, f))| f.weight > 0.0);
+        let beside = beside.map(|(tried, (_, figures))| {
+            Ok(Beside {
+                fit: tried.fit?,
+                lines: tried.lines,
+                weight: figures.weight,
+            })
+        });
         let chosen = Chosen {
             fit: fit?,
+            weight,
             lines: AtLines {
                 describing: describing.as_ref(),
                 fit: lines,
                 why_none: no_lines,
             },
+            beside: beside.collect::<Result<_, IdentError>>()?,
             forms: figures,
             prediction: &prediction,
             records: &records,

@@ -7,7 +7,8 @@ use hoid_model::Finding;
 
 use super::{
     agreement::Agreement, clusters::ClusterKind, instrumental::InstrumentalFit, line_fit::LineFit,
-    parameter::Parameter, result::FreeModel,
+    parameter::Parameter,
+    result::{FreeModel, WeighedForm},
 };
 use crate::{Termination, judgement::residuals::ResidualMeasures};
 
@@ -22,6 +23,8 @@ const LARGEST_RESPONSE_ERROR: f64 = 0.5;
 /// Damping ratio above which the two neuromuscular poles are lags of their own, far apart: no muscle
 /// is so damped.
 pub(super) const MOST_DAMPED: f64 = 1.5;
+/// Weight from which on a form is settled.
+const SETTLED_WEIGHT: f64 = 0.95;
 /// Ratio of clustered to model-based standard errors that is worth a note.
 const NOTED_ERROR_RATIO: f64 = 1.5;
 
@@ -46,6 +49,8 @@ pub(super) struct Judged<'a> {
     pub has_covariance: bool,
     /// Smallest relative standard error of the response over the band of manual control.
     pub response_error: Option<f64>,
+    /// The forms that the data leave, the one in front first.
+    pub weighed: &'a [WeighedForm],
 }
 
 /// All findings.
@@ -73,6 +78,7 @@ pub(super) fn findings(judged: &Judged<'_>) -> Vec<Finding> {
         ));
     }
     determined(judged, &mut all);
+    all.extend(unsettled(judged.weighed));
     all.extend(judged.residuals.findings());
     all.extend(judged.not_constant.clone());
     methods(judged, &mut all);
@@ -90,6 +96,22 @@ pub(super) fn findings(judged: &Judged<'_>) -> Vec<Finding> {
         ));
     }
     all
+}
+
+/// Forms that the data do not tell apart.
+fn unsettled(weighed: &[WeighedForm]) -> Option<Finding> {
+    let front = weighed.first().filter(|front| front.weight < SETTLED_WEIGHT)?;
+    let mut all: Vec<&WeighedForm> = weighed.iter().filter(|w| w.weight >= 1.0 - SETTLED_WEIGHT).collect();
+    all.sort_by(|a, b| b.weight.total_cmp(&a.weight));
+    let named: Vec<String> = all.iter().map(|w| format!("{} {:.2}", w.form, w.weight)).collect();
+    Some(Finding::note(
+        "form",
+        format!(
+            "the form is not settled: {}; parameters have the names of {}, and what the forms differ by is in all errors",
+            named.join(", "),
+            front.form
+        ),
+    ))
 }
 
 /// True where it rests at the end of what is sought: it has no error of its own.

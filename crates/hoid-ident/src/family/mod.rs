@@ -12,7 +12,8 @@
 //! 2. Each form by prediction error, with an autoregressive (or ARMA) noise model whose order
 //!    Akaike's criterion chooses, and a weak prior on what seconds of tracking do not tell
 //!    ([`OperatorPrior`]).
-//! 3. The form that held-out runs choose ([`FormFigures`]).
+//! 3. Forms are weighed by Akaike's criterion ([`FormFigures`]), and estimates averaged over those that the data
+//!    leave ([`WeighedForm`]).
 //! 4. Errors by the scatter of runs or blocks; intervals in coordinates that are nearly normal, by
 //!    profile likelihood where they are not ([`Parameter`]).
 //! 5. The operator by refined instrumental variables, where an excitation was recorded
@@ -23,7 +24,7 @@
 //! |---|---|
 //! | `estimator` | [`FamilyEstimator`]: options, and the searches of all forms |
 //! | `comparison` | what each form is worth beside the others |
-//! | `assembly` | from the search of the chosen form to the result |
+//! | `assembly` | from the searches of the forms that count to the result |
 //! | `estimated` | the operator of a record with its errors |
 //! | `result` | [`FamilyFit`] |
 //! | `parameter` | a parameter with its interval, its prior share, and whether it is determined |
@@ -41,7 +42,8 @@
 //! | `jackknife` | covariances from estimates without each part, and from a prior |
 //! | `sensitivity` | what the estimate owes to the choice of a noise model |
 //! | `profile` | intervals by profile likelihood |
-//! | `choice` | which form |
+//! | `choice` | the weights of the forms, and which of them stands in front |
+//! | `mixture` | an estimate over several forms |
 //! | `agreement` | do methods agree |
 //! | `open_loop` | crossover and phase margin |
 //! | `of_polynomials`, `pole_reading` | polynomials back to an operator; which pole is what |
@@ -63,6 +65,7 @@ mod judgement;
 mod layout;
 mod line_fit;
 mod lines;
+mod mixture;
 pub(crate) mod noise;
 mod of_polynomials;
 mod open_loop;
@@ -87,4 +90,4 @@ pub use open_loop::{Crossover, LoopMeasures, loop_doubt, loop_measures};
 pub use parameter::Parameter;
 pub use pole_reading::{PoleRole, RealPole};
 pub use prior::{OperatorPrior, ParameterPrior};
-pub use result::{FamilyFit, FreeModel, OperatorOfRecord};
+pub use result::{FamilyFit, FreeModel, OperatorInForm, OperatorOfRecord, WeighedForm};

@@ -15,7 +15,11 @@ use hoid_model::{
     uncertainty::{Estimate, variance_along},
 };
 
-use super::response_fit::hold;
+use super::{
+    clusters::quantile,
+    mixture::{Component, Mixture},
+    response_fit::hold,
+};
 
 /// Where crossovers are looked for, rad/s.
 const RANGE_RAD_S: (f64, f64) = (0.05, 60.0);
@@ -31,27 +35,124 @@ const POINTS: usize = 150;
 pub struct LoopMeasures {
     /// Crossover frequency omega_c, rad/s.
     pub crossover_rad_s: Estimate,
+    /// Its interval of 95 %.
+    pub crossover_interval: Option<(f64, f64)>,
     /// Phase margin phi_m, deg, between -180 and 180.
     pub phase_margin_deg: Estimate,
-    /// Quantile for the intervals of 95 %: Student's where the errors rest on few clusters.
-    pub quantile: f64,
+    /// Its interval of 95 %.
+    pub phase_margin_interval: Option<(f64, f64)>,
+    /// What one per cent of the gain moves both by, times 100: `d/d ln K`.
+    by_gain: [f64; 2],
+    /// Standard errors of both as those of the person, whose gain varies from run to run.
+    pub of_person: [Option<f64>; 2],
 }
 
 impl LoopMeasures {
-    /// Interval of 95 % of the crossover frequency, rad/s.
-    pub fn crossover_interval(&self) -> Option<(f64, f64)> {
-        self.interval(self.crossover_rad_s)
+    fn of(both: [Estimate; 2], by_gain: [f64; 2]) -> Self {
+        let [crossover_rad_s, phase_margin_deg] = both;
+        Self {
+            crossover_rad_s,
+            crossover_interval: reaching(crossover_rad_s, NORMAL),
+            phase_margin_deg,
+            phase_margin_interval: reaching(phase_margin_deg, NORMAL),
+            by_gain,
+            of_person: both.map(|e| e.standard_error),
+        }
     }
 
-    /// Interval of 95 % of the phase margin, deg.
-    pub fn phase_margin_interval(&self) -> Option<(f64, f64)> {
-        self.interval(self.phase_margin_deg)
+    /// With Student's intervals of errors that rest on so many clusters.
+    pub(super) fn of_few(self, clusters: usize) -> Self {
+        Self {
+            crossover_interval: reaching(self.crossover_rad_s, quantile(clusters)),
+            phase_margin_interval: reaching(self.phase_margin_deg, quantile(clusters)),
+            ..self
+        }
     }
 
-    fn interval(&self, of: Estimate) -> Option<(f64, f64)> {
-        let reach = self.quantile * of.standard_error?;
-        Some((of.value - reach, of.value + reach))
+    /// With what the gain of the person varies by beyond these runs, as a part of it.
+    pub(super) fn with_run_to_run(self, share: f64) -> Self {
+        let both = [self.crossover_rad_s, self.phase_margin_deg];
+        let wider = |k: usize| {
+            let own = both[k].standard_error?;
+            Some(own.hypot(share * self.by_gain[k]))
+        };
+        Self {
+            of_person: [wider(0), wider(1)],
+            ..self
+        }
     }
+
+    /// The same with the errors and intervals of the person.
+    #[must_use]
+    pub fn as_of_person(self) -> Self {
+        let [crossover, margin] = self.of_person;
+        let (crossover_rad_s, crossover_interval) = widened(self.crossover_rad_s, self.crossover_interval, crossover);
+        let (phase_margin_deg, phase_margin_interval) =
+            widened(self.phase_margin_deg, self.phase_margin_interval, margin);
+        Self {
+            crossover_rad_s,
+            crossover_interval,
+            phase_margin_deg,
+            phase_margin_interval,
+            ..self
+        }
+    }
+
+    /// Over forms with their weights; `None` for none.
+    pub(super) fn averaged(each: &[(f64, Self)], clusters: usize) -> Option<Self> {
+        let [_, _, ..] = each else {
+            return each.first().map(|(_, only)| *only);
+        };
+        let over = |estimate: &dyn Fn(&Self) -> Estimate, interval: &dyn Fn(&Self) -> Option<(f64, f64)>| {
+            let component = |(weight, of): &(f64, Self)| Component {
+                weight: *weight,
+                estimate: estimate(of),
+                interval: interval(of),
+            };
+            Mixture::of(&each.iter().map(component).collect::<Vec<_>>(), clusters)
+        };
+        let crossover = over(&|m| m.crossover_rad_s, &|m| m.crossover_interval)?;
+        let margin = over(&|m| m.phase_margin_deg, &|m| m.phase_margin_interval)?;
+        let person = |k: usize| {
+            let own = |m: &Self| Estimate {
+                value: [m.crossover_rad_s, m.phase_margin_deg][k].value,
+                standard_error: m.of_person[k],
+            };
+            over(&own, &|_| None).and_then(|mixture| mixture.estimate.standard_error)
+        };
+        Some(Self {
+            crossover_rad_s: crossover.estimate,
+            crossover_interval: crossover.interval,
+            phase_margin_deg: margin.estimate,
+            phase_margin_interval: margin.interval,
+            by_gain: each[0].1.by_gain,
+            of_person: [person(0), person(1)],
+        })
+    }
+}
+
+/// So many standard errors to both sides.
+fn reaching(of: Estimate, quantile: f64) -> Option<(f64, f64)> {
+    let reach = quantile * of.standard_error?;
+    Some((of.value - reach, of.value + reach))
+}
+
+/// With a standard error that is larger: the ends of the interval move out in its ratio to the old one.
+pub(super) fn widened(
+    of: Estimate,
+    interval: Option<(f64, f64)>,
+    error: Option<f64>,
+) -> (Estimate, Option<(f64, f64)>) {
+    let ratio = match (error, of.standard_error) {
+        (Some(wide), Some(own)) if own > 0.0 => (wide / own).max(1.0),
+        _ => 1.0,
+    };
+    let moved = |end: f64| of.value + ratio * (end - of.value);
+    let wide = Estimate {
+        standard_error: error.or(of.standard_error),
+        ..of
+    };
+    (wide, interval.map(|(low, high)| (moved(low), moved(high))))
 }
 
 /// Where the gain of an open loop falls through one.
@@ -191,11 +292,8 @@ pub fn loop_measures(
         }
         None => Estimate::fixed(value),
     };
-    Some(LoopMeasures {
-        crossover_rad_s: estimate(found.omega_rad_s, 0),
-        phase_margin_deg: estimate(found.margin_deg, 1),
-        quantile: NORMAL,
-    })
+    let both = [estimate(found.omega_rad_s, 0), estimate(found.margin_deg, 1)];
+    Some(LoopMeasures::of(both, found.moved_by(Complex64::ONE)))
 }
 
 #[cfg(test)]

@@ -11,10 +11,18 @@
 //! factor of two.
 
 use hoid_model::{
-    FamilyOperator,
+    FamilyOperator, Form,
     operator_family::{Coordinate, NamedParameter},
+    uncertainty::Estimate,
 };
 
+use super::{
+    mixture::{Component, Mixture},
+    open_loop::widened,
+};
+
+/// Weight of the forms that have a parameter, below which it is not determined.
+const LEAST_WEIGHT: f64 = 0.5;
 /// Largest part of the prior's variance in what is determined.
 const LARGEST_PRIOR_SHARE: f64 = 0.5;
 /// Largest standard error of a logarithm that is determined.
@@ -30,14 +38,82 @@ pub struct Parameter {
     pub unit: hoid_model::interned::Name,
     /// Its value; infinite for T_I of a pure integration.
     pub value: f64,
-    /// Standard error, to first order; `None` where there is none.
+    /// Standard error, to first order, of the operator of these runs; `None` where there is none.
     pub standard_error: Option<f64>,
+    /// That of the person, whose gain varies from one run to the next.
+    pub standard_error_person: Option<f64>,
     /// Interval of 95 %; an end that is open is infinite.
     pub interval: Option<(f64, f64)>,
     /// Variance after the data over that before; 0 without a prior.
     pub prior_share: f64,
     /// True where the data determine it.
     pub determined: bool,
+    /// The forms whose estimates it is the mean of; empty where it is that of one form alone.
+    pub averaged_over: Vec<Form>,
+}
+
+impl Parameter {
+    /// The same with error and interval of the person.
+    #[must_use]
+    pub fn as_of_person(&self) -> Self {
+        let (estimate, interval) = widened(self.estimate(), self.interval, self.standard_error_person);
+        Self {
+            standard_error: estimate.standard_error,
+            interval,
+            ..self.clone()
+        }
+    }
+
+    /// Its value with its standard error.
+    pub fn estimate(&self) -> Estimate {
+        Estimate {
+            value: self.value,
+            standard_error: self.standard_error,
+        }
+    }
+
+    /// The mean over forms of what has this name in each, with their weights, the form in front first.
+    pub(super) fn averaged(each: &[(Form, f64, &Self)], clusters: usize) -> Option<Self> {
+        let (_, _, front) = *each.first()?;
+        if each.len() == 1 {
+            return Some(front.clone());
+        }
+        let total: f64 = each.iter().map(|(_, weight, _)| weight).sum();
+        let component = |&(_, weight, p): &(Form, f64, &Self)| Component {
+            weight,
+            estimate: p.estimate(),
+            interval: p.interval,
+        };
+        let components: Vec<Component> = each.iter().map(component).collect();
+        let Mixture { estimate, interval } = Mixture::of(&components, clusters)?;
+        let of_person: Vec<Component> = (components.iter().zip(each))
+            .map(|(c, (_, _, p))| Component {
+                estimate: Estimate {
+                    standard_error: p.standard_error_person,
+                    ..c.estimate
+                },
+                ..*c
+            })
+            .collect();
+        let share = |of: &dyn Fn(&Self) -> f64| each.iter().map(|(_, w, p)| w / total * of(p)).sum::<f64>();
+        // Of one sign, and within the factor that counts for a scale: in the mean as in a form.
+        let one_sign = interval.is_some_and(|(low, high)| low * high > 0.0);
+        let known = match estimate.standard_error {
+            Some(s) if matches!(front.name.as_str(), "omega_nm" | "zeta_nm") => s < LARGEST_LOG_ERROR * estimate.value,
+            error => error.is_some(),
+        };
+        Some(Self {
+            value: estimate.value,
+            standard_error: estimate.standard_error,
+            standard_error_person: Mixture::of(&of_person, clusters)?.estimate.standard_error,
+            interval,
+            prior_share: share(&|p| p.prior_share),
+            // A parameter of forms that are less likely than those without it is not one of the person.
+            determined: total > LEAST_WEIGHT && share(&|p| f64::from(p.determined)) > 0.5 && one_sign && known,
+            averaged_over: each.iter().map(|(form, ..)| *form).collect(),
+            ..front.clone()
+        })
+    }
 }
 
 /// What is known of the coordinates of one operator.
@@ -52,15 +128,23 @@ pub(super) struct Known<'a> {
     pub profile: &'a [Option<(f64, f64)>],
     /// Quantile of Student's distribution for 95 %.
     pub quantile: f64,
+    /// What the gain of the person varies by beyond these runs, as a part of it.
+    pub run_to_run: f64,
 }
 
 impl Known<'_> {
     pub fn parameters(&self) -> Vec<Parameter> {
-        self.operator
-            .named()
-            .iter()
-            .map(|named| self.parameter(named))
-            .collect()
+        let made = |named: &NamedParameter| {
+            let made = self.parameter(named);
+            // All gains, and products with one, are proportional to it.
+            let scales = matches!(named.coordinate, None | Some(Coordinate::Gain));
+            let share = if scales { self.run_to_run * made.value.abs() } else { 0.0 };
+            Parameter {
+                standard_error_person: made.standard_error.map(|own| own.hypot(share)),
+                ..made
+            }
+        };
+        self.operator.named().iter().map(made).collect()
     }
 
     fn place(&self, wanted: Coordinate) -> Option<usize> {
@@ -111,9 +195,11 @@ impl Known<'_> {
             unit: named.unit,
             value: named.value,
             standard_error: None,
+            standard_error_person: None,
             interval: None,
             prior_share: 0.0,
             determined: false,
+            averaged_over: Vec::new(),
         };
         let Some(coordinate) = named.coordinate else {
             return self.product(made);
@@ -254,6 +340,7 @@ mod tests {
             ],
             profile: &[None; 6],
             quantile: 2.0,
+            run_to_run: 0.05,
         }
         .parameters()
     }
@@ -278,6 +365,41 @@ mod tests {
         let above = ((5.4_f64 / 5.0).ln().powi(2) + (0.2_f64 / 0.16).ln().powi(2)).sqrt();
         assert!((low - 25.0 * (-below).exp()).abs() < 1e-9 && (high - 25.0 * above.exp()).abs() < 1e-9);
         assert!((k.standard_error.unwrap() - 25.0 * (0.04_f64.powi(2) + 0.01).sqrt()).abs() < 1e-9);
+    }
+
+    #[test]
+    fn the_gain_of_the_person_is_known_less_well_than_that_of_the_run() {
+        let all = known(0.2, 0.02);
+        let (gain, tau) = (of(&all, "K_over_T_I"), of(&all, "tau_e"));
+        assert!((gain.standard_error_person.unwrap() - 0.2_f64.hypot(0.25)).abs() < 1e-12);
+        assert_eq!(tau.standard_error_person, tau.standard_error);
+        let person = gain.as_of_person();
+        assert_eq!(person.standard_error, gain.standard_error_person);
+        let (low, high) = person.interval.unwrap();
+        let reach = 0.4 * person.standard_error.unwrap() / 0.2;
+        assert!((low - (5.0 - reach)).abs() < 1e-12 && (high - (5.0 + reach)).abs() < 1e-12);
+        assert_eq!(tau.as_of_person(), *tau);
+    }
+
+    #[test]
+    fn a_parameter_is_averaged_over_the_forms_that_have_it() {
+        let near = known(0.2, 0.02);
+        let mut far = of(&near, "tau_e").clone();
+        far.value += 0.04;
+        far.interval = far.interval.map(|(low, high)| (low + 0.04, high + 0.04));
+        let tau = of(&near, "tau_e");
+        let averaged = |weights: [f64; 2]| {
+            Parameter::averaged(&[(Form::LeadLag, weights[0], tau), (Form::Lead2, weights[1], &far)], 1000).unwrap()
+        };
+        let both = averaged([0.75, 0.25]);
+        assert!((both.value - 0.16).abs() < 1e-12 && both.determined);
+        // .75 .25 .04^2 more than the variance of each.
+        assert!((both.standard_error.unwrap() - (1e-4_f64 + 3e-4).sqrt()).abs() < 1e-12);
+        assert_eq!(both.averaged_over, [Form::LeadLag, Form::Lead2]);
+        // Forms without it are the likelier ones.
+        assert!(!averaged([0.2, 0.2]).determined);
+        assert_eq!(Parameter::averaged(&[(Form::LeadLag, 1.0, tau)], 8).as_ref(), Some(tau));
+        assert_eq!(Parameter::averaged(&[], 8), None);
     }
 
     #[test]

@@ -15,8 +15,12 @@ use hoid_model::{
 };
 
 use super::{
-    clusters::Clusters, coordinates, covariances::inflation, layout::FamilyLayout, noise::NoiseProducts,
-    prediction_fit::PredictionFit, prior::OperatorPrior,
+    clusters::Clusters,
+    coordinates, covariances,
+    layout::FamilyLayout,
+    noise::NoiseProducts,
+    prediction_fit::{OPEN, PredictionFit},
+    prior::OperatorPrior,
 };
 use crate::{
     IdentError, InitialState, SearchOptions,
@@ -206,11 +210,15 @@ impl<'a> Prediction<'a> {
             residuals: n,
             states,
             inflation: 1.0,
+            ridge: 0.0,
             criterion,
             minimum,
             clusters,
         };
-        fit.inflation = inflation(&fit).unwrap_or(1.0);
+        if !covariances::is_regular(&fit) {
+            fit.ridge = OPEN;
+        }
+        fit.inflation = covariances::inflation(&fit).unwrap_or(1.0);
         Ok(fit)
     }
 }

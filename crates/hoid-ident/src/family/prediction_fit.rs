@@ -20,7 +20,13 @@ pub(super) struct PredictionFit<'a> {
     pub clusters: Clusters,
     /// kappa.
     pub inflation: f64,
+    /// Part of the diagonal of `G + P` that is added to it: zero, and [`OPEN`] where a combination of parameters
+    /// is open. It then has an enormous error, and what does not depend on it has its own.
+    pub ridge: f64,
 }
+
+/// The ridge that makes `G + P` regular: errors of 3e4 times those of a parameter alone count as open.
+pub(super) const OPEN: f64 = 1e-9;
 
 impl PredictionFit<'_> {
     pub fn layout(&self) -> &FamilyLayout {
@@ -51,22 +57,15 @@ impl PredictionFit<'_> {
         self.minimum.theta.len()
     }
 
-    /// Sum of squares of the residuals of one record, at any eta; `None` where there is no model.
-    pub fn squares_of(&self, eta: &[f64], record: usize, workspace: &mut Workspace) -> Option<f64> {
-        let mapped = self.criterion.model_of(eta, record).ok()?;
-        let residuals = self
-            .criterion
-            .of_record(mapped.orders, record)
-            .residuals_of(&mapped.theta, 0, workspace);
-        let squares: f64 = residuals.iter().map(|e| e * e).sum();
-        squares.is_finite().then_some(squares)
-    }
-
     /// `G + P` less what is taken away, solved for a right-hand side over these elements; zero for
     /// the others.
     pub fn solve(&self, free: &[usize], less: Option<&[f64]>, rhs: &[f64]) -> Option<Vec<f64>> {
         let p = self.parameters();
-        let gram = |i: usize, j: usize| self.minimum.at.gram[i * p + j] - less.map_or(0.0, |l| l[i * p + j]);
+        let gram = |i: usize, j: usize| {
+            let own = self.minimum.at.gram[i * p + j];
+            let held = if i == j { self.ridge * own } else { 0.0 };
+            own + held - less.map_or(0.0, |l| l[i * p + j])
+        };
         let part: Vec<f64> = free
             .iter()
             .flat_map(|&i| free.iter().map(move |&j| (i, j)))

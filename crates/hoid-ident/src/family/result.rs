@@ -11,9 +11,10 @@ use hoid_model::{
 use super::{
     agreement::Agreement,
     choice::FormFigures,
-    clusters::{ClusterKind, quantile},
+    clusters::ClusterKind,
     instrumental::InstrumentalFit,
     line_fit::LineFit,
+    mixture::{Component, Mixture},
     open_loop::{LoopMeasures, loop_doubt, loop_measures},
     parameter::Parameter,
     prior::OperatorPrior,
@@ -31,10 +32,32 @@ pub struct OperatorOfRecord {
     pub covariance: Option<Vec<f64>>,
     /// The same from the model alone, as if residuals were white and nothing varied.
     pub model_based: Option<Vec<f64>>,
-    /// Its parameters.
+    /// Its parameters, averaged over the forms that the data leave ([`FamilyFit::weighed`]).
     pub parameters: Vec<Parameter>,
     /// The same model as polynomials, for prediction and simulation.
     pub polynomial_fit: Fit,
+}
+
+/// A form that the data leave, with its weight and its operators.
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct WeighedForm {
+    /// The form.
+    pub form: Form,
+    /// Its weight; those of all forms make one.
+    pub weight: f64,
+    /// One for all records, or one for each.
+    pub operators: Vec<OperatorInForm>,
+}
+
+/// The operator of a record in one of the forms, by this form alone.
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct OperatorInForm {
+    /// The operator.
+    pub operator: FamilyOperator,
+    /// Covariance of its coordinates by rows.
+    pub covariance: Option<Vec<f64>>,
+    /// Its parameters.
+    pub parameters: Vec<Parameter>,
 }
 
 /// Whether the form can be told from a Box-Jenkins model of the same orders.
@@ -53,7 +76,7 @@ pub struct FreeModel {
 /// The result of [`super::FamilyEstimator::fit`].
 #[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub struct FamilyFit {
-    /// The form that was chosen or given.
+    /// The form in front, or the one that was given.
     pub form: Form,
     /// True with the neuromuscular part.
     pub neuromuscular: bool,
@@ -67,6 +90,11 @@ pub struct FamilyFit {
     pub prior: OperatorPrior,
     /// The forms that were compared, simplest first.
     pub forms: Vec<FormFigures>,
+    /// Those that the data leave, over which estimates are averaged: the one in front first.
+    pub weighed: Vec<WeighedForm>,
+    /// What the gain of the person varies by beyond these runs, as a part of it: standard deviation of their
+    /// mean. Zero where errors are those of the scatter between runs, which hold it.
+    pub run_to_run: f64,
     /// The fit at the lines of the excitation, of the same form.
     pub lines: Option<LineFit>,
     /// Why there is none.
@@ -125,32 +153,58 @@ impl FamilyFit {
         &self.operators[record.min(self.operators.len() - 1)]
     }
 
-    /// Crossover frequency and phase margin of a record with a controlled element; `None` where
-    /// the loop has no crossover.
+    /// Crossover frequency and phase margin of a record with a controlled element, averaged over the forms; `None`
+    /// where the loop of the form in front has no crossover.
     pub fn loop_measures(&self, record: usize, element: &ContinuousTransferFunction) -> Option<LoopMeasures> {
+        let each = self.weighed.iter().map(|form| {
+            let of = form.of(record)?;
+            let found = self.measured(&of.operator, of.covariance.as_deref(), element)?;
+            Some((form.weight, found))
+        });
+        let each: Vec<Option<(f64, LoopMeasures)>> = each.collect();
+        each.first()?.as_ref()?;
+        LoopMeasures::averaged(&each.into_iter().flatten().collect::<Vec<_>>(), self.clusters)
+    }
+
+    /// The same by the form in front alone.
+    pub fn loop_measures_in_front(&self, record: usize, element: &ContinuousTransferFunction) -> Option<LoopMeasures> {
         let of = self.operator(record);
         self.measured(&of.operator, of.covariance.as_deref(), element)
     }
 
-    /// Gain and phase of the operator of a record from e to u at frequencies in rad/s, held over a sample, with
-    /// errors from the covariance of its coordinates: those of its intervals.
+    /// Gain and phase of the operator of a record from e to u at frequencies in rad/s, held over a sample,
+    /// averaged over the forms: of `ln H` the mean, and its error with what the forms differ by.
     pub fn frequency_response(&self, record: usize, omega_rad_s: &[f64]) -> Vec<ResponsePoint> {
-        let of = self.operator(record);
+        let front = &self.operator(record).operator;
         let point = |&omega: &f64| {
-            let found = of.operator.response_and_gradient(omega);
-            let along = |value: f64, part: fn(Complex64) -> f64, unit: f64| {
-                let gradient = found.gradient.iter().map(|g| unit * part(g / found.value));
-                let gradient: Vec<f64> = gradient.collect();
-                match of.covariance.as_deref() {
-                    Some(covariance) => Estimate::with_variance(value, variance_along(&gradient, covariance)),
-                    None => Estimate::fixed(value),
-                }
+            let middle = front.response(omega);
+            let along = |part: fn(Complex64) -> f64| {
+                let of = |form: &WeighedForm| {
+                    let of = form.of(record)?;
+                    let found = of.operator.response_and_gradient(omega);
+                    let gradient: Vec<f64> = found.gradient.iter().map(|g| part(g / found.value)).collect();
+                    let variance = of.covariance.as_deref().map(|c| variance_along(&gradient, c).max(0.0));
+                    Some(Component {
+                        weight: form.weight,
+                        estimate: Estimate {
+                            value: part((found.value / middle).ln()),
+                            standard_error: variance.map(f64::sqrt),
+                        },
+                        interval: None,
+                    })
+                };
+                let all: Vec<Component> = self.weighed.iter().filter_map(of).collect();
+                Mixture::of(&all, self.clusters).map_or(Estimate::fixed(0.0), |mixture| mixture.estimate)
             };
-            let held = found.value * hold(omega, self.sample_time);
+            let held = middle * hold(omega, self.sample_time);
+            let scaled = |from: f64, unit: f64, e: Estimate| Estimate {
+                value: from + unit * e.value,
+                standard_error: e.standard_error.map(|s| unit * s),
+            };
             ResponsePoint {
                 omega_rad_s: omega,
-                magnitude_db: along(20.0 * held.norm().log10(), |z| z.re, 20.0 / LN_10),
-                phase_deg: along(held.arg().to_degrees(), |z| z.im, 180.0 / PI),
+                magnitude_db: scaled(20.0 * held.norm().log10(), 20.0 / LN_10, along(|z| z.re)),
+                phase_deg: scaled(held.arg().to_degrees(), 180.0 / PI, along(|z| z.im)),
             }
         };
         omega_rad_s.iter().map(point).collect()
@@ -162,8 +216,8 @@ impl FamilyFit {
     pub fn loop_finding(&self, record: usize, element: &ContinuousTransferFunction) -> Option<Finding> {
         let operator = &self.operator(record).operator;
         let open_loop = |omega: f64| operator.response(omega) * hold(omega, self.sample_time) * element.response(omega);
-        let crossing = self.loop_measures(record, element).map(|found| {
-            let reach = found.quantile * found.phase_margin_deg.standard_error.unwrap_or(0.0);
+        let crossing = self.loop_measures_in_front(record, element).map(|found| {
+            let reach = found.phase_margin_interval.map_or(0.0, |(low, high)| 0.5 * (high - low));
             (found.crossover_rad_s.value, reach)
         });
         loop_doubt(open_loop, crossing)
@@ -188,10 +242,7 @@ impl FamilyFit {
         element: &ContinuousTransferFunction,
     ) -> Option<LoopMeasures> {
         let measures = loop_measures(operator, covariance, element, self.sample_time)?;
-        Some(LoopMeasures {
-            quantile: quantile(self.clusters),
-            ..measures
-        })
+        Some(measures.of_few(self.clusters).with_run_to_run(self.run_to_run))
     }
 
     /// A coordinate of a record with its standard error.
@@ -204,6 +255,13 @@ impl FamilyFit {
             Some(c) => Estimate::with_variance(x[i], c[i * x.len() + i]),
             None => Estimate::fixed(x[i]),
         })
+    }
+}
+
+impl WeighedForm {
+    /// The operator of a record; of records beyond them, the last.
+    pub fn of(&self, record: usize) -> Option<&OperatorInForm> {
+        self.operators.get(record).or(self.operators.last())
     }
 }
 

@@ -13,6 +13,7 @@
 //! | `neuromuscular-lag` | the two poles describe no neuromuscular system |
 //! | `not-constant` | parameters that change within the records, or from one to the next |
 //! | `residuals-not-white`, `structure`, `leverage` | sizes in the residuals |
+//! | `no-response` | nothing that could not be chance |
 //! | `exact-fit`, `no-change`, `change-point` | worth knowing; the result stands |
 //!
 //! | file | what it holds |
@@ -21,6 +22,7 @@
 //! | `constancy` | whether parameters change; also for the family |
 //! | `left_response` | whether a response is left that a model does not have |
 //! | `answer` | whether e answers to u, as it does in a loop |
+//! | `no_response` | whether u responds to e at all |
 //! | `operator` | gains, poles and delay of an operator |
 //! | `operator_step` | what a stretch of data says against an operator |
 //! | `second_opinion` | fits to records that no single sample can carry |
@@ -32,6 +34,7 @@ pub(crate) mod constancy;
 mod fit;
 mod grey_box;
 mod left_response;
+mod no_response;
 mod operator;
 mod operator_step;
 pub(crate) mod residuals;
@@ -42,5 +45,6 @@ mod whitened;
 pub use answer::{Answer, answer};
 pub use constancy::{Course, Unsteady, unsteady};
 pub use left_response::{LeftResponse, left_response};
+pub use no_response::{Response, response};
 pub use operator::{gain_findings, is_open, leads_backwards, neuromuscular_finding, pole_findings};
 pub use operator_step::{OperatorStep, operator_step};

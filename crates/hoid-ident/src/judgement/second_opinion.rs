@@ -17,7 +17,7 @@ use hoid_model::{
 
 use crate::{
     Estimator, Fit, GreyBox, GreyBoxFit, SigmoidChange, SigmoidFit,
-    family::{FamilyEstimator, FamilyFit, Parameter},
+    family::{FamilyEstimator, FamilyFit},
     faults::{held, without_slow},
 };
 
@@ -141,17 +141,15 @@ pub fn of_family(
         Some(_) => &Without::ALL[..1],
         None => &Without::ALL,
     };
-    let measures = |of: &FamilyFit| of.loop_measures(0, element?);
-    let estimate = |p: &Parameter| Estimate {
-        value: p.value,
-        standard_error: p.standard_error,
-    };
+    let measures = |of: &FamilyFit| of.loop_measures_in_front(0, element?);
     opinions(asked, records, |others| {
         let other = again.fit_beside(others, None).ok()?;
-        let parameters = fit.operators.iter().zip(&other.operators).flat_map(|(one, two)| {
+        // Of the form in front by itself: the other fit has no other.
+        let (one, two) = (fit.weighed.first()?, other.weighed.first()?);
+        let parameters = one.operators.iter().zip(&two.operators).flat_map(|(one, two)| {
             let both = one.parameters.iter().zip(&two.parameters);
             both.filter(|(a, _)| a.determined)
-                .map(|(a, b)| (a.name.clone(), estimate(a), estimate(b)))
+                .map(|(a, b)| (a.name.clone(), a.estimate(), b.estimate()))
         });
         let mut pairs: Vec<Beside> = parameters.collect();
         if let Some((a, b)) = measures(fit).zip(measures(&other)) {

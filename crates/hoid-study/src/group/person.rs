@@ -7,7 +7,7 @@
 //! intervals, the figures of the fit and its verdict. Parameters that no person has, have no columns. Where some parameters are
 //! individual, a person has a row for each run.
 
-use hoid_ident::family::{FamilyFit, OperatorOfRecord, Parameter};
+use hoid_ident::family::{FamilyFit, LoopMeasures, OperatorOfRecord, Parameter};
 use hoid_io::{ColumnValues, OutputTable, TableSchema};
 use hoid_model::{ContinuousTransferFunction, VerdictLevel, operator_family::PARAMETERS, uncertainty::Estimate};
 
@@ -110,17 +110,19 @@ impl Person {
         element: Option<&ContinuousTransferFunction>,
     ) -> Self {
         let OperatorOfRecord { parameters, .. } = fit.operator(record);
+        // Rows are of people, whose gain varies from run to run.
         let measures = element.and_then(|element| fit.loop_measures(record, element));
+        let measures = measures.map(LoopMeasures::as_of_person);
         let strings = |all: &mut dyn Iterator<Item = &str>| all.map(str::to_owned).collect();
         Self {
             run: run.to_owned(),
             runs,
             form: fit.form.name().to_owned(),
-            parameters: parameters.clone(),
+            parameters: parameters.iter().map(Parameter::as_of_person).collect(),
             crossover_rad_s: measures.map(|m| m.crossover_rad_s),
-            crossover_interval: measures.and_then(|m| m.crossover_interval()),
+            crossover_interval: measures.and_then(|m| m.crossover_interval),
             phase_margin_deg: measures.map(|m| m.phase_margin_deg),
-            phase_margin_interval: measures.and_then(|m| m.phase_margin_interval()),
+            phase_margin_interval: measures.and_then(|m| m.phase_margin_interval),
             chi2: fit.lines.as_ref().map(|l| (l.chi_squared, l.degrees_of_freedom)),
             kappa: Some(fit.inflation),
             noise_order: Some(fit.noise_orders.1),
@@ -208,9 +210,11 @@ impl Person {
                 unit,
                 value,
                 standard_error: any(&format!("{name}_se")),
+                standard_error_person: any(&format!("{name}_se")),
                 interval: interval(name),
                 prior_share: any(&format!("{name}_prior_share")).unwrap_or(0.0),
                 determined: cell(&format!("{name}_determined")) == "yes",
+                averaged_over: Vec::new(),
             })
         };
         Some(Self {
@@ -298,9 +302,11 @@ mod tests {
             unit,
             value: if determined { 0.2 } else { f64::INFINITY },
             standard_error: determined.then_some(0.01),
+            standard_error_person: determined.then_some(0.01),
             interval,
             prior_share: 0.25,
             determined,
+            averaged_over: Vec::new(),
         };
         let mut person = Person {
             run: "3".to_owned(),

@@ -106,6 +106,7 @@ impl Found<'_> {
             let here = fit.loop_measures(0, element);
             page.push_str(&format!("Open loop with {element}: {}\n", measures(here.as_ref())));
         }
+        page.push_str(&self.of_person());
         let quality = self.identified.quality()?;
         let coherence = fit.coherent_share;
         page.push_str(&format!(
@@ -126,6 +127,38 @@ impl Found<'_> {
         }
         page.push_str(&text::records(self.files, self.records, self.accounts, false));
         Ok(page)
+    }
+
+    /// The errors of the person, where they are larger than those of their runs.
+    fn of_person(&self) -> String {
+        let fit = self.fit;
+        if fit.run_to_run == 0.0 || fit.operators.len() > 1 {
+            return String::new();
+        }
+        let error = |name: &str, estimate: Estimate, error: f64| {
+            let (_, error) = numbers::with_uncertainty(estimate.value, Some(error));
+            format!("{name} ± {error}")
+        };
+        let parameters = fit.operator(0).parameters.iter().filter(|p| p.determined);
+        let wider = parameters.filter(|p| p.standard_error_person != p.standard_error);
+        let mut all: Vec<String> = wider
+            .filter_map(|p| Some(error(&p.name, p.estimate(), p.standard_error_person?)))
+            .collect();
+        let here = self.element.and_then(|element| fit.loop_measures(0, element));
+        if let Some(m) = here {
+            let [crossover, margin] = m.of_person;
+            all.extend(crossover.map(|s| error("crossover", m.crossover_rad_s, s)));
+            all.extend(margin.map(|s| error("phase margin", m.phase_margin_deg, s)));
+        }
+        let runs = if self.records.len() == 1 { "this run" } else { "these runs" };
+        match all.as_slice() {
+            [] => String::new(),
+            all => format!(
+                "Errors are those of {runs}. Of the person, whose gain varies by some {:.0} % beyond: {}.\n",
+                100.0 * fit.run_to_run,
+                all.join(", ")
+            ),
+        }
     }
 
     /// The methods side by side.
@@ -332,20 +365,21 @@ fn measures(found: Option<&LoopMeasures>) -> String {
     format!(
         "crossover {} rad/s{}, phase margin {} deg{}",
         with_error(m.crossover_rad_s.value, m.crossover_rad_s.standard_error),
-        interval(m.crossover_interval()),
+        interval(m.crossover_interval),
         with_error(m.phase_margin_deg.value, m.phase_margin_deg.standard_error),
-        interval(m.phase_margin_interval()),
+        interval(m.phase_margin_interval),
     )
 }
 
 fn forms(all: &[FormFigures], chosen: &str) -> String {
-    let mut rows = text::table(&["form", "loss", "criterion", "held out", "chi^2", "degrees", ""]);
+    let mut rows = text::table(&["form", "weight", "loss", "criterion", "held out", "chi^2", "degrees", ""]);
     let least = all.iter().filter_map(|f| f.criterion).fold(f64::INFINITY, f64::min);
     for f in all {
         let number = |v: Option<f64>| v.map_or(String::new(), |v| format!("{v:.1}"));
-        let sign = if f.form.name() == chosen { "chosen" } else { "" };
+        let sign = if f.form.name() == chosen { "in front" } else { "" };
         rows.add_row([
             f.form.to_string(),
+            if f.weight > 0.0 { format!("{:.2}", f.weight) } else { String::new() },
             f.loss.map_or("none".to_owned(), numbers::plain),
             f.criterion.map_or(String::new(), |c| format!("+{:.1}", c - least)),
             number(f.held_out),

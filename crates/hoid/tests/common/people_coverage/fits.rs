@@ -8,7 +8,7 @@ use hoid::{
     sim::{SimError, people::Person},
 };
 
-use super::people::{Cell, recorded};
+use super::people::{Cell, Spread, recorded};
 
 /// Where the response is compared, rad/s: the band of manual control.
 const BAND_RAD_S: [f64; 5] = [0.7, 1.3, 2.4, 4.3, 8.0];
@@ -112,50 +112,65 @@ pub fn outcomes(seed: u64, number: u64, variants: &[Variant]) -> Result<Vec<Outc
             variant,
             true_form,
             seconds: begun.elapsed().as_secs_f64(),
-            found: fit.map(|fit| found(&fit, &person)).map_err(|e| e.to_string()),
+            found: fit.map(|fit| found(&fit, &person, cell)).map_err(|e| e.to_string()),
         }
     };
     Ok(variants.iter().map(of).collect())
 }
 
-fn found(fit: &FamilyFit, person: &Person) -> Found {
+fn found(fit: &FamilyFit, person: &Person, cell: Cell) -> Found {
     let truth = &person.state.operator;
     let of = fit.operator(0);
     let named = truth.named();
-    let mut quantities: Vec<Quantity> = (of.parameters.iter())
+    // The truth is the person's: where their runs differ, their errors are asked.
+    let of_person = cell.spread != Spread::None;
+    let parameters = of.parameters.iter();
+    let mut quantities: Vec<Quantity> = parameters
+        .map(|p| if of_person { p.as_of_person() } else { p.clone() })
         .filter_map(|p| {
             let true_value = named.iter().find(|n| n.name == p.name)?.value;
             Some(Quantity {
-                name: p.name.clone(),
                 truth: true_value,
                 value: p.value,
                 standard_error: p.standard_error,
                 interval: p.interval,
                 prior_share: p.prior_share,
                 determined: p.determined,
+                name: p.name,
             })
         })
         .collect();
     let element = &person.state.controlled_element;
     let true_loop = loop_measures(truth, None, element, fit.sample_time);
-    if let (Some(true_loop), Some(own_loop)) = (true_loop, fit.loop_measures(0, element)) {
-        let mut put = |name: &str, truth: Estimate, own: Estimate| {
-            for (suffix, quantile) in [("", own_loop.quantile), (" (1.96)", 1.96)] {
+    let own_loop = fit.loop_measures(0, element);
+    let own_loop = own_loop.map(|own| if of_person { own.as_of_person() } else { own });
+    if let (Some(true_loop), Some(own)) = (true_loop, own_loop) {
+        let mut put = |name: &str, truth: Estimate, own: Estimate, interval: Option<(f64, f64)>| {
+            let normal = own.standard_error.map(|s| (own.value - 1.96 * s, own.value + 1.96 * s));
+            for (suffix, interval) in [("", interval), (" (1.96)", normal)] {
                 quantities.push(Quantity {
                     name: format!("{name}{suffix}"),
                     truth: truth.value,
                     value: own.value,
                     standard_error: own.standard_error,
-                    interval: own
-                        .standard_error
-                        .map(|s| (own.value - quantile * s, own.value + quantile * s)),
+                    interval,
                     prior_share: 0.0,
                     determined: own.standard_error.is_some(),
                 });
             }
         };
-        put("crossover", true_loop.crossover_rad_s, own_loop.crossover_rad_s);
-        put("phase margin", true_loop.phase_margin_deg, own_loop.phase_margin_deg);
+        put(
+            "crossover",
+            true_loop.crossover_rad_s,
+            own.crossover_rad_s,
+            own.crossover_interval,
+        );
+        put(
+            "phase margin",
+            true_loop.phase_margin_deg,
+            own.phase_margin_deg,
+            own.phase_margin_interval,
+        );
     }
     Found {
         form: fit.form,

@@ -1,0 +1,180 @@
+//! An estimate over the forms that the data leave: weighed, not chosen.
+//!
+//! Form f has the weight `w_f = exp(-Delta_f/2)/sum exp(-Delta_g/2)`, Delta its difference in Akaike's
+//! criterion to the least (H. Akaike, *J. Econometrics* 16 (1981) 3-14). A quantity x that forms have in
+//! common is
+//!
+//! `x = sum w_f x_f`,  `s^2 = sum w_f (s_f^2 + (x_f - x)^2)`,
+//!
+//! the unconditional standard error (K. P. Burnham and D. R. Anderson, *Sociological Methods and Research* 33
+//! (2004) 261-304, eq. 9): what the choice of a form costs is a part of the error. A form that lacks x has no
+//! part in it, and the other weights are scaled to one. The interval of 95 % is that of the mixture of the
+//! distributions of the forms, each of two halves of Student's distribution that meet at `x_f` and end at its
+//! own interval, which need not be symmetric.
+
+use hoid_model::uncertainty::Estimate;
+use statrs::distribution::{ContinuousCDF, StudentsT};
+
+use super::clusters::{freedom, quantile};
+
+/// Halvings of a bracket.
+const HALVINGS: usize = 80;
+/// Widths of all intervals beyond which Student's distribution has less than a hundredth of a tail.
+const FAR: f64 = 50.0;
+/// Probability in each tail.
+const TAIL: f64 = 0.025;
+
+/// What a form says of a quantity.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Component {
+    /// Weight of the form.
+    pub weight: f64,
+    /// Its estimate.
+    pub estimate: Estimate,
+    /// Its interval of 95 %.
+    pub interval: Option<(f64, f64)>,
+}
+
+/// What all of them say.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Mixture {
+    pub estimate: Estimate,
+    pub interval: Option<(f64, f64)>,
+}
+
+impl Mixture {
+    /// Of these forms; `None` for none. Errors rest on so many clusters.
+    pub fn of(components: &[Component], clusters: usize) -> Option<Self> {
+        let total: f64 = components.iter().map(|c| c.weight).sum();
+        if let [only] = components {
+            return Some(Self {
+                estimate: only.estimate,
+                interval: only.interval,
+            });
+        }
+        if !(total > 0.0) {
+            return None;
+        }
+        let over = |of: &dyn Fn(&Component) -> f64| components.iter().map(|c| c.weight / total * of(c)).sum::<f64>();
+        let value = over(&|c| c.estimate.value);
+        // An error that is missing is not one of zero.
+        let known = components.iter().all(|c| c.estimate.standard_error.is_some()) && value.is_finite();
+        let variance = over(&|c| {
+            let s = c.estimate.standard_error.unwrap_or(0.0);
+            s * s + (c.estimate.value - value).powi(2)
+        });
+        Some(Self {
+            estimate: Estimate {
+                value,
+                standard_error: known.then(|| variance.sqrt()),
+            },
+            interval: interval(components, total, clusters),
+        })
+    }
+}
+
+/// The interval of the mixture; `None` where a form has none.
+fn interval(components: &[Component], total: f64, clusters: usize) -> Option<(f64, f64)> {
+    let student = StudentsT::new(0.0, 1.0, freedom(clusters)).ok()?;
+    let quantile = quantile(clusters);
+    let parts: Option<Vec<(f64, f64, (f64, f64))>> = (components.iter())
+        .map(|c| Some((c.weight / total, c.estimate.value, c.interval?)))
+        .collect();
+    let parts = parts?;
+    // Below x, of one form.
+    let below = |x: f64, value: f64, (low, high): (f64, f64)| -> f64 {
+        let reach = if x < value { value - low } else { high - value };
+        match (x - value) / reach {
+            z if z.is_finite() => student.cdf(quantile * z),
+            // A form without an error, and one whose estimate itself is infinite.
+            _ if x < value => 0.0,
+            _ => 1.0,
+        }
+    };
+    let share = |x: f64| parts.iter().map(|&(w, v, i)| w * below(x, v, i)).sum::<f64>();
+    let finite = |pick: fn(f64, f64) -> f64, from: f64| {
+        let all = parts.iter().flat_map(|&(_, v, (low, high))| [v, low, high]);
+        all.filter(|x| x.is_finite()).fold(from, pick)
+    };
+    let (least, most) = (finite(f64::min, f64::INFINITY), finite(f64::max, f64::NEG_INFINITY));
+    // Far out: a form with an end that is open keeps half of its probability there.
+    let reach = FAR * (most - least).max(most.abs().max(least.abs()) * f64::EPSILON);
+    let place = |wanted: f64| {
+        let (mut low, mut high) = (least - reach, most + reach);
+        for _ in 0..HALVINGS {
+            let middle = 0.5 * (low + high);
+            if share(middle) < wanted {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        0.5 * (low + high)
+    };
+    let low = if share(least - reach) > TAIL { f64::NEG_INFINITY } else { place(TAIL) };
+    let high = if share(most + reach) < 1.0 - TAIL { f64::INFINITY } else { place(1.0 - TAIL) };
+    Some((low, high))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn component(weight: f64, value: f64, s: f64, clusters: usize) -> Component {
+        let reach = quantile(clusters) * s;
+        Component {
+            weight,
+            estimate: Estimate::with_variance(value, s * s),
+            interval: Some((value - reach, value + reach)),
+        }
+    }
+
+    #[test]
+    fn one_form_is_itself_and_two_alike_are_one() {
+        let one = component(0.3, 2.0, 0.1, 8);
+        let alone = Mixture::of(&[one], 8).unwrap();
+        assert_eq!((alone.estimate, alone.interval), (one.estimate, one.interval));
+        let both = Mixture::of(&[one, Component { weight: 0.5, ..one }], 8).unwrap();
+        assert!((both.estimate.value - 2.0).abs() < 1e-14);
+        assert!((both.estimate.standard_error.unwrap() - 0.1).abs() < 1e-14);
+        let (low, high) = both.interval.unwrap();
+        let expected = one.interval.unwrap();
+        assert!((low - expected.0).abs() < 1e-9 && (high - expected.1).abs() < 1e-9);
+        assert_eq!(Mixture::of(&[], 8), None);
+    }
+
+    /// Two forms three errors apart: mean and variance by hand, the interval by its own probability.
+    #[test]
+    fn forms_that_differ_widen_the_error() {
+        let many = 1_000_000;
+        let all = [component(0.75, 1.0, 0.1, many), component(0.25, 1.4, 0.2, many)];
+        let found = Mixture::of(&all, many).unwrap();
+        assert!((found.estimate.value - 1.1).abs() < 1e-14);
+        let variance: f64 = 0.75 * (0.01 + 0.01) + 0.25 * (0.04 + 0.09);
+        assert!((found.estimate.standard_error.unwrap() - variance.sqrt()).abs() < 1e-14);
+        let normal = statrs::distribution::Normal::new(0.0, 1.0).unwrap();
+        let share = |x: f64| 0.75 * normal.cdf((x - 1.0) / 0.1) + 0.25 * normal.cdf((x - 1.4) / 0.2);
+        let (low, high) = found.interval.unwrap();
+        assert!((share(low) - 0.025).abs() < 1e-5 && (share(high) - 0.975).abs() < 1e-5, "{low} {high}");
+    }
+
+    #[test]
+    fn an_end_that_is_open_in_a_form_with_weight_is_open() {
+        let closed = component(0.9, 5.0, 0.5, 8);
+        let open = |weight| Component {
+            weight,
+            estimate: Estimate::with_variance(6.0, 1.0),
+            interval: Some((4.0, f64::INFINITY)),
+        };
+        let high = |weight| Mixture::of(&[closed, open(weight)], 8).unwrap().interval.unwrap().1;
+        assert!(high(0.2).is_infinite());
+        assert!(high(0.01).is_finite());
+        // A pure integration in one form.
+        let infinite = Component {
+            estimate: Estimate::fixed(f64::INFINITY),
+            ..open(0.2)
+        };
+        let found = Mixture::of(&[closed, infinite], 8).unwrap();
+        assert!(found.estimate.value.is_infinite() && found.interval.unwrap().1.is_infinite());
+    }
+}
