@@ -20,6 +20,8 @@ pub struct Identification<E = FamilyEstimator> {
     pub rate: Decimation,
     /// What the person controls: adds the loop to the verdict.
     pub controlled_element: Option<ContinuousTransferFunction>,
+    /// What the verdict is about ([`crate::answers`]); by default the response and the loop.
+    pub answers: Vec<String>,
 }
 
 impl Default for Identification {
@@ -38,6 +40,7 @@ impl<E> Identification<E> {
             faults: FaultHandling::default(),
             rate: Decimation::default(),
             controlled_element: None,
+            answers: Vec::new(),
         }
     }
 }

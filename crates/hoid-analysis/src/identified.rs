@@ -2,12 +2,13 @@
 
 use std::fmt;
 
-use hoid_ident::{Fit, family::FamilyFit, frequency::Description, validation::GoodnessOfFit};
+use hoid_ident::{Fit, family::FamilyFit, frequency::Description, judgement::response, validation::GoodnessOfFit};
 use hoid_model::{ContinuousTransferFunction, Decimation, Detrend, Record, Verdict, uncertainty::Estimate};
 use serde_json::{Map, Value};
 
 use crate::{
     AnalysisError,
+    answers::{self, Answered, Answers, of_answer},
     estimators::{BatchEstimator, Fitted},
     identification::Identification,
     reading::Reading,
@@ -77,6 +78,9 @@ impl<E: BatchEstimator> Identification<E> {
             found,
         } = E::fit(self, &mut data)?;
         let verdict = data.judged(verdict);
+        let response = E::OF_PERSON.then(|| response(&data.records)).flatten();
+        let verdict = verdict.behind(response.and_then(|found| found.finding()));
+        let verdict = answers::judged(verdict, &fit.answers(self.controlled_element.as_ref()), &self.answers);
         E::judged(&mut fit, &verdict);
         let reading = data.source.as_ref().map(|source| &source.reading);
         let by_default = Identification::of(self.estimator.by_default());
@@ -99,6 +103,18 @@ impl<E: BatchEstimator> Identification<E> {
             taken_out,
             written: None,
         })
+    }
+}
+
+impl<F: Answers> Identified<F> {
+    /// What each answer is worth.
+    pub fn answers(&self) -> Vec<(String, Verdict)> {
+        let all = self.fit.answers(self.controlled_element.as_ref());
+        let one = |answer: Answered| (of_answer(&self.verdict, &answer), answer.name);
+        all.into_iter()
+            .map(one)
+            .map(|(verdict, name)| (name, verdict))
+            .collect()
     }
 }
 

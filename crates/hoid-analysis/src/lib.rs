@@ -19,6 +19,7 @@
 //! | the describing function, where the excitation is recorded | `description`, `offset` |
 //! | the fit, a second opinion, the loop, the settings of the estimator | `estimators`: a file each |
 //! | what the recordings say | `identified`, `recordings` |
+//! | what each answer is worth, and the verdict on those that were asked for | `answers` |
 //! | a describing function, from recordings to its verdict | `describing` |
 //! | the level of u, the settings that all share | `level`, `settings` |
 //!
@@ -37,6 +38,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod answers;
 mod copies;
 mod describing;
 mod description;
@@ -59,6 +61,7 @@ mod repair;
 mod request;
 mod settings;
 
+pub use answers::{Answered, Answers};
 pub use describing::{Described, Describing};
 pub use description::Excitation;
 pub use error::AnalysisError;

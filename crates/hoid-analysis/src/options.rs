@@ -13,8 +13,8 @@ use hoid_ident::{
 use hoid_model::{Form, NamedChoice, operator_family::Coordinate};
 
 use crate::{
-    AnalysisError, description::Excitation, estimators::Polynomials, identification::Identification,
-    prior::prior_of_text,
+    AnalysisError, answers::asked_for, description::Excitation, estimators::Polynomials,
+    identification::Identification, prior::prior_of_text,
 };
 
 /// Standard deviations from which a robust loss is linear where no number is given: 95 % efficient for normal
@@ -105,7 +105,8 @@ impl Options for Identification<SigmoidChange> {
                     return Err(refused(option, text, expected.to_owned()));
                 }
             },
-            _ => return set_search(&mut how.search, option, text),
+            _ if set_search(&mut how.search, option, text)? => {}
+            _ => return self.set_shared(option, text),
         }
         Ok(true)
     }
@@ -157,6 +158,7 @@ impl<E> Identification<E> {
     fn set_shared(&mut self, option: &Setting, text: &str) -> Result<bool, AnalysisError> {
         match option.name {
             "excitation" => self.excitation = Excitation::of_text(Some(text)),
+            "answers" => self.answers = asked_for(&option.read::<Vec<String>>(text)?)?,
             "period" => self.period_s = Some(option.read(text)?),
             "controlled_element" => {
                 let element = text

@@ -63,6 +63,7 @@ pub fn estimators() -> Vec<MethodSpec> {
                 delay(FamilyEstimator::default().delay_range_s),
                 individual(),
                 run_to_run(),
+                answers(),
                 initial_state(),
             ],
             search(FamilyEstimator::default().search),
@@ -82,6 +83,7 @@ pub fn estimators() -> Vec<MethodSpec> {
                 controlled_element(),
                 delay(GreyBox::new(1..=4).delay_range_s),
                 individual(),
+                answers(),
                 initial_state(),
                 fix(),
                 bound(),
@@ -104,6 +106,7 @@ pub fn estimators() -> Vec<MethodSpec> {
                 operator_prior("none"),
                 orders("nd=1 of its noise"),
                 delay(SigmoidChange::default().delay_range_s),
+                answers(),
                 initial_state(),
                 fix(),
                 bound(),
@@ -119,6 +122,7 @@ pub fn estimators() -> Vec<MethodSpec> {
             polynomial_delay(),
             criterion(),
             controlled_element(),
+            answers(),
         ]
     };
     let pem = MethodSpec {
@@ -253,7 +257,7 @@ fn remnant_order() -> Setting {
 }
 
 fn form() -> Setting {
-    let help = "Form of the operator; auto: the simplest that held-out runs do not refute, of one that changes lead";
+    let help = "Form of the operator; auto: estimates are averaged over the forms that the data leave, of one that changes lead";
     setting("form", Kind::Choice(&FORMS), "auto", help)
 }
 
@@ -312,6 +316,12 @@ fn delay_of(usual: &str) -> Setting {
     setting("delay", Kind::NumberOrSpan, usual, help)
         .unit("s")
         .bounds(Bounds::NonNegative)
+}
+
+fn answers() -> Setting {
+    let help =
+        "What the verdict is about: response, crossover, phase_margin, parameters by their names, as crossover,tau_e";
+    setting("answers", Kind::Names, "response and loop", help)
 }
 
 fn individual() -> Setting {

@@ -110,6 +110,8 @@ impl Polynomials {
 
 impl BatchEstimator for Polynomials {
     type Fit = PolynomialFit;
+    /// Of any system.
+    const OF_PERSON: bool = false;
 
     fn counts_samples(&self) -> bool {
         true

@@ -25,7 +25,7 @@ use hoid_ident::{
     validation::{GoodnessOfFit, LjungBox},
 };
 use hoid_model::{
-    Fault, Finding, NotConvertible, Orders, Record, Verdict,
+    Fault, Finding, NotConvertible, Orders, Record, Severity, Verdict,
     margins::Margins,
     uncertainty::{Estimate, OperatorEstimate},
 };
@@ -103,6 +103,15 @@ pub fn verdict(v: &Verdict) -> Value {
         "notes": v.notes().collect::<Vec<_>>(),
         "findings": v.findings().iter().map(finding).collect::<Vec<_>>(),
     })
+}
+
+/// What each answer is worth, by its name.
+pub fn answers(all: &[(String, Verdict)]) -> Map<String, Value> {
+    let one = |v: &Verdict| {
+        let reasons = v.findings().iter().filter(|finding| finding.severity > Severity::Note);
+        json!({"level": v.level.name(), "reasons": reasons.map(finding).collect::<Vec<_>>()})
+    };
+    all.iter().map(|(name, verdict)| (name.clone(), one(verdict))).collect()
 }
 
 /// What makes a result doubtful, or is worth knowing.

@@ -5,9 +5,10 @@ use hoid_model::{ContinuousTransferFunction, Decimation, Detrend, Fault, Verdict
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use serde_json::{Map, Value, json};
 
-use super::state;
+use super::{answers, state};
 use crate::{
     AnalysisError,
+    answers::Answers,
     estimators::PolynomialFit,
     identified::Identified,
     recordings::{Account, Recordings},
@@ -20,7 +21,7 @@ pub(super) const OPERATOR: &str = "operator";
 pub(super) const POLYNOMIAL: &str = "polynomial";
 
 /// A fit that writes itself.
-pub trait BatchAnswer: Serialize + DeserializeOwned {
+pub trait BatchAnswer: Answers + Serialize + DeserializeOwned {
     /// Its estimator in the registry.
     const ESTIMATOR: &'static str;
 
@@ -126,7 +127,11 @@ impl<F: BatchAnswer> Identified<F> {
         if let Some(written) = &self.written {
             return Ok(written.clone());
         }
-        Ok(self.with_state(F::object(self)?))
+        let mut map = F::object(self)?;
+        if let Some(Value::Object(verdict)) = map.get_mut("verdict") {
+            verdict.insert("of".to_owned(), Value::Object(answers(&self.answers())));
+        }
+        Ok(self.with_state(map))
     }
 
     /// An object of the contract of this result, with the state from which the result is made again.

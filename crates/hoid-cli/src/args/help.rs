@@ -60,6 +60,7 @@ const HELP: [Help; 17] = [
             "nk",
             "excitation",
             "controlled_element",
+            "answers",
             "figure",
             "report",
             "verbose",

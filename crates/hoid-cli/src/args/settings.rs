@@ -58,9 +58,12 @@ impl<R> SettingArgs<R> {
     }
 }
 
-/// The flag of an option.
+/// The flag of an option: its name, but for one that no language lets its keywords have.
 pub fn flag(name: &str) -> String {
-    name.replace('_', "-")
+    match name {
+        "answers" => "for".to_owned(),
+        name => name.replace('_', "-"),
+    }
 }
 
 /// Estimators and methods as help names them, groups by one word.

@@ -40,7 +40,9 @@ const MOST_FORMS: usize = 4;
 /// does not count. No form for no criterion.
 pub(super) fn weigh(criteria: &[Option<f64>]) -> Option<(usize, Vec<f64>)> {
     let least = criteria.iter().flatten().copied().min_by(f64::total_cmp)?;
-    let front = criteria.iter().position(|c| c.is_some_and(|c| c - least <= NO_EVIDENCE))?;
+    let front = criteria
+        .iter()
+        .position(|c| c.is_some_and(|c| c - least <= NO_EVIDENCE))?;
     let mut weights: Vec<f64> = (criteria.iter())
         .map(|c| c.map_or(0.0, |c| (0.5 * (least - c)).exp()))
         .collect();
@@ -66,7 +68,10 @@ mod tests {
         assert_eq!(front, 1);
         let of_second = 1.0 / (1.0 + (-0.75_f64).exp());
         let expected = [0.0, 1.0 - of_second, of_second, 0.0];
-        assert!(weights.iter().zip(expected).all(|(w, e)| (w - e).abs() < 1e-12), "{weights:?}");
+        assert!(
+            weights.iter().zip(expected).all(|(w, e)| (w - e).abs() < 1e-12),
+            "{weights:?}"
+        );
         assert_eq!(weigh(&[Some(4.0), Some(1.5), Some(1.0)]).unwrap().0, 1);
         assert_eq!(weigh(&[None, None]), None);
         assert_eq!(weigh(&[]), None);

@@ -4,15 +4,21 @@
 //! errors, all in units of one inflation kappa, so that a form does not look well by its own large
 //! variance. A form whose parameters the data leave open counts only where all are so.
 
-use hoid_model::{FamilyOperator, Form};
+use hoid_model::{FamilyOperator, Form, operator_family::Coordinate};
 
 use super::{
     choice::{FormFigures, weigh},
+    covariances::{self, Covariances},
     judgement::MOST_DAMPED,
     line_fit::LineFit,
     prediction_fit::PredictionFit,
 };
 use crate::IdentError;
+
+/// Difference of criteria of two forms that are one.
+const THE_SAME: f64 = 0.05;
+/// Standard errors from zero of a gain that is known.
+const LEAST_ERRORS: f64 = 2.0;
 
 /// A form with what was found of it.
 pub(super) struct Tried<'a> {
@@ -37,10 +43,12 @@ impl Comparison {
         let mut counting = criteria.clone();
         // A form that lacks a lag, where there is one, takes the neuromuscular poles for it.
         retain(&mut counting, |i| !has_lost_its_muscles(&tried[i]));
-        retain(&mut counting, |i| tried[i].fit.as_ref().is_ok_and(|fit| fit.ridge == 0.0));
+        retain(&mut counting, |i| tried[i].fit.as_ref().is_ok_and(|fit| !is_open(fit)));
+        count_once(&mut counting, tried);
         let (front, weights) = weigh(&counting).map_or((None, Vec::new()), |(front, weights)| (Some(front), weights));
         let figures = tried.iter().zip(criteria).enumerate();
-        let figures = figures.map(|(i, (t, criterion))| figures_of(t, criterion, weights.get(i).copied().unwrap_or(0.0)));
+        let figures =
+            figures.map(|(i, (t, criterion))| figures_of(t, criterion, weights.get(i).copied().unwrap_or(0.0)));
         Self {
             front,
             figures: figures.collect(),
@@ -48,12 +56,46 @@ impl Comparison {
     }
 }
 
+/// A lead with a droop is the quadratic numerator over s with real zeros: where both end at the same place they are
+/// one form with two names, and count once.
+fn count_once(counting: &mut [Option<f64>], tried: &[Tried<'_>]) {
+    let place = |form: Form| tried.iter().position(|t| t.form == form);
+    if let (Some(quadratic), Some(droop)) = (place(Form::QuadraticIntegral), place(Form::LeadDroop))
+        && let (Some(one), Some(two)) = (counting[quadratic], counting[droop])
+        && (one - two).abs() < THE_SAME
+    {
+        counting[quadratic] = None;
+    }
+}
+
 /// Leaves those that are good, where any of those that count is.
 fn retain(counting: &mut [Option<f64>], is_good: impl Fn(usize) -> bool) {
-    let good: Vec<bool> = (0..counting.len()).map(|i| counting[i].is_some() && is_good(i)).collect();
+    let good: Vec<bool> = (0..counting.len())
+        .map(|i| counting[i].is_some() && is_good(i))
+        .collect();
     if good.contains(&true) {
-        counting.iter_mut().zip(good).filter(|(_, good)| !good).for_each(|(c, _)| *c = None);
+        counting
+            .iter_mut()
+            .zip(good)
+            .filter(|(_, good)| !good)
+            .for_each(|(c, _)| *c = None);
     }
+}
+
+/// True where a combination of parameters is open, or the gain is not told from zero: the other parameters of the
+/// form are then shares of nothing, and a form with fewer of them says the same.
+fn is_open(fit: &PredictionFit<'_>) -> bool {
+    let p = fit.parameters();
+    let known = |covariances: Covariances| {
+        let mut gains = fit
+            .layout()
+            .elements
+            .iter()
+            .enumerate()
+            .filter(|(_, (c, _))| *c == Coordinate::Gain);
+        gains.all(|(at, _)| LEAST_ERRORS * covariances.clustered[at * p + at].sqrt() < fit.eta()[at].abs())
+    };
+    fit.ridge > 0.0 || !covariances::covariances(fit).is_some_and(known)
 }
 
 /// True where the neuromuscular poles have become two lags, by prediction error or at the lines.

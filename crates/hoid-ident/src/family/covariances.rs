@@ -80,7 +80,6 @@ impl Covariances {
             }
         }
     }
-
 }
 
 /// What the operator's elements off their bounds differ by from another estimate.

@@ -1,8 +1,6 @@
 //! The operator of a record with its errors, out of eta and what is known of it.
 
-use hoid_model::{
-    FamilyOperator, NotConvertible, PolynomialModel, Structure, operator_family::Coordinate,
-};
+use hoid_model::{FamilyOperator, NotConvertible, PolynomialModel, Structure, operator_family::Coordinate};
 
 use super::{
     clusters::{ClusterKind, quantile},

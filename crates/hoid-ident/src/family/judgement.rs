@@ -6,7 +6,10 @@
 use hoid_model::Finding;
 
 use super::{
-    agreement::Agreement, clusters::ClusterKind, instrumental::InstrumentalFit, line_fit::LineFit,
+    agreement::Agreement,
+    clusters::ClusterKind,
+    instrumental::InstrumentalFit,
+    line_fit::LineFit,
     parameter::Parameter,
     result::{FreeModel, WeighedForm},
 };

@@ -111,8 +111,16 @@ fn interval(components: &[Component], total: f64, clusters: usize) -> Option<(f6
         }
         0.5 * (low + high)
     };
-    let low = if share(least - reach) > TAIL { f64::NEG_INFINITY } else { place(TAIL) };
-    let high = if share(most + reach) < 1.0 - TAIL { f64::INFINITY } else { place(1.0 - TAIL) };
+    let low = if share(least - reach) > TAIL {
+        f64::NEG_INFINITY
+    } else {
+        place(TAIL)
+    };
+    let high = if share(most + reach) < 1.0 - TAIL {
+        f64::INFINITY
+    } else {
+        place(1.0 - TAIL)
+    };
     Some((low, high))
 }
 
@@ -155,7 +163,10 @@ mod tests {
         let normal = statrs::distribution::Normal::new(0.0, 1.0).unwrap();
         let share = |x: f64| 0.75 * normal.cdf((x - 1.0) / 0.1) + 0.25 * normal.cdf((x - 1.4) / 0.2);
         let (low, high) = found.interval.unwrap();
-        assert!((share(low) - 0.025).abs() < 1e-5 && (share(high) - 0.975).abs() < 1e-5, "{low} {high}");
+        assert!(
+            (share(low) - 0.025).abs() < 1e-5 && (share(high) - 0.975).abs() < 1e-5,
+            "{low} {high}"
+        );
     }
 
     #[test]

@@ -138,7 +138,11 @@ impl Known<'_> {
             let made = self.parameter(named);
             // All gains, and products with one, are proportional to it.
             let scales = matches!(named.coordinate, None | Some(Coordinate::Gain));
-            let share = if scales { self.run_to_run * made.value.abs() } else { 0.0 };
+            let share = if scales {
+                self.run_to_run * made.value.abs()
+            } else {
+                0.0
+            };
             Parameter {
                 standard_error_person: made.standard_error.map(|own| own.hypot(share)),
                 ..made
@@ -389,7 +393,11 @@ mod tests {
         far.interval = far.interval.map(|(low, high)| (low + 0.04, high + 0.04));
         let tau = of(&near, "tau_e");
         let averaged = |weights: [f64; 2]| {
-            Parameter::averaged(&[(Form::LeadLag, weights[0], tau), (Form::Lead2, weights[1], &far)], 1000).unwrap()
+            Parameter::averaged(
+                &[(Form::LeadLag, weights[0], tau), (Form::Lead2, weights[1], &far)],
+                1000,
+            )
+            .unwrap()
         };
         let both = averaged([0.75, 0.25]);
         assert!((both.value - 0.16).abs() < 1e-12 && both.determined);

@@ -217,7 +217,9 @@ impl FamilyFit {
         let operator = &self.operator(record).operator;
         let open_loop = |omega: f64| operator.response(omega) * hold(omega, self.sample_time) * element.response(omega);
         let crossing = self.loop_measures_in_front(record, element).map(|found| {
-            let reach = found.phase_margin_interval.map_or(0.0, |(low, high)| 0.5 * (high - low));
+            let reach = found
+                .phase_margin_interval
+                .map_or(0.0, |(low, high)| 0.5 * (high - low));
             (found.crossover_rad_s.value, reach)
         });
         loop_doubt(open_loop, crossing)

@@ -237,7 +237,12 @@ mod tests {
     use super::*;
 
     fn record(e: Vec<f64>, u: Vec<f64>) -> Record {
-        Record::new(SampleTime::HUNDREDTH, Channel::new("e", "", e), Channel::new("u", "", u)).unwrap()
+        Record::new(
+            SampleTime::HUNDREDTH,
+            Channel::new("e", "", e),
+            Channel::new("u", "", u),
+        )
+        .unwrap()
     }
 
     /// Noise of these poles.
@@ -262,10 +267,7 @@ mod tests {
         let mut small = 0;
         for seed in 0..400 {
             let slow = [0.99, [0.999, 0.9, 0.5, 0.98][seed as usize % 4]];
-            let (e, u) = (
-                noise(2 * seed, slow, 4000),
-                noise(2 * seed + 1, [0.95, slow[1]], 4000),
-            );
+            let (e, u) = (noise(2 * seed, slow, 4000), noise(2 * seed + 1, [0.95, slow[1]], 4000));
             let found = response(&[record(e, u)]).unwrap();
             small += usize::from(found.p_value() < 0.05);
         }
@@ -296,7 +298,10 @@ mod tests {
     #[test]
     fn too_little_says_nothing() {
         assert_eq!(response(&[record(vec![0.0; 4000], noise(1, [0.9, 0.9], 4000))]), None);
-        assert_eq!(response(&[record(noise(1, [0.9, 0.9], 60), noise(2, [0.9, 0.9], 60))]), None);
+        assert_eq!(
+            response(&[record(noise(1, [0.9, 0.9], 60), noise(2, [0.9, 0.9], 60))]),
+            None
+        );
         assert_eq!(response(&[]), None);
     }
 }

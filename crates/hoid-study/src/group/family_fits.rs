@@ -33,6 +33,7 @@ pub(super) fn identification(
         faults: manifest.read.faults.handling(),
         rate: manifest.by_rate(condition)?,
         controlled_element: rows.element().cloned(),
+        answers: Vec::new(),
     })
 }
 

@@ -150,7 +150,11 @@ impl Found<'_> {
             all.extend(crossover.map(|s| error("crossover", m.crossover_rad_s, s)));
             all.extend(margin.map(|s| error("phase margin", m.phase_margin_deg, s)));
         }
-        let runs = if self.records.len() == 1 { "this run" } else { "these runs" };
+        let runs = if self.records.len() == 1 {
+            "this run"
+        } else {
+            "these runs"
+        };
         match all.as_slice() {
             [] => String::new(),
             all => format!(
@@ -372,14 +376,27 @@ fn measures(found: Option<&LoopMeasures>) -> String {
 }
 
 fn forms(all: &[FormFigures], chosen: &str) -> String {
-    let mut rows = text::table(&["form", "weight", "loss", "criterion", "held out", "chi^2", "degrees", ""]);
+    let mut rows = text::table(&[
+        "form",
+        "weight",
+        "loss",
+        "criterion",
+        "held out",
+        "chi^2",
+        "degrees",
+        "",
+    ]);
     let least = all.iter().filter_map(|f| f.criterion).fold(f64::INFINITY, f64::min);
     for f in all {
         let number = |v: Option<f64>| v.map_or(String::new(), |v| format!("{v:.1}"));
         let sign = if f.form.name() == chosen { "in front" } else { "" };
         rows.add_row([
             f.form.to_string(),
-            if f.weight > 0.0 { format!("{:.2}", f.weight) } else { String::new() },
+            if f.weight > 0.0 {
+                format!("{:.2}", f.weight)
+            } else {
+                String::new()
+            },
             f.loss.map_or("none".to_owned(), numbers::plain),
             f.criterion.map_or(String::new(), |c| format!("+{:.1}", c - least)),
             number(f.held_out),

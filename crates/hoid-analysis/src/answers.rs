@@ -1,0 +1,226 @@
+//! What each answer of a result is worth: the response, crossover and phase margin, each parameter.
+//!
+//! What speaks against the data or against the fit speaks against all answers. Beside it an answer can be open by
+//! itself: a parameter that the data do not determine, a crossover whose interval holds zero. The level of the
+//! whole is that of the answers that were asked for, by default the response and the loop: a result whose delay is
+//! open is trustworthy in what it says of the crossover, and not determined for who asks for the delay.
+
+use hoid_ident::{Fit, GreyBoxFit, SigmoidFit, family::FamilyFit, judgement::is_open};
+use hoid_model::{ContinuousTransferFunction, Finding, Verdict, operator_family::PARAMETERS, uncertainty::Estimate};
+
+use crate::{AnalysisError, estimators::PolynomialFit};
+
+/// The response of the person.
+pub const RESPONSE: &str = "response";
+/// Crossover frequency and phase margin of the loop.
+pub const LOOP: [&str; 2] = ["crossover", "phase_margin"];
+/// Kind of what makes an answer open by itself.
+const OPEN: &str = "open-answer";
+/// Errors of the crossover, as a part of it, and of the margin in deg, beyond which they are open.
+const LARGEST_ERRORS: [f64; 2] = [0.5, 30.0];
+
+/// An answer, and what makes it open by itself.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Answered {
+    /// `response`, `crossover`, `phase_margin`, or the name of a parameter.
+    pub name: String,
+    /// Why the data do not determine it, where they do not.
+    pub open: Option<Finding>,
+}
+
+/// A fit that tells what is known of each of its answers.
+pub trait Answers {
+    /// All of them, with this controlled element.
+    fn answers(&self, element: Option<&ContinuousTransferFunction>) -> Vec<Answered>;
+}
+
+/// The names of answers that are asked for.
+///
+/// # Errors
+/// [`AnalysisError::Options`] for a name of none.
+pub fn asked_for(names: &[String]) -> Result<Vec<String>, AnalysisError> {
+    let known = || {
+        let parameters = PARAMETERS.iter().map(|(name, _)| *name);
+        [RESPONSE].into_iter().chain(LOOP).chain(parameters)
+    };
+    let one = |name: &String| {
+        let name = match name.trim() {
+            "margin" => LOOP[1],
+            "delay" => "tau_e",
+            other => other,
+        };
+        known().find(|known| *known == name).map(str::to_owned).ok_or_else(|| {
+            let expected = known().collect::<Vec<_>>().join(", ");
+            AnalysisError::Options {
+                reason: format!("for: there is no answer {name:?}, expected one of {expected}"),
+            }
+        })
+    };
+    names.iter().map(one).collect()
+}
+
+/// The verdict on what was asked for, from what is known of the fit and what its answers say; by default of the
+/// response and the loop.
+pub fn judged(verdict: Verdict, answers: &[Answered], asked: &[String]) -> Verdict {
+    let default = || [RESPONSE].into_iter().chain(LOOP).map(str::to_owned);
+    let wanted: Vec<String> = if asked.is_empty() {
+        default().collect()
+    } else {
+        asked.to_vec()
+    };
+    let open = wanted
+        .iter()
+        .filter_map(|name| match answers.iter().find(|a| a.name == *name) {
+            Some(answer) => answer.open.clone(),
+            None if asked.is_empty() => None,
+            None => Some(open(format!("{name} is not one of the answers of this result"))),
+        });
+    let open: Vec<Finding> = open.collect();
+    verdict.and(open)
+}
+
+/// The verdict on one answer: what is known of the fit as a whole, and what makes this one open.
+pub fn of_answer(verdict: &Verdict, answer: &Answered) -> Verdict {
+    let whole = verdict.findings().iter().filter(|finding| finding.kind != OPEN);
+    Verdict::of(whole.chain(&answer.open).cloned().collect())
+}
+
+fn open(words: String) -> Finding {
+    Finding::undetermined(OPEN, words)
+}
+
+fn answered(name: &str, why: Option<String>) -> Answered {
+    Answered {
+        name: name.to_owned(),
+        open: why.map(open),
+    }
+}
+
+/// Crossover and margin, `None` for those that the loop does not have, with their intervals.
+fn of_loop(measures: [Option<(Estimate, Option<(f64, f64)>)>; 2]) -> impl Iterator<Item = Answered> {
+    let words = ["the crossover", "the phase margin"];
+    (0..2).map(move |k| {
+        let why = match measures[k] {
+            None => Some(format!(
+                "{} is open: the gain of the loop does not fall through one",
+                words[k]
+            )),
+            Some((value, interval)) => {
+                let scale = if k == 0 { value.value } else { 1.0 };
+                let wide = value.standard_error.is_none_or(|s| s > LARGEST_ERRORS[k] * scale);
+                let zero = k == 0 && interval.is_some_and(|(low, _)| low <= 0.0);
+                (wide || zero).then(|| match interval {
+                    Some((low, high)) => format!("{} is not determined: 95 % from {low:.2} to {high:.2}", words[k]),
+                    None => format!("{} is not determined: it has no error bar", words[k]),
+                })
+            }
+        };
+        answered(LOOP[k], why)
+    })
+}
+
+impl Answers for FamilyFit {
+    fn answers(&self, element: Option<&ContinuousTransferFunction>) -> Vec<Answered> {
+        let mut all = vec![answered(RESPONSE, None)];
+        if let Some(element) = element {
+            let found = self.loop_measures(0, element);
+            all.extend(of_loop([
+                found.map(|m| (m.crossover_rad_s, m.crossover_interval)),
+                found.map(|m| (m.phase_margin_deg, m.phase_margin_interval)),
+            ]));
+        }
+        all.extend(self.operator(0).parameters.iter().map(|p| {
+            let why = match (p.determined, p.prior_share > 0.5) {
+                (true, _) => None,
+                (false, true) => Some(format!("{} is determined by the prior alone", p.name)),
+                (false, false) => Some(format!("{} is not determined by the data", p.name)),
+            };
+            answered(&p.name, why)
+        }));
+        all
+    }
+}
+
+impl Answers for PolynomialFit {
+    fn answers(&self, _element: Option<&ContinuousTransferFunction>) -> Vec<Answered> {
+        of_operator(&self.fit)
+    }
+}
+
+impl Answers for GreyBoxFit {
+    fn answers(&self, _element: Option<&ContinuousTransferFunction>) -> Vec<Answered> {
+        of_operator(self.polynomial_fit(0))
+    }
+}
+
+impl Answers for SigmoidFit {
+    fn answers(&self, _element: Option<&ContinuousTransferFunction>) -> Vec<Answered> {
+        vec![answered(RESPONSE, None)]
+    }
+}
+
+fn of_operator(fit: &Fit) -> Vec<Answered> {
+    let mut all = vec![answered(RESPONSE, None)];
+    if let Ok(operator) = fit.operator() {
+        all.extend(operator.rows().iter().map(|(name, _, estimate)| {
+            let why = is_open(estimate).then(|| format!("{name} ({estimate}) is not told from zero"));
+            answered(name, why)
+        }));
+    }
+    all
+}
+
+#[cfg(test)]
+mod tests {
+    use hoid_model::VerdictLevel;
+
+    use super::*;
+
+    #[test]
+    fn the_level_is_that_of_what_was_asked() {
+        let answers = [
+            answered(RESPONSE, None),
+            answered("tau_e", Some("tau_e is not determined by the data".to_owned())),
+        ];
+        let level = |asked: &[&str]| {
+            let asked: Vec<String> = asked.iter().map(|name| (*name).to_owned()).collect();
+            judged(Verdict::of(Vec::new()), &answers, &asked).level
+        };
+        assert_eq!(level(&[]), VerdictLevel::Trustworthy);
+        assert_eq!(level(&["response"]), VerdictLevel::Trustworthy);
+        assert_eq!(level(&["response", "tau_e"]), VerdictLevel::NotDetermined);
+        assert_eq!(level(&["T_I"]), VerdictLevel::NotDetermined);
+        // What speaks against the whole speaks against each, and an answer that is open against itself alone.
+        let whole = Verdict::of(vec![Finding::doubt("leverage", "few samples")]);
+        let asked = judged(whole, &answers, &["tau_e".to_owned()]);
+        assert_eq!(of_answer(&asked, &answers[0]).level, VerdictLevel::Doubtful);
+        assert_eq!(of_answer(&asked, &answers[1]).level, VerdictLevel::NotDetermined);
+    }
+
+    #[test]
+    fn a_crossover_whose_interval_holds_zero_is_open() {
+        let of = |value: f64, s: f64| {
+            let one = Estimate::with_variance(value, s * s);
+            let interval = Some((value - 2.0 * s, value + 2.0 * s));
+            let all: Vec<Answered> = of_loop([Some((one, interval)), None]).collect();
+            (all[0].open.is_some(), all[1].open.is_some())
+        };
+        assert_eq!(of(3.0, 0.1), (false, true));
+        assert_eq!(of(1.2, 1.5), (true, true));
+    }
+
+    #[test]
+    fn names_that_are_asked_for() {
+        let names = |text: &str| asked_for(&text.split(',').map(str::to_owned).collect::<Vec<_>>());
+        assert_eq!(
+            names("crossover, delay,margin").unwrap(),
+            ["crossover", "tau_e", "phase_margin"]
+        );
+        assert!(
+            names("speed")
+                .unwrap_err()
+                .to_string()
+                .contains("expected one of response, crossover")
+        );
+    }
+}
