@@ -2,13 +2,14 @@
 //!
 //! What speaks against the data or against the fit speaks against all answers. Beside it an answer can be open by
 //! itself: a parameter that the data do not determine, a crossover whose interval holds zero. The level of the
-//! whole is that of the answers that were asked for, by default the response and the loop: a result whose delay is
-//! open is trustworthy in what it says of the crossover, and not determined for who asks for the delay.
+//! whole is that of the answers that were asked for: a result whose delay is open is trustworthy in what it says of
+//! the crossover, and not determined for who asks for the delay. By default it is that of the response, and a loop that is
+//! open is a doubt.
 
 use hoid_ident::{Fit, GreyBoxFit, SigmoidFit, family::FamilyFit, judgement::is_open};
 use hoid_model::{ContinuousTransferFunction, Finding, Verdict, operator_family::PARAMETERS, uncertainty::Estimate};
 
-use crate::{AnalysisError, estimators::PolynomialFit};
+use crate::AnalysisError;
 
 /// The response of the person.
 pub const RESPONSE: &str = "response";
@@ -60,7 +61,7 @@ pub fn asked_for(names: &[String]) -> Result<Vec<String>, AnalysisError> {
 }
 
 /// The verdict on what was asked for, from what is known of the fit and what its answers say; by default of the
-/// response and the loop.
+/// response, with doubts of the loop.
 pub fn judged(verdict: Verdict, answers: &[Answered], asked: &[String]) -> Verdict {
     let default = || [RESPONSE].into_iter().chain(LOOP).map(str::to_owned);
     let wanted: Vec<String> = if asked.is_empty() {
@@ -141,12 +142,6 @@ impl Answers for FamilyFit {
     }
 }
 
-impl Answers for PolynomialFit {
-    fn answers(&self, _element: Option<&ContinuousTransferFunction>) -> Vec<Answered> {
-        of_operator(&self.fit)
-    }
-}
-
 impl Answers for GreyBoxFit {
     fn answers(&self, _element: Option<&ContinuousTransferFunction>) -> Vec<Answered> {
         of_operator(self.polynomial_fit(0))
@@ -159,7 +154,8 @@ impl Answers for SigmoidFit {
     }
 }
 
-fn of_operator(fit: &Fit) -> Vec<Answered> {
+/// Of polynomials: the response, and the operator that they stand for.
+pub(crate) fn of_operator(fit: &Fit) -> Vec<Answered> {
     let mut all = vec![answered(RESPONSE, None)];
     if let Ok(operator) = fit.operator() {
         all.extend(operator.rows().iter().map(|(name, _, estimate)| {

@@ -12,7 +12,9 @@ use hoid_ident::frequency::{Description, DescriptionOptions, describe_runs};
 use hoid_io::{Offset, Step};
 use hoid_model::{Decimation, FaultHandling};
 
-use crate::{AnalysisError, offset::late_samples, reading::Reading, recordings::Recordings, settings::Setting};
+use crate::{
+    AnalysisError, offset::late_samples, quality::Of, reading::Reading, recordings::Recordings, settings::Setting,
+};
 
 /// How recordings are described.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -44,7 +46,7 @@ impl Describing {
     /// # Errors
     /// [`AnalysisError`] where there is no result: no lines, no whole period, no such channel.
     pub fn run(&self, recordings: Recordings) -> Result<Described, AnalysisError> {
-        let read = recordings.repaired(self.faults)?;
+        let read = recordings.repaired(self.faults, Of::Person)?;
         let first = read.records.first().ok_or(AnalysisError::NoRecordings)?;
         let late = self.options.offset_samples + late_samples(first, &self.offsets)?;
         let late_s = late * first.sample_time().s();

@@ -11,6 +11,7 @@ use crate::{
     answers::{self, Answered, Answers, of_answer},
     estimators::{BatchEstimator, Fitted},
     identification::Identification,
+    quality::Of,
     reading::Reading,
     recordings::Recordings,
     settings::Setting,
@@ -68,7 +69,9 @@ impl<E: BatchEstimator> Identification<E> {
             return Err(AnalysisError::NoRecordings);
         }
         let counts_samples = self.estimator.counts_samples();
-        let mut data = recordings.repaired(self.faults)?.at_rate(self.rate, counts_samples)?;
+        let mut data = recordings
+            .repaired(self.faults, E::OF)?
+            .at_rate(self.rate, counts_samples)?;
         let Fitted {
             mut fit,
             verdict,
@@ -78,7 +81,7 @@ impl<E: BatchEstimator> Identification<E> {
             found,
         } = E::fit(self, &mut data)?;
         let verdict = data.judged(verdict);
-        let response = E::OF_PERSON.then(|| response(&data.records)).flatten();
+        let response = (E::OF == Of::Person).then(|| response(&data.records)).flatten();
         let verdict = verdict.behind(response.and_then(|found| found.finding()));
         let verdict = answers::judged(verdict, &fit.answers(self.controlled_element.as_ref()), &self.answers);
         E::judged(&mut fit, &verdict);

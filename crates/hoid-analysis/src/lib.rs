@@ -72,7 +72,7 @@ pub use look::{Advice, Known, Lag, Look, OtherColumns, Periods, Role, Roles, See
 pub use offset::{late_samples, without_offsets};
 pub use options::Options;
 pub use prior::prior_of_text;
-pub use quality::{findings_of_channels, findings_of_quality};
+pub use quality::{Of, findings_of_channels, findings_of_quality};
 pub use rate::kept_rate;
 pub use reading::Reading;
 pub use recordings::{Account, Recordings};

@@ -20,17 +20,26 @@ const COARSE: [f64; 2] = [0.05, 0.15];
 /// Longest gap that may be bridged by a straight line, s.
 const BRIDGED_S: f64 = 0.25;
 
+/// Whose record is judged.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Of {
+    /// A person, who answers what they see.
+    Person,
+    /// Any system: what is put into it may have two levels.
+    System,
+}
+
 /// What the channels of a record that was not read from a file say of any result.
 pub fn findings_of_channels(record: &Record) -> Vec<Finding> {
     let account = Account {
         quality_issues: quality_of_record(record),
         ..Account::default()
     };
-    findings_of_quality(&account, record)
+    findings_of_quality(&account, record, Of::Person)
 }
 
 /// What the quality of the channels says of any result.
-pub fn findings_of_quality(account: &Account, record: &Record) -> Vec<Finding> {
+pub fn findings_of_quality(account: &Account, record: &Record, of: Of) -> Vec<Finding> {
     let mut all = Vec::new();
     let issues = |kind: QualityIssueKind| account.quality_issues.iter().filter(move |issue| issue.kind == kind);
     let output = record.output_channel().name.as_str();
@@ -50,6 +59,9 @@ pub fn findings_of_quality(account: &Account, record: &Record) -> Vec<Finding> {
     }
     let input = record.input_channel().map_or("", |channel| channel.name.as_str());
     for (channel, values, least) in [(input, record.input(), COARSE[0]), (output, record.output(), COARSE[1])] {
+        if of == Of::System && channel == input {
+            continue;
+        }
         let deviation = deviation(values);
         let coarse = issues(QualityIssueKind::Quantised).find(|issue| issue.channel == channel);
         if let Some(issue) = coarse.filter(|issue| issue.size > least * deviation) {

@@ -1,12 +1,12 @@
 //! Faults of recordings, looked for and mended before anything else is done with them.
 
-use hoid_ident::faults::mend;
+use hoid_ident::faults::{SLOWEST_S, mend};
 use hoid_model::{FaultHandling, ModelError, Record};
 
 use crate::{
     AnalysisError,
     copies::refuse_copies,
-    quality::findings_of_quality,
+    quality::{Of, findings_of_quality},
     recordings::{Account, Recordings},
 };
 
@@ -16,7 +16,7 @@ impl Recordings {
     ///
     /// # Errors
     /// [`AnalysisError::SameSamples`] for runs that are given twice.
-    pub fn repaired(self, handling: FaultHandling) -> Result<Self, AnalysisError> {
+    pub fn repaired(self, handling: FaultHandling, of: Of) -> Result<Self, AnalysisError> {
         refuse_copies(&self)?;
         let mut all = Self {
             source: self.source,
@@ -24,10 +24,14 @@ impl Recordings {
         };
         let one = self.names.into_iter().zip(self.records).zip(self.accounts);
         for (((name, record), account), origin) in one.zip(self.origins) {
-            let found = mend(&record, handling)?;
+            let found = match of {
+                // Rules in seconds of a person's sampling do not judge a furnace.
+                Of::System if record.sample_time().s() > SLOWEST_S => mend(&record, FaultHandling::Keep)?,
+                _ => mend(&record, handling)?,
+            };
             let whole = found.segments.len() == 1 && found.segments[0].len() == record.len();
             let mut findings = found.findings;
-            findings.extend(findings_of_quality(&account, &record));
+            findings.extend(findings_of_quality(&account, &record, of));
             let mut account = Account {
                 faults: found.faults,
                 findings,

@@ -139,12 +139,9 @@ fn a_virtual_experiment_is_analysed_and_reported() {
                 measure["standard_error"].as_f64().unwrap(),
             );
             let end = |i: usize| measure["interval"][i].as_f64().unwrap();
-            // Student's quantile of few runs is wider than the normal one.
-            assert!(
-                error > 0.0 && (end(0) + end(1) - 2.0 * value).abs() < 1e-9 * value.abs(),
-                "{measure}"
-            );
-            assert!(end(1) - value > 1.96 * error, "{measure}");
+            // Of a mixture over forms, so that it need not be symmetric.
+            assert!(error > 0.0 && end(0) < value && value < end(1), "{measure}");
+            assert!(end(1) - end(0) > 2.0 * 1.96 * error, "{measure}");
         }
         assert!(person["verdict"]["level"].is_string());
     }

@@ -22,15 +22,16 @@ pub use polynomials::{PolynomialFit, Polynomials};
 pub(crate) use remnant::ORDERS as REMNANT_ORDERS;
 
 use crate::{
-    AnalysisError, answers::Answers, identification::Identification, recordings::Recordings, settings::Setting,
+    AnalysisError, answers::Answers, identification::Identification, quality::Of, recordings::Recordings,
+    settings::Setting,
 };
 
 /// A batch estimator as [`Identification`] runs it.
 pub trait BatchEstimator: Sized {
     /// Its result.
     type Fit: Answers;
-    /// Whether it is of a person who answers an error within a second: then a record without a response is told.
-    const OF_PERSON: bool = true;
+    /// Whose records it judges: of a person, who answers an error within a second, one without a response is told.
+    const OF: Of = Of::Person;
 
     /// Whether orders and delay are numbers of samples, so that a high rate is kept.
     fn counts_samples(&self) -> bool {

@@ -10,10 +10,18 @@ use hoid_ident::{
     order_selection::{Criterion, OrderRanges, default_operator_ranges, fit_or_choose},
     progress,
 };
-use hoid_model::{FaultHandling, Orders, SampleTime, Structure, theta_of};
+use hoid_model::{ContinuousTransferFunction, FaultHandling, Orders, SampleTime, Structure, theta_of};
 
 use super::{BatchEstimator, Fitted, constraints, named};
-use crate::{AnalysisError, identification::Identification, level::Level, recordings::Recordings, settings::Setting};
+use crate::{
+    AnalysisError,
+    answers::{Answered, Answers, of_operator},
+    identification::Identification,
+    level::Level,
+    quality::Of,
+    recordings::Recordings,
+    settings::Setting,
+};
 
 /// A polynomial structure and how it is fitted.
 #[derive(Debug, Clone, PartialEq)]
@@ -41,6 +49,12 @@ pub struct PolynomialFit {
     pub fit: Fit,
     /// The candidates.
     pub choice: Option<Choice>,
+}
+
+impl Answers for PolynomialFit {
+    fn answers(&self, _element: Option<&ContinuousTransferFunction>) -> Vec<Answered> {
+        of_operator(&self.fit)
+    }
 }
 
 impl Polynomials {
@@ -110,8 +124,7 @@ impl Polynomials {
 
 impl BatchEstimator for Polynomials {
     type Fit = PolynomialFit;
-    /// Of any system.
-    const OF_PERSON: bool = false;
+    const OF: Of = Of::System;
 
     fn counts_samples(&self) -> bool {
         true

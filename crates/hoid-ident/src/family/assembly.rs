@@ -5,7 +5,7 @@
 //! difference become a part of the errors of the operator (`Covariances::add_bias`).
 
 use hoid_model::{
-    Complex64, FamilyOperator, Finding, Record, Verdict, operator_family::Coordinate, uncertainty::variance_along,
+    Complex64, FamilyOperator, Finding, Form, Record, Verdict, operator_family::Coordinate, uncertainty::variance_along,
 };
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
@@ -15,11 +15,11 @@ use super::{
     covariances::BAND_RAD_S,
     estimated::{Errors, Estimated, in_form, operator_of},
     instrumental::{Instrumental, InstrumentalFit},
-    judgement::{Judged, findings},
+    judgement::{Judged, LARGEST_RESPONSE_ERROR, findings},
     line_fit::LineFit,
     prediction::Prediction,
     prediction_fit::PredictionFit,
-    result::{FamilyFit, FreeModel, OperatorOfRecord, WeighedForm},
+    result::{FamilyFit, FreeModel, OperatorInForm, WeighedForm},
     sensitivity::{LARGEST_SHARE_AT_LINES, MORE_WITHOUT_LINES, UNSEEN_WITHOUT_LINES, rivals},
 };
 use crate::{
@@ -101,8 +101,12 @@ impl Chosen<'_, '_> {
         add_bias(&mut errors, fit, self.lines.fit.as_ref(), separate, &others);
         let mut weighed = vec![in_form(fit, &errors, self.weight, separate)?];
         for other in &self.beside {
-            weighed.push(self.weighed(other, separate, workspace)?);
+            let form = self.weighed(other, separate, workspace)?;
+            if form.operators.first().is_some_and(knows_the_response) {
+                weighed.push(form);
+            }
         }
+        let forms = self.with_weights_of(&mut weighed);
         let mut operators = Vec::with_capacity(separate);
         for record in 0..separate {
             operators.push(operator_of(fit, &errors, &weighed, record)?);
@@ -128,7 +132,8 @@ impl Chosen<'_, '_> {
             cluster_kind: fit.clusters.kind,
             clusters: fit.clusters.parts.len(),
             has_covariance: errors.covariances.is_some(),
-            response_error: response_error(&operators[0]),
+            response_error: response_errors(&operators[0].operator, operators[0].covariance.as_deref())
+                .and_then(|errors| errors.into_iter().min_by(f64::total_cmp)),
             weighed: &weighed,
         }));
         let noise = &fit.eta()[layout.operator_elements()..];
@@ -139,7 +144,7 @@ impl Chosen<'_, '_> {
             noise: (noise[..layout.nc].to_vec(), noise[layout.nc..].to_vec()),
             operators,
             prior: self.prediction.prior.clone(),
-            forms: self.forms,
+            forms,
             weighed,
             run_to_run: errors.run_to_run,
             coherent_share: self.lines.describing.and_then(coherent_share),
@@ -176,6 +181,23 @@ impl Chosen<'_, '_> {
         };
         let found = Instrumental::new(self.prediction, &self.fit, self.records, channel);
         Some(found.and_then(|method| method.fit(&auxiliary, workspace)))
+    }
+
+    /// Scales the weights of what is left to one; the figures of all forms, with these weights.
+    fn with_weights_of(&self, weighed: &mut [WeighedForm]) -> Vec<FormFigures> {
+        let total: f64 = weighed.iter().map(|form| form.weight).sum();
+        weighed.iter_mut().for_each(|form| form.weight /= total);
+        let weight = |of: Form| {
+            weighed
+                .iter()
+                .find(|form| form.form == of)
+                .map_or(0.0, |form| form.weight)
+        };
+        let figures = self.forms.iter().map(|figures| FormFigures {
+            weight: weight(figures.form),
+            ..figures.clone()
+        });
+        figures.collect()
     }
 
     /// Another form with its errors, made as those of the form in front.
@@ -376,16 +398,22 @@ fn coherent_share(describing: &DescribingFunction) -> Option<f64> {
     Some(all.iter().sum::<f64>() / all.len() as f64)
 }
 
-/// Smallest relative standard error of the response over the band of manual control.
-fn response_error(of: &OperatorOfRecord) -> Option<f64> {
-    let covariance = of.covariance.as_deref()?;
-    let error = |omega: f64| {
-        let response = of.operator.response_and_gradient(omega);
+/// Whether a form beside the one in front knows the response: one whose parameters make up for each other, the data
+/// leave as open as if they were fewer, and their errors say nothing.
+fn knows_the_response(of: &OperatorInForm) -> bool {
+    let errors = response_errors(&of.operator, of.covariance.as_deref());
+    errors.is_some_and(|all| all.iter().sum::<f64>() < LARGEST_RESPONSE_ERROR * all.len() as f64)
+}
+
+/// Relative standard errors of the response over the band of manual control.
+fn response_errors(operator: &FamilyOperator, covariance: Option<&[f64]>) -> Option<[f64; BAND_RAD_S.len()]> {
+    let covariance = covariance?;
+    Some(BAND_RAD_S.map(|omega| {
+        let response = operator.response_and_gradient(omega);
         let along = |part: fn(Complex64) -> f64| -> f64 {
             let gradient: Vec<f64> = response.gradient.iter().map(|g| part(g / response.value)).collect();
             variance_along(&gradient, covariance)
         };
         (along(|z| z.re) + along(|z| z.im)).sqrt()
-    };
-    BAND_RAD_S.iter().map(|omega| error(*omega)).min_by(f64::total_cmp)
+    }))
 }

@@ -22,7 +22,7 @@ const LEVEL: f64 = 0.01;
 /// Loss above that of a free model beyond which a refuted form is said to be so.
 const LARGEST_EXCESS_LOSS: f64 = 0.01;
 /// Relative error of the response, at its best, beyond which nothing is known of the person.
-const LARGEST_RESPONSE_ERROR: f64 = 0.5;
+pub(super) const LARGEST_RESPONSE_ERROR: f64 = 0.5;
 /// Damping ratio above which the two neuromuscular poles are lags of their own, far apart: no muscle
 /// is so damped.
 pub(super) const MOST_DAMPED: f64 = 1.5;

@@ -124,6 +124,24 @@ fn interval(components: &[Component], total: f64, clusters: usize) -> Option<(f6
     Some((low, high))
 }
 
+/// With a standard error that is larger: the ends of the interval move out in its ratio to the old one.
+pub(super) fn widened(
+    of: Estimate,
+    interval: Option<(f64, f64)>,
+    error: Option<f64>,
+) -> (Estimate, Option<(f64, f64)>) {
+    let ratio = match (error, of.standard_error) {
+        (Some(wide), Some(own)) if own > 0.0 => (wide / own).max(1.0),
+        _ => 1.0,
+    };
+    let moved = |end: f64| of.value + ratio * (end - of.value);
+    let wide = Estimate {
+        standard_error: error.or(of.standard_error),
+        ..of
+    };
+    (wide, interval.map(|(low, high)| (moved(low), moved(high))))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -17,7 +17,7 @@ use hoid_model::{
 
 use super::{
     clusters::quantile,
-    mixture::{Component, Mixture},
+    mixture::{Component, Mixture, widened},
     response_fit::hold,
 };
 
@@ -135,24 +135,6 @@ impl LoopMeasures {
 fn reaching(of: Estimate, quantile: f64) -> Option<(f64, f64)> {
     let reach = quantile * of.standard_error?;
     Some((of.value - reach, of.value + reach))
-}
-
-/// With a standard error that is larger: the ends of the interval move out in its ratio to the old one.
-pub(super) fn widened(
-    of: Estimate,
-    interval: Option<(f64, f64)>,
-    error: Option<f64>,
-) -> (Estimate, Option<(f64, f64)>) {
-    let ratio = match (error, of.standard_error) {
-        (Some(wide), Some(own)) if own > 0.0 => (wide / own).max(1.0),
-        _ => 1.0,
-    };
-    let moved = |end: f64| of.value + ratio * (end - of.value);
-    let wide = Estimate {
-        standard_error: error.or(of.standard_error),
-        ..of
-    };
-    (wide, interval.map(|(low, high)| (moved(low), moved(high))))
 }
 
 /// Where the gain of an open loop falls through one.

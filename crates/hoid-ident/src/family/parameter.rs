@@ -16,10 +16,7 @@ use hoid_model::{
     uncertainty::Estimate,
 };
 
-use super::{
-    mixture::{Component, Mixture},
-    open_loop::widened,
-};
+use super::mixture::{Component, Mixture, widened};
 
 /// Weight of the forms that have a parameter, below which it is not determined.
 const LEAST_WEIGHT: f64 = 0.5;
@@ -75,8 +72,19 @@ impl Parameter {
     /// The mean over forms of what has this name in each, with their weights, the form in front first.
     pub(super) fn averaged(each: &[(Form, f64, &Self)], clusters: usize) -> Option<Self> {
         let (_, _, front) = *each.first()?;
+        // At a bound it has no error of its own, and no part in the mean of those that have.
+        let with_error: Vec<_> = each
+            .iter()
+            .filter(|(_, _, p)| p.standard_error.is_some())
+            .copied()
+            .collect();
+        let each = if with_error.is_empty() { each } else { &with_error };
         if each.len() == 1 {
-            return Some(front.clone());
+            let (_, weight, only) = each[0];
+            return Some(Self {
+                determined: only.determined && weight > LEAST_WEIGHT,
+                ..only.clone()
+            });
         }
         let total: f64 = each.iter().map(|(_, weight, _)| weight).sum();
         let component = |&(_, weight, p): &(Form, f64, &Self)| Component {

@@ -13,7 +13,7 @@ use super::{
 use crate::frequency::USUAL_EXCITATIONS;
 
 /// Sample time in s that no person is recorded with.
-const SLOWEST_S: f64 = 0.5;
+pub const SLOWEST_S: f64 = 0.5;
 
 /// A record without its faults, in one or more segments, and what was done.
 #[derive(Debug, Clone, PartialEq)]

@@ -44,6 +44,6 @@ mod test_signals;
 mod tests;
 
 pub use limits::{BRIDGED_S, MOST_SPIKES, SHORTEST_S};
-pub use mending::{Mended, mend};
+pub use mending::{Mended, SLOWEST_S, mend};
 pub use resistant::{held, resistant};
-pub use slow::without_slow;
+pub use slow::{PERIOD_S, without_slow};

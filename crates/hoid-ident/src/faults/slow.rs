@@ -13,14 +13,14 @@ use std::f64::consts::PI;
 
 use hoid_model::{Detrend, Record};
 
-/// What is slower than this is taken out, s.
-const PERIOD_S: f64 = 20.0;
+/// Of a person what is slower than this is taken out, s.
+pub const PERIOD_S: f64 = 20.0;
 /// Most cosines, so that the time stays in proportion to a record's length.
 const MOST: usize = 64;
 
-/// The records without what is slow; `None` where they are too short for anything slow.
-pub fn without_slow(records: &[Record]) -> Option<Vec<Record>> {
-    let count = |r: &Record| ((2.0 * r.len() as f64 * r.sample_time().s() / PERIOD_S) as usize).min(MOST);
+/// The records without what is slower than a period in s; `None` where they are too short for anything slow.
+pub fn without_slow(records: &[Record], period_s: f64) -> Option<Vec<Record>> {
+    let count = |r: &Record| ((2.0 * r.len() as f64 * r.sample_time().s() / period_s) as usize).min(MOST);
     records.iter().any(|r| count(r) > 0).then(|| {
         let each = records.iter().map(|record| {
             let flat = record.clone().detrended(Detrend::Linear);
@@ -65,7 +65,7 @@ mod tests {
     fn what_is_slow_goes_and_what_is_fast_stays() {
         let gone = |e: &dyn Fn(f64) -> f64| {
             let before = record(8000, e);
-            let after = &without_slow(std::slice::from_ref(&before)).unwrap()[0];
+            let after = &without_slow(std::slice::from_ref(&before), PERIOD_S).unwrap()[0];
             // u is .3 e before and behind.
             let same = after.input().iter().zip(after.output());
             assert!(same.clone().all(|(e, u)| (0.3 * e - u).abs() < 1e-9));
@@ -83,7 +83,7 @@ mod tests {
 
     #[test]
     fn a_short_record_has_nothing_slow() {
-        assert!(without_slow(&[record(900, f64::sin)]).is_none());
-        assert!(without_slow(&[]).is_none());
+        assert!(without_slow(&[record(900, f64::sin)], PERIOD_S).is_none());
+        assert!(without_slow(&[], PERIOD_S).is_none());
     }
 }

@@ -3,11 +3,13 @@
 //! | without | where the fit differs, this carries it | finding |
 //! |---|---|---|
 //! | what no neighbour of a sample bears out ([`crate::faults::held`]), in e as in u: what it brings into the filters of a fit is bounded | few samples | `leverage` |
-//! | what is slower than 20 s ([`crate::faults::without_slow`]) | a drift or a step of a sensor, which the person does not follow | `slow` |
+//! | what is slower than 20 s, of a slow system than ten periods of its slowest pole ([`crate::faults::without_slow`]) | a drift or a step of a sensor, which the person does not follow | `slow` |
 //!
 //! Two fits differ where a parameter, the crossover or the phase margin does by more than three standard
 //! errors: those of the first fit or, where the second knows less, of what it has lost, `sqrt(se'^2 -
 //! se^2)`. Where nothing is taken out the second fit would be the first, and is not made.
+
+use std::f64::consts::TAU;
 
 use hoid_model::{
     ContinuousTransferFunction, Detrend, Finding, Record,
@@ -18,9 +20,11 @@ use hoid_model::{
 use crate::{
     Estimator, Fit, GreyBox, GreyBoxFit, SigmoidChange, SigmoidFit,
     family::{FamilyEstimator, FamilyFit},
-    faults::{held, without_slow},
+    faults::{PERIOD_S, held, without_slow},
 };
 
+/// Periods of the slowest pole of a system that are slow beside it.
+const SLOW_PERIODS: f64 = 10.0;
 /// Standard errors by which two fits differ.
 const DIFFERENT: f64 = 3.0;
 /// Standard errors by which a level may move a parameter.
@@ -33,17 +37,18 @@ type Beside = (String, Estimate, Estimate);
 #[derive(Debug, Clone, Copy)]
 enum Without {
     SamplesThatStandOut,
-    WhatIsSlow,
+    /// Than this period, s.
+    WhatIsSlow(f64),
 }
 
 impl Without {
-    const ALL: [Self; 2] = [Self::SamplesThatStandOut, Self::WhatIsSlow];
+    const ALL: [Self; 2] = [Self::SamplesThatStandOut, Self::WhatIsSlow(PERIOD_S)];
 
     /// The records without it; `None` where they have none of it.
     fn records(self, records: &[Record]) -> Option<Vec<Record>> {
         match self {
             Self::SamplesThatStandOut => held(records),
-            Self::WhatIsSlow => without_slow(records),
+            Self::WhatIsSlow(period_s) => without_slow(records, period_s),
         }
     }
 
@@ -69,11 +74,11 @@ impl Without {
                      look at the recording"
                 ),
             ),
-            Self::WhatIsSlow => Finding::doubt(
+            Self::WhatIsSlow(period_s) => Finding::doubt(
                 "slow",
                 format!(
-                    "a drift or a step that the person does not follow carries the fit: without what is slower than 20 s it \
-                     differs in {differ} standard errors; look at the recording, or take a span without it"
+                    "a drift or a step that the person does not follow carries the fit: without what is slower than \
+                     {period_s:.0} s it differs in {differ} standard errors; look at the recording, or take a span without it"
                 ),
             ),
         })
@@ -94,12 +99,23 @@ pub fn of_polynomials(
     records: &[Record],
     element: Option<&ContinuousTransferFunction>,
 ) -> Vec<Finding> {
-    opinions(&Without::ALL, records, |others| {
+    let all = [Without::SamplesThatStandOut, Without::WhatIsSlow(slow_period_s(fit))];
+    opinions(&all, records, |others| {
         let other = again(estimator, fit, others)?;
         let mut pairs = parameters_beside(fit, &other);
         pairs.extend(loops_beside(fit, &other, element));
         Some(pairs)
     })
+}
+
+/// What is slow beside a system: the periods of a person, or ten of its slowest pole.
+fn slow_period_s(fit: &Fit) -> f64 {
+    let poles = fit.roots();
+    let poles = poles.iter().filter(|root| matches!(root.polynomial, 'a' | 'f'));
+    // s Ts = ln z.
+    let slowest = poles.map(|root| root.value.ln().norm()).filter(|rate| *rate > 0.0);
+    let periods = slowest.map(|rate| SLOW_PERIODS * TAU * fit.model().sample_time().s() / rate);
+    periods.fold(PERIOD_S, f64::max)
 }
 
 /// Of a grey box: the order of its remnant stays.

@@ -1,13 +1,14 @@
 //! The operator of a person in a condition: what the family ([`hoid_ident::family`]) finds in all
 //! their runs together, and its row in the table `people`.
 //!
-//! A row has the form, for each parameter its value, standard error (`_se`), interval of 95 %
+//! A row has the form, for each parameter its value, standard error of these runs (`_se`) and of the person
+//! (`_se_person`), interval of 95 %
 //! (`_low`, `_high`), whether the data determine it (`_determined`) and how much of it is prior
 //! (`_prior_share`), crossover and phase margin with the controlled element and their errors and
 //! intervals, the figures of the fit and its verdict. Parameters that no person has, have no columns. Where some parameters are
 //! individual, a person has a row for each run.
 
-use hoid_ident::family::{FamilyFit, LoopMeasures, OperatorOfRecord, Parameter};
+use hoid_ident::family::{FamilyFit, OperatorOfRecord, Parameter};
 use hoid_io::{ColumnValues, OutputTable, TableSchema};
 use hoid_model::{ContinuousTransferFunction, VerdictLevel, operator_family::PARAMETERS, uncertainty::Estimate};
 
@@ -110,15 +111,13 @@ impl Person {
         element: Option<&ContinuousTransferFunction>,
     ) -> Self {
         let OperatorOfRecord { parameters, .. } = fit.operator(record);
-        // Rows are of people, whose gain varies from run to run.
         let measures = element.and_then(|element| fit.loop_measures(record, element));
-        let measures = measures.map(LoopMeasures::as_of_person);
         let strings = |all: &mut dyn Iterator<Item = &str>| all.map(str::to_owned).collect();
         Self {
             run: run.to_owned(),
             runs,
             form: fit.form.name().to_owned(),
-            parameters: parameters.iter().map(Parameter::as_of_person).collect(),
+            parameters: parameters.clone(),
             crossover_rad_s: measures.map(|m| m.crossover_rad_s),
             crossover_interval: measures.and_then(|m| m.crossover_interval),
             phase_margin_deg: measures.map(|m| m.phase_margin_deg),
@@ -168,6 +167,10 @@ impl Person {
             let name = &p.name;
             rows.real(name, p.value);
             rows.real(&format!("{name}_se"), p.standard_error.unwrap_or(f64::NAN));
+            rows.real(
+                &format!("{name}_se_person"),
+                p.standard_error_person.unwrap_or(f64::NAN),
+            );
             let (low, high) = p.interval.unwrap_or((f64::NAN, f64::NAN));
             rows.real(&format!("{name}_low"), low);
             rows.real(&format!("{name}_high"), high);
@@ -210,7 +213,7 @@ impl Person {
                 unit,
                 value,
                 standard_error: any(&format!("{name}_se")),
-                standard_error_person: any(&format!("{name}_se")),
+                standard_error_person: any(&format!("{name}_se_person")),
                 interval: interval(name),
                 prior_share: any(&format!("{name}_prior_share")).unwrap_or(0.0),
                 determined: cell(&format!("{name}_determined")) == "yes",
@@ -267,7 +270,7 @@ fn people_schema(parameters: &[&str]) -> TableSchema {
         .collect();
     let of_parameters: Vec<String> = parameters
         .iter()
-        .flat_map(|name| ["", "_se", "_low", "_high", "_prior_share"].map(|end| format!("{name}{end}")))
+        .flat_map(|name| ["", "_se", "_se_person", "_low", "_high", "_prior_share"].map(|end| format!("{name}{end}")))
         .collect();
     let determined: Vec<String> = parameters.iter().map(|name| format!("{name}_determined")).collect();
     schema(

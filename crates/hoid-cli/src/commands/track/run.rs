@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use hoid::analysis::{Recordings, Setting, findings_of_quality};
+use hoid::analysis::{Of, Recordings, Setting, findings_of_quality};
 use hoid::io::{check_table_path, write_table};
 use hoid::model::Record;
 use hoid::track::{
@@ -149,7 +149,7 @@ pub fn run(args: &TrackArgs) -> Result<(), CliError> {
     settings.push(Setting::new("rows of the trace", format!("every {every} samples")).given(args.every != 1));
 
     let verdict = trace.verdict(record, choice.as_ref())?;
-    let verdict = verdict.behind(findings_of_quality(account, record));
+    let verdict = verdict.behind(findings_of_quality(account, record, Of::Person));
     let tracked = Tracked {
         verdict: &verdict,
         file: args.record.display().to_string(),
