@@ -63,20 +63,19 @@ pub fn asked_for(names: &[String]) -> Result<Vec<String>, AnalysisError> {
 /// The verdict on what was asked for, from what is known of the fit and what its answers say; by default of the
 /// response, with doubts of the loop.
 pub fn judged(verdict: Verdict, answers: &[Answered], asked: &[String]) -> Verdict {
-    let default = || [RESPONSE].into_iter().chain(LOOP).map(str::to_owned);
-    let wanted: Vec<String> = if asked.is_empty() {
-        default().collect()
+    let of = |name: &str| answers.iter().find(|answer| answer.name == name);
+    let open: Vec<Finding> = if asked.is_empty() {
+        let is_told = |finding: &Finding| matches!(finding.kind, "no-crossover" | "unstable-loop");
+        let wanted = LOOP.iter().filter(|_| !verdict.findings().iter().any(is_told));
+        let of_loop = wanted.filter_map(|name| of(name)?.open.clone());
+        of_loop.map(|finding| Finding::doubt(OPEN, finding.words)).collect()
     } else {
-        asked.to_vec()
-    };
-    let open = wanted
-        .iter()
-        .filter_map(|name| match answers.iter().find(|a| a.name == *name) {
+        let wanted = asked.iter().filter_map(|name| match of(name) {
             Some(answer) => answer.open.clone(),
-            None if asked.is_empty() => None,
             None => Some(open(format!("{name} is not one of the answers of this result"))),
         });
-    let open: Vec<Finding> = open.collect();
+        wanted.collect()
+    };
     verdict.and(open)
 }
 

@@ -1,7 +1,7 @@
 //! Faults of recordings, looked for and mended before anything else is done with them.
 
 use hoid_ident::faults::{SLOWEST_S, mend};
-use hoid_model::{FaultHandling, ModelError, Record};
+use hoid_model::{FaultHandling, Finding, ModelError, Record};
 
 use crate::{
     AnalysisError,
@@ -24,11 +24,12 @@ impl Recordings {
         };
         let one = self.names.into_iter().zip(self.records).zip(self.accounts);
         for (((name, record), account), origin) in one.zip(self.origins) {
-            let found = match of {
-                // Rules in seconds of a person's sampling do not judge a furnace.
-                Of::System if record.sample_time().s() > SLOWEST_S => mend(&record, FaultHandling::Keep)?,
-                _ => mend(&record, handling)?,
-            };
+            let mut found = mend(&record, handling)?;
+            if of == Of::System && record.sample_time().s() > SLOWEST_S {
+                // No person's; of a furnace it is usual.
+                let note = |finding: Finding| Finding::note(finding.kind, finding.words);
+                found.findings = found.findings.into_iter().map(note).collect();
+            }
             let whole = found.segments.len() == 1 && found.segments[0].len() == record.len();
             let mut findings = found.findings;
             findings.extend(findings_of_quality(&account, &record, of));

@@ -317,3 +317,88 @@ fn every_estimator_hears_of_the_recordings() {
             .contains("--start belongs to one model")
     );
 }
+
+/// A furnace sampled every 9 s, its input of two levels: nothing of a person's rules speaks against it.
+#[test]
+fn polynomials_are_judged_as_any_system() {
+    let noise = |seed: u64| {
+        RunSeed {
+            seed,
+            ..RunSeed::default()
+        }
+        .white_noise(900)
+    };
+    let input: Vec<f64> = (0..900).map(|t| noise(1)[t / 3].signum()).collect();
+    let mut output = vec![0.0; 900];
+    let (mut x, mut v) = ([0.0; 2], 0.0);
+    for (t, w) in noise(2).iter().enumerate().skip(2) {
+        let next = 1.5 * x[0] - 0.7 * x[1] + input[t - 1] + 0.5 * input[t - 2];
+        x = [next, x[0]];
+        v = 0.6 * v + 0.1 * w;
+        output[t] = next + v;
+    }
+    let record = Record::new(
+        SampleTime::new(9.0).unwrap(),
+        Channel::new("valve", "", input),
+        Channel::new("gas", "", output),
+    )
+    .unwrap();
+    let mut bj = Polynomials::new(Structure::BoxJenkins);
+    for (name, order) in [("nb", 2), ("nf", 2), ("nd", 1), ("nc", 0), ("nk", 1)] {
+        bj.orders.insert(name.to_owned(), order..=order);
+    }
+    let found = Identification::of(bj).run(Recordings::of_records([record])).unwrap();
+    assert_eq!(found.verdict.level, VerdictLevel::Trustworthy, "{}", found.verdict);
+    for (name, truth) in [("f1", -1.5), ("f2", 0.7), ("b0", 1.0), ("b1", 0.5)] {
+        let (_, of) = found.fit.fit.parameters().into_iter().find(|(n, _)| n == name).unwrap();
+        let error = of.standard_error.unwrap();
+        assert!((of.value - truth).abs() < 4.0 * error && error < 0.05, "{name}: {of}");
+    }
+}
+
+/// e of one person and noise for u: nothing is trustworthy, and who asks for an answer hears of that answer.
+#[test]
+fn a_verdict_is_about_what_was_asked() {
+    let simulator = Simulator::new(&Scenario::condition(Condition::C1)).unwrap();
+    let run = simulator.run(RunSeed::default(), false).unwrap();
+    let noise = RunSeed {
+        seed: 99,
+        ..RunSeed::default()
+    };
+    let u = Channel::new("u", "", noise.white_noise(run.len()));
+    let unrelated = Record::new(run.sample_time(), Channel::new("e", "", run.input().to_vec()), u).unwrap();
+    let identified = |record: &Record, answers: &[&str]| {
+        let how = Identification {
+            answers: answers.iter().map(|name| (*name).to_owned()).collect(),
+            controlled_element: Some(ContinuousTransferFunction::new(&[90.0], &[1.0, 6.0, 0.0]).unwrap()),
+            ..Identification::default()
+        };
+        how.run(Recordings::of_records([record.clone()])).unwrap()
+    };
+    let nothing = identified(&unrelated, &[]);
+    assert_eq!(nothing.verdict.level, VerdictLevel::NotDetermined);
+    assert!(
+        nothing.verdict.findings().iter().any(|f| f.kind == "no-response"),
+        "{}",
+        nothing.verdict
+    );
+    assert!(
+        nothing
+            .answers()
+            .iter()
+            .all(|(_, v)| v.level == VerdictLevel::NotDetermined)
+    );
+
+    let person = identified(&run, &[]);
+    assert_eq!(person.verdict.level, VerdictLevel::Trustworthy, "{}", person.verdict);
+    let answers = person.answers();
+    let open: Vec<&str> = answers
+        .iter()
+        .filter(|(_, v)| v.level == VerdictLevel::NotDetermined)
+        .map(|(name, _)| name.as_str())
+        .collect();
+    assert!(!open.contains(&"crossover") && !open.contains(&"response"), "{open:?}");
+    let level = |answers: &[&str]| identified(&run, answers).verdict.level;
+    assert_eq!(level(&["crossover", "tau_e"]), VerdictLevel::Trustworthy);
+    assert_eq!(level(&["T_I"]), VerdictLevel::NotDetermined);
+}

@@ -255,7 +255,7 @@ mod tests {
     use hoid::ident::settings::Bounds;
 
     use super::*;
-    use crate::args::{Cli, with_settings};
+    use crate::args::{Cli, flag, with_settings};
 
     fn is_as_written(path: &str, expected: &str) {
         let path = format!("{}/../../{path}", env!("CARGO_MANIFEST_DIR"));
@@ -290,7 +290,7 @@ mod tests {
         cli.build();
         let identify = cli.find_subcommand("identify").unwrap();
         for setting in estimators().into_iter().flat_map(|spec| spec.settings) {
-            let name = setting.name.replace('_', "-");
+            let name = flag(setting.name);
             let flag = identify
                 .get_arguments()
                 .find(|arg| arg.get_long() == Some(name.as_str()));

@@ -159,8 +159,8 @@ class BatchSettings(TypedDict, total=False):
     # Whether the operator changes: not at all, or its gains once, by a sigmoid. For operators.
     change: Literal["none", "sigmoid"] | None
 
-    # Form of the operator; auto: the simplest that held-out runs do not refute, of one that
-    # changes lead. For operator, change="sigmoid".
+    # Form of the operator; auto: estimates are averaged over the forms that the data leave, of
+    # one that changes lead. For operator, change="sigmoid".
     form: (
         Literal[
             "auto",
@@ -206,6 +206,10 @@ class BatchSettings(TypedDict, total=False):
     # What a person's gain varies by from run to run, as a part of it: in the error bars of
     # fewer than five records. For operator.
     run_to_run: float | None
+
+    # What the verdict is about: response, crossover, phase_margin, parameters by their names,
+    # as crossover,tau_e.
+    answers: Sequence[str] | None
 
     # Initial states of each record; auto: estimate, and backcast for an output alone (ar, ma,
     # arma). For operators, pem.
@@ -350,8 +354,8 @@ BATCH_SETTINGS = """noise : Literal['ar', 'arma', 'remnant']
             Whether the operator changes: not at all, or its gains once, by a sigmoid. For
             operators.
         form : Literal['auto', 'gain', 'lead', 'lead2', 'lag', 'lead-lag', 'lead2-lag', 'quadratic-integral', 'lead-droop']
-            Form of the operator; auto: the simplest that held-out runs do not refute, of one
-            that changes lead. For operator, change="sigmoid".
+            Form of the operator; auto: estimates are averaged over the forms that the data
+            leave, of one that changes lead. For operator, change="sigmoid".
         neuromuscular : Literal['yes', 'no']
             With neuromuscular dynamics omega_nm, zeta_nm. For operator, change="sigmoid".
         prior : str | PathLike[str] | Mapping[str, tuple[float, float]] | OperatorFit
@@ -375,6 +379,9 @@ BATCH_SETTINGS = """noise : Literal['ar', 'arma', 'remnant']
         run_to_run : float
             What a person's gain varies by from run to run, as a part of it: in the error bars
             of fewer than five records. For operator.
+        answers : Sequence[str]
+            What the verdict is about: response, crossover, phase_margin, parameters by their
+            names, as crossover,tau_e.
         initial_state : Literal['auto', 'zero', 'estimate', 'backcast']
             Initial states of each record; auto: estimate, and backcast for an output alone (ar,
             ma, arma). For operators, pem.

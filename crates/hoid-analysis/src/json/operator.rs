@@ -194,7 +194,7 @@ fn operator(of: &OperatorOfRecord) -> Value {
     for p in &of.parameters {
         let mut value = parameter(p);
         if let Some(fields) = value.as_object_mut() {
-            fields.remove("name");
+            fields.shift_remove("name");
         }
         map.insert(p.name.clone(), value);
     }
