@@ -63,6 +63,16 @@ pub enum IoError {
         /// The file.
         file: String,
     },
+    /// A shared library of something else.
+    #[error(
+        "{file} is a shared library, but not that of hoid: it has no {missing}; give the one that `cargo xtask ffi` has built"
+    )]
+    OtherLibrary {
+        /// The file.
+        file: String,
+        /// The function that it lacks.
+        missing: &'static str,
+    },
     /// A second process on one directory.
     #[error("another process works on {directory}: wait for its end, or take another directory")]
     InUse {

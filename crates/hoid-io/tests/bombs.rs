@@ -14,7 +14,11 @@ use hoid_io::{read_any_scenario, read_fit, read_table, survey};
 use parquet::{
     basic::{Compression, GzipLevel},
     data_type::{ByteArray, ByteArrayType, DoubleType, Int64Type},
-    file::{properties::WriterProperties, writer::SerializedFileWriter},
+    file::{
+        metadata::{ParquetMetaDataReader, ParquetMetaDataWriter},
+        properties::WriterProperties,
+        writer::SerializedFileWriter,
+    },
     schema::parser::parse_message_type,
 };
 
@@ -69,6 +73,64 @@ fn parquet(path: &Path, schema: &str, groups: usize, gzip: bool, plain: bool) {
         group.close().unwrap();
     }
     writer.close().unwrap();
+}
+
+/// A file of one column of 100 numbers, whose page is another: it states what it unpacks to.
+fn parquet_page(path: &Path, compression: Compression, unpacked: u32, packed: &[u8]) {
+    let schema = Arc::new(parse_message_type("message m { required double e; }").unwrap());
+    let properties = WriterProperties::builder()
+        .set_compression(compression)
+        .set_dictionary_enabled(false)
+        .build();
+    let mut writer = SerializedFileWriter::new(Vec::new(), schema, Arc::new(properties)).unwrap();
+    let mut group = writer.next_row_group().unwrap();
+    let mut column = group.next_column().unwrap().unwrap();
+    column
+        .typed::<DoubleType>()
+        .write_batch(&[0.0; 100], None, None)
+        .unwrap();
+    column.close().unwrap();
+    group.close().unwrap();
+    let honest = bytes::Bytes::from(writer.into_inner().unwrap());
+    // PageHeader { type 0, unpacked, packed, DataPageHeader { 100 values, plain, levels by RLE } }.
+    let mut page = vec![0x15, 0, 0x15];
+    let put = |page: &mut Vec<u8>, value: u64| {
+        let mut rest = 2 * value;
+        while rest >= 0x80 {
+            page.push(rest as u8 | 0x80);
+            rest >>= 7;
+        }
+        page.push(rest as u8);
+    };
+    put(&mut page, u64::from(unpacked));
+    page.push(0x15);
+    put(&mut page, packed.len() as u64);
+    page.extend([0x2c, 0x15]);
+    put(&mut page, 100);
+    page.extend([0x15, 0, 0x15, 6, 0x15, 6, 0, 0]);
+    page.extend(packed);
+    let metadata = ParquetMetaDataReader::new().parse_and_finish(&honest).unwrap();
+    let group = metadata.row_group(0).clone();
+    let chunk = group.column(0).clone().into_builder();
+    let chunk = chunk
+        .set_data_page_offset(4)
+        .set_total_compressed_size(page.len() as i64)
+        .set_column_index_offset(None)
+        .set_offset_index_offset(None)
+        .build()
+        .unwrap();
+    let group = group.into_builder().set_column_metadata(vec![chunk]).build().unwrap();
+    let metadata = metadata.into_builder().set_row_groups(vec![group]).build();
+    let mut file = [b"PAR1".as_slice(), &page].concat();
+    ParquetMetaDataWriter::new(&mut file, &metadata).finish().unwrap();
+    fs::write(path, file).unwrap();
+}
+
+/// So many zeros in gzip.
+fn gzip_of_zeros(count: u64) -> Vec<u8> {
+    let mut packed = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::default());
+    std::io::copy(&mut std::io::repeat(0).take(count), &mut packed).unwrap();
+    packed.finish().unwrap()
 }
 
 /// A member of zeros of an archive, with the head of an array of numpy.
@@ -141,6 +203,14 @@ fn small_files_do_not_unpack_without_a_bound() {
         false,
         false,
     );
+    let gzip = || Compression::GZIP(GzipLevel::default());
+    parquet_page(&at("lying.parquet"), gzip(), 800, &gzip_of_zeros(1 << 30));
+    parquet_page(&at("stated.parquet"), Compression::SNAPPY, 2_000_000_000, &[0; 20]);
+    parquet_page(&at("honest.parquet"), gzip(), 800, &gzip_of_zeros(800));
+    assert_eq!(
+        read_table(&at("honest.parquet")).unwrap().column("e").unwrap().len(),
+        100
+    );
     let many: String = (0..10_001).map(|k| format!("required double c{k}; ")).collect();
     parquet(&at("many.parquet"), &format!("message m {{ {many} }}"), 0, false, false);
     npz(&at("zeros.npz"), 1 << 27);
@@ -152,6 +222,8 @@ fn small_files_do_not_unpack_without_a_bound() {
         ("dates.parquet", "unpacks to more than"),
         ("zeros.parquet", "unpacks to more than"),
         ("texts.parquet", "unpacks to more than"),
+        ("lying.parquet", "a page is longer than it says"),
+        ("stated.parquet", "unpacks to more than"),
         ("many.parquet", "10001"),
         ("zeros.npz", "unpacks to more than"),
         ("zeros.mat", "unpacks to more than"),

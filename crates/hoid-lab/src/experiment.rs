@@ -17,6 +17,7 @@ A tracking experiment by `hoid lab`.
 
 sub-P01/ses-01/             one session of one person, who has a made-up name
   lab.toml                  the experiment, its order, browser and screen
+  lab.copy.toml             the same, for when lab.toml is damaged
   runs.csv                  each run that ended: verified, or unverified and why
   ..._run.json              the task of a run and its settings, written before it began
   ..._forcing.parquet       target and disturbance at each tick of 1 ms

@@ -74,6 +74,17 @@ const MAC: [(u32, Platform); 2] = [
     ),
 ];
 
+/// Functions that the library of a unit hands out: that of hoid, of FMI 2 and of FMI 3. Their names stand in
+/// its table of symbols, each ended by a 0, whatever the system.
+const FUNCTIONS: [&str; 3] = ["hoid_abi_version", "fmi2Instantiate", "fmi3InstantiateCoSimulation"];
+
+fn hands_out(bytes: &[u8], function: &str) -> bool {
+    let name = [function.as_bytes(), &[0]].concat();
+    let first = name[0];
+    let starts = bytes.iter().enumerate().filter(|(_, byte)| **byte == first);
+    starts.into_iter().any(|(at, _)| bytes[at..].starts_with(&name))
+}
+
 fn two_bytes(bytes: &[u8], at: usize) -> Option<u16> {
     let found = bytes.get(at..at.checked_add(2)?)?;
     Some(u16::from_le_bytes(found.try_into().ok()?))
@@ -105,12 +116,19 @@ impl Library {
     /// Reads a library; its platform is that of its head.
     ///
     /// # Errors
-    /// [`IoError::Unreadable`]; [`IoError::NoLibrary`] for what is no shared library of a known platform.
+    /// [`IoError::Unreadable`]; [`IoError::NoLibrary`] for what is no shared library of a known platform;
+    /// [`IoError::OtherLibrary`] for one of something else.
     pub fn read(path: &Path) -> Result<Self, IoError> {
         let bytes = read_bytes(path)?;
         let platform = Platform::of(&bytes).ok_or_else(|| IoError::NoLibrary {
             file: path.display().to_string(),
         })?;
+        if let Some(missing) = FUNCTIONS.into_iter().find(|function| !hands_out(&bytes, function)) {
+            return Err(IoError::OtherLibrary {
+                file: path.display().to_string(),
+                missing,
+            });
+        }
         Ok(Self { bytes, platform })
     }
 }
@@ -181,7 +199,7 @@ mod tests {
     use super::*;
     use crate::fmu::FmuKind;
 
-    /// Heads as the systems write them.
+    /// Heads as the systems write them, with the names of the functions.
     fn heads() -> [(Vec<u8>, &'static str, &'static str); 5] {
         let elf = |machine: u16| {
             let mut bytes = vec![0; 64];
@@ -194,6 +212,7 @@ mod tests {
         windows[..2].copy_from_slice(b"MZ");
         windows[0x3c] = 0x80;
         windows[0x80..0x86].copy_from_slice(b"PE\0\0\x64\x86");
+        let names = FUNCTIONS.map(|name| format!("\0{name}")).concat() + "\0";
         [
             (elf(62), "linux64/hoid.so", "x86_64-linux/hoid.so"),
             (elf(183), "aarch64-linux/hoid.so", "aarch64-linux/hoid.so"),
@@ -205,6 +224,7 @@ mod tests {
                 "aarch64-darwin/hoid.dylib",
             ),
         ]
+        .map(|(head, in_two, in_three)| ([head, names.clone().into_bytes()].concat(), in_two, in_three))
     }
 
     #[test]
@@ -267,5 +287,18 @@ mod tests {
             assert!(refused.contains("cargo xtask ffi"), "{refused}");
         }
         assert!(Library::read(&folder.path().join("nowhere")).is_err());
+        // Of one name a part is not the name.
+        for (bytes, ..) in heads() {
+            let text = String::from_utf8_lossy(FUNCTIONS[1].as_bytes()).into_owned();
+            let place = bytes.windows(text.len()).position(|w| w == text.as_bytes()).unwrap();
+            let mut other = bytes.clone();
+            other[place] = b'F';
+            fs::write(&path, other).unwrap();
+            let refused = Library::read(&path).err().unwrap().to_string();
+            assert!(
+                refused.contains("not that of hoid: it has no fmi2Instantiate"),
+                "{refused}"
+            );
+        }
     }
 }

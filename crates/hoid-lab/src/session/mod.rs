@@ -4,7 +4,7 @@
 //! OUT/                                     one experiment, any number of people
 //!   README, dataset_description.json, participants.tsv, group.toml
 //!   sub-P01/ses-01/                        one session
-//!     lab.toml                             what was to be, who, with which browser and screen
+//!     lab.toml, lab.copy.toml              what was to be, who, with which browser and screen; twice
 //!     runs.csv                             a line for each run that ended, with its verdict
 //!     sub-P01_ses-01_task-rate_run-01_...  the files of a run, one stem each:
 //!       run.json                           the task and its settings, written before the run

@@ -22,6 +22,15 @@ use crate::{
     verify::{Checked, check},
 };
 
+/// The file of what was to be, and its copy for when that is lost.
+const FACTS: &str = "lab.toml";
+const FACTS_AGAIN: &str = "lab.copy.toml";
+
+/// True for the folder of a session.
+fn is_session(folder: &Path) -> bool {
+    [FACTS, FACTS_AGAIN].iter().any(|name| folder.join(name).exists())
+}
+
 /// What `lab.toml` of a session holds.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -50,6 +59,23 @@ pub struct Facts {
     pub plan: Vec<Planned>,
     /// The experiment.
     pub config: Config,
+}
+
+impl Facts {
+    fn read(path: &Path) -> Result<Self, LabError> {
+        let text = hoid_io::read_settings(path)?;
+        let facts: Self = toml::from_str(&text)
+            .map_err(|error| LabError::damaged(path, format!("{}; expected that of a session", error.message())))?;
+        let conditions = facts.config.condition.len();
+        if let Some(wrong) = facts.plan.iter().find(|run| run.condition >= conditions) {
+            let reason = format!(
+                "the plan names condition {} of {conditions}; it is not as hoid lab wrote it",
+                wrong.condition
+            );
+            return Err(LabError::damaged(path, reason));
+        }
+        Ok(facts)
+    }
 }
 
 /// A run that has ended: a line of `runs.csv`.
@@ -152,18 +178,11 @@ impl Session {
     /// # Errors
     /// [`LabError::Damaged`].
     pub fn read(folder: &Path) -> Result<Self, LabError> {
-        let path = folder.join("lab.toml");
-        let text = hoid_io::read_settings(&path)?;
-        let facts: Facts = toml::from_str(&text)
-            .map_err(|error| LabError::damaged(&path, format!("{}; expected that of a session", error.message())))?;
-        let conditions = facts.config.condition.len();
-        if let Some(wrong) = facts.plan.iter().find(|run| run.condition >= conditions) {
-            let reason = format!(
-                "the plan names condition {} of {conditions}; it is not as hoid lab wrote it",
-                wrong.condition
-            );
-            return Err(LabError::damaged(&path, reason));
-        }
+        // What the copy says is taken only where the file says nothing: it is one change behind at most.
+        let facts = match Facts::read(&folder.join(FACTS)) {
+            Ok(facts) => facts,
+            Err(damaged) => Facts::read(&folder.join(FACTS_AGAIN)).map_err(|_| damaged)?,
+        };
         Ok(Self {
             done: read_runs(&folder.join("runs.csv"))?,
             folder: folder.to_owned(),
@@ -171,14 +190,16 @@ impl Session {
         })
     }
 
-    /// Writes `lab.toml`.
+    /// Writes `lab.toml` and its copy, one after the other.
     ///
     /// # Errors
     /// [`LabError::Io`].
     pub fn save(&self) -> Result<(), LabError> {
-        let path = self.folder.join("lab.toml");
-        let text = toml::to_string(&self.facts).map_err(|error| LabError::damaged(&path, error.to_string()))?;
-        hoid_io::write_atomically(&path, |file| file.write_all(text.as_bytes()))?;
+        for name in [FACTS, FACTS_AGAIN] {
+            let path = self.folder.join(name);
+            let text = toml::to_string(&self.facts).map_err(|error| LabError::damaged(&path, error.to_string()))?;
+            hoid_io::write_atomically(&path, |file| file.write_all(text.as_bytes()))?;
+        }
         Ok(())
     }
 
@@ -309,7 +330,7 @@ impl Session {
             found.extend(
                 directories(&person, "ses-")?
                     .into_iter()
-                    .filter(|folder| folder.join("lab.toml").exists()),
+                    .filter(|folder| is_session(folder)),
             );
         }
         Ok(found)
@@ -340,7 +361,7 @@ fn row_of(out: &Path, subject: &str) -> Result<usize, LabError> {
             .is_some_and(|name| name.to_string_lossy() == format!("sub-{subject}"));
         let first = directories(&person, "ses-")?
             .into_iter()
-            .find(|folder| folder.join("lab.toml").exists());
+            .find(|folder| is_session(folder));
         match first {
             Some(first) if own => return Ok(Session::read(&first)?.facts.row),
             Some(_) => others += 1,

@@ -4,12 +4,14 @@
 //! | module | what it holds |
 //! |---|---|
 //! | `columns` | columns as they were read |
+//! | `pages` | what the pages of a column unpack to |
 //! | `read` | the columns of a file of any program |
 //! | `record` | the table that a record is made of |
 //! | `results` | a table of results |
 //! | `write` | row groups as they come |
 
 mod columns;
+mod pages;
 mod read;
 mod record;
 mod results;

@@ -15,7 +15,10 @@ use parquet::errors::ParquetError;
 use parquet::file::reader::{FileReader, SerializedFileReader};
 use parquet::schema::types::{ColumnDescPtr, ColumnDescriptor};
 
-use super::columns::{COMMENTS, Data, ReadColumn, ReadFile};
+use super::{
+    columns::{COMMENTS, Data, ReadColumn, ReadFile},
+    pages,
+};
 use crate::IoError;
 use crate::budget::Budget;
 use crate::guarded::guarded;
@@ -76,7 +79,7 @@ fn columns(bytes: Bytes, file: &str) -> Result<ReadFile, IoError> {
         file: file.to_owned(),
         found,
     };
-    let reader = SerializedFileReader::new(bytes).map_err(|error| damaged(told(&error.to_string())))?;
+    let reader = SerializedFileReader::new(bytes.clone()).map_err(|error| damaged(told(&error.to_string())))?;
     let footer = reader.metadata().file_metadata();
     let count = |rows: i64| usize::try_from(rows).map_err(|_| damaged(format!("{rows} rows")));
     let rows = count(footer.num_rows())?;
@@ -103,6 +106,31 @@ fn columns(bytes: Bytes, file: &str) -> Result<ReadFile, IoError> {
     }
     if grouped != rows {
         return Err(damaged(format!("{rows} rows in all, {grouped} in the row groups")));
+    }
+    for (number, group) in reader.metadata().row_groups().iter().enumerate() {
+        for chunk in group.columns() {
+            let place = || {
+                let name = chunk.column_path().string();
+                format!("column {}, row group {}", shown(&name), number + 1)
+            };
+            if chunk.file_path().is_some() {
+                continue;
+            }
+            let start = chunk.dictionary_page_offset().unwrap_or(chunk.data_page_offset());
+            let end = start.saturating_add(chunk.compressed_size());
+            let place_of = |at: i64| usize::try_from(at).map_or(0, |at| at.min(size));
+            let pages = bytes.get(place_of(start)..place_of(end)).unwrap_or_default();
+            let values = u64::try_from(chunk.num_values()).unwrap_or(0);
+            let Some(stated) = pages::unpacked(pages, chunk.compression(), values) else {
+                return Err(damaged(format!(
+                    "{}: a page is longer than it says, or does not say how long it is",
+                    place()
+                )));
+            };
+            // The footer has been counted.
+            let counted = u64::try_from(chunk.uncompressed_size()).unwrap_or(0);
+            budget.take(stated.saturating_sub(counted), file)?;
+        }
     }
     let mut column = |(index, descriptor): (usize, &ColumnDescPtr)| {
         let parts: Vec<&str> = descriptor.path().parts().iter().map(|part| part.trim()).collect();

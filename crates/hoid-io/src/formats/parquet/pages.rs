@@ -1,0 +1,267 @@
+//! What the pages of a column unpack to, before any of them is unpacked.
+//!
+//! The footer says how long a column is when unpacked, each page says it again in its header, and nobody
+//! has to be right: a page of a few kB may state 2 GB, which Snappy and LZ4 then fill with zeros, and gzip
+//! unpacks until it ends, whatever was stated. So the headers are read here first, in the compact protocol
+//! of Thrift (<https://github.com/apache/thrift/blob/master/doc/specs/thrift-compact-protocol.md>): a field
+//! is a byte `delta << 4 | type`, numbers are zigzag varints, and a struct ends with a 0. Of `PageHeader`
+//! (<https://github.com/apache/parquet-format>, `parquet.thrift`) are taken
+//!
+//! | field | what |
+//! |---|---|
+//! | 2, 3 | bytes unpacked and packed |
+//! | 5.1, 8.1 | values of a data page |
+//! | 8.5, 8.6, 8.7 | bytes of levels in front of the values, and whether these are packed |
+//!
+//! What is not packed, or packed by Snappy and LZ4, is as long as stated or refused by the crate. A page in
+//! gzip is unpacked here into nothing, as far as it is stated and one byte further.
+
+use std::io::{self, Read as _};
+
+use flate2::read::MultiGzDecoder;
+use parquet::basic::Compression;
+
+/// Structures inside of structures that a header may have; the format has three.
+const MOST_NESTED: usize = 8;
+/// Types of the compact protocol.
+const STOP: u8 = 0;
+const TRUE: u8 = 1;
+const FALSE: u8 = 2;
+const BYTE: u8 = 3;
+const DOUBLE: u8 = 7;
+const BINARY: u8 = 8;
+const LIST: u8 = 9;
+const SET: u8 = 10;
+const MAP: u8 = 11;
+const STRUCT: u8 = 12;
+
+/// What the header of a page states.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct PageHeader {
+    unpacked: u64,
+    packed: u64,
+    values: u64,
+    /// Bytes of levels that stand in front of what is packed.
+    levels: u64,
+    is_packed: bool,
+}
+
+/// Bytes that the pages of a column state to unpack to; `None` where a header is none, or a page in gzip is
+/// longer than it states. `column` holds the pages, and `values` are in all of them.
+pub(super) fn unpacked(column: &[u8], compression: Compression, values: u64) -> Option<u64> {
+    let (mut rest, mut all, mut seen) = (column, 0_u64, 0_u64);
+    while !rest.is_empty() && seen < values {
+        let header = PageHeader::read(&mut rest)?;
+        let page = rest.get(..usize::try_from(header.packed).ok()?)?;
+        if matches!(compression, Compression::GZIP(_)) && header.is_packed {
+            let packed = page.get(usize::try_from(header.levels).ok()?..)?;
+            let stated = header.unpacked.checked_sub(header.levels)?;
+            // What is damaged otherwise is told by who reads it.
+            let mut limited = MultiGzDecoder::new(packed).take(stated.saturating_add(1));
+            if io::copy(&mut limited, &mut io::sink()).is_ok_and(|bytes| bytes > stated) {
+                return None;
+            }
+        }
+        all = all.saturating_add(header.unpacked);
+        seen = seen.saturating_add(header.values);
+        rest = rest.get(page.len()..)?;
+    }
+    Some(all)
+}
+
+impl PageHeader {
+    fn read(bytes: &mut &[u8]) -> Option<Self> {
+        let mut header = Self {
+            unpacked: 0,
+            packed: 0,
+            values: 0,
+            levels: 0,
+            is_packed: true,
+        };
+        header.structure(bytes, None, 0)?;
+        Some(header)
+    }
+
+    /// The fields of a structure, which is field `inside` of the header.
+    fn structure(&mut self, bytes: &mut &[u8], inside: Option<i64>, depth: usize) -> Option<()> {
+        if depth > MOST_NESTED {
+            return None;
+        }
+        let mut field = 0_i64;
+        loop {
+            let head = byte(bytes)?;
+            let kind = head & 15;
+            if kind == STOP {
+                return Some(());
+            }
+            field = match head >> 4 {
+                0 => zigzag(bytes)?,
+                delta => field.checked_add(i64::from(delta))?,
+            };
+            match kind {
+                TRUE | FALSE => {
+                    if (inside, field) == (Some(8), 7) {
+                        self.is_packed = kind == TRUE;
+                    }
+                }
+                BYTE => drop(byte(bytes)?),
+                4..=6 => self.number(inside, field, zigzag(bytes)?)?,
+                STRUCT => self.structure(bytes, Some(if depth == 0 { field } else { -1 }), depth + 1)?,
+                other => self.pass_over(bytes, other, depth + 1)?,
+            }
+        }
+    }
+
+    fn number(&mut self, inside: Option<i64>, field: i64, value: i64) -> Option<()> {
+        let place = match (inside, field) {
+            (None, 2) => &mut self.unpacked,
+            (None, 3) => &mut self.packed,
+            (Some(5 | 8), 1) => &mut self.values,
+            (Some(8), 5 | 6) => {
+                self.levels = self.levels.checked_add(u64::try_from(value).ok()?)?;
+                return Some(());
+            }
+            _ => return Some(()),
+        };
+        *place = u64::try_from(value).ok()?;
+        Some(())
+    }
+
+    /// A value that says nothing here.
+    fn pass_over(&mut self, bytes: &mut &[u8], kind: u8, depth: usize) -> Option<()> {
+        match kind {
+            TRUE | FALSE | BYTE => drop(byte(bytes)?),
+            4..=6 => drop(zigzag(bytes)?),
+            DOUBLE => *bytes = bytes.get(8..)?,
+            BINARY => {
+                let length = usize::try_from(varint(bytes)?).ok()?;
+                *bytes = bytes.get(length..)?;
+            }
+            LIST | SET => {
+                let head = byte(bytes)?;
+                let count = match head >> 4 {
+                    15 => varint(bytes)?,
+                    count => u64::from(count),
+                };
+                self.each(bytes, count, &[head & 15], depth)?;
+            }
+            MAP => {
+                let count = varint(bytes)?;
+                if count > 0 {
+                    let kinds = byte(bytes)?;
+                    self.each(bytes, count, &[kinds >> 4, kinds & 15], depth)?;
+                }
+            }
+            STRUCT => self.structure(bytes, Some(-1), depth)?,
+            _ => return None,
+        }
+        Some(())
+    }
+
+    fn each(&mut self, bytes: &mut &[u8], count: u64, kinds: &[u8], depth: usize) -> Option<()> {
+        // Each takes a byte at least.
+        if depth > MOST_NESTED || count > bytes.len() as u64 {
+            return None;
+        }
+        for _ in 0..count {
+            for kind in kinds {
+                self.pass_over(bytes, *kind, depth + 1)?;
+            }
+        }
+        Some(())
+    }
+}
+
+fn byte(bytes: &mut &[u8]) -> Option<u8> {
+    let (first, rest) = bytes.split_first()?;
+    *bytes = rest;
+    Some(*first)
+}
+
+fn varint(bytes: &mut &[u8]) -> Option<u64> {
+    let mut value = 0_u64;
+    for place in 0..10 {
+        let next = byte(bytes)?;
+        value |= u64::from(next & 0x7f).checked_shl(7 * place)?;
+        if next < 0x80 {
+            return Some(value);
+        }
+    }
+    None
+}
+
+fn zigzag(bytes: &mut &[u8]) -> Option<i64> {
+    let value = varint(bytes)?;
+    Some((value >> 1).cast_signed() ^ -(value & 1).cast_signed())
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use std::io::Write as _;
+
+    use flate2::{Compression as Level, write::GzEncoder};
+    use parquet::basic::GzipLevel;
+
+    use super::*;
+
+    const GZIP: fn() -> Compression = || Compression::GZIP(GzipLevel::default());
+
+    /// A header of a data page with a text and a list that say nothing, and its page.
+    fn page(unpacked: i64, values: i64, packed: &[u8]) -> Vec<u8> {
+        let put = |bytes: &mut Vec<u8>, value: i64| {
+            let mut rest = ((value << 1) ^ (value >> 63)).cast_unsigned();
+            while rest >= 0x80 {
+                bytes.push(rest as u8 | 0x80);
+                rest >>= 7;
+            }
+            bytes.push(rest as u8);
+        };
+        let mut bytes = vec![0x15];
+        put(&mut bytes, 0);
+        bytes.push(0x15);
+        put(&mut bytes, unpacked);
+        bytes.push(0x15);
+        put(&mut bytes, packed.len() as i64);
+        // Field 5: values, statistics with a text and a list.
+        bytes.extend([0x2c, 0x15]);
+        put(&mut bytes, values);
+        bytes.extend([0x4c, 0x18, 3, b'a', b'b', b'c', 0x19, 0x25, 2, 4, STOP, STOP, STOP]);
+        bytes.extend(packed);
+        bytes
+    }
+
+    fn zipped(bytes: &[u8]) -> Vec<u8> {
+        let mut encoder = GzEncoder::new(Vec::new(), Level::default());
+        encoder.write_all(bytes).unwrap();
+        encoder.finish().unwrap()
+    }
+
+    #[test]
+    fn pages_say_what_they_unpack_to_and_gzip_is_held_to_it() {
+        let honest = page(800, 100, &zipped(&[0; 800]));
+        assert_eq!(unpacked(&honest, GZIP(), 100), Some(800));
+        // Of two pages, the second behind the last value is not looked at.
+        let two = [honest.clone(), vec![0xff; 40]].concat();
+        assert_eq!(unpacked(&two, GZIP(), 100), Some(800));
+        assert_eq!(unpacked(&two, GZIP(), 101), None);
+        let two = [honest, page(2_000_000_000, 100, &[1, 2, 3])].concat();
+        assert_eq!(unpacked(&two, Compression::SNAPPY, 200), Some(2_000_000_800));
+        let lying = page(800, 100, &zipped(&[0; 900]));
+        assert_eq!(unpacked(&lying, GZIP(), 100), None);
+        assert_eq!(unpacked(&lying, Compression::SNAPPY, 100), Some(800));
+    }
+
+    #[test]
+    fn headers_that_are_cut_or_make_no_sense_are_none() {
+        let whole = page(800, 100, &zipped(&[0; 800]));
+        assert_eq!(unpacked(&[], GZIP(), 100), Some(0));
+        for cut in 1..whole.len() {
+            assert_eq!(unpacked(&whole[..cut], GZIP(), 100), None, "{cut}");
+        }
+        assert_eq!(unpacked(&page(-1, 100, &[]), Compression::SNAPPY, 100), None);
+        // Structures without an end, and a list of more than there is.
+        assert_eq!(unpacked(&[0x1c; 100], GZIP(), 1), None);
+        assert_eq!(unpacked(&[0x19, 0xf5, 0xff, 0xff, 0xff, 0x7f, 0, 0], GZIP(), 1), None);
+    }
+}
