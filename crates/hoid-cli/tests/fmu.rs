@@ -10,11 +10,12 @@ use tempfile::TempDir;
 
 use common::{bad, good};
 
-/// The head of a shared library of Linux, and nothing behind it.
+/// The head of a shared library of Linux, and the names of the functions of that of hoid.
 fn library(folder: &TempDir) {
     let mut bytes = vec![0_u8; 64];
     bytes[..6].copy_from_slice(b"\x7fELF\x02\x01");
     bytes[18] = 62;
+    bytes.extend(b"\0hoid_abi_version\0fmi2Instantiate\0fmi3InstantiateCoSimulation\0");
     fs::write(folder.path().join("libhoid.so"), bytes).unwrap();
 }
 
