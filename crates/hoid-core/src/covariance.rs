@@ -61,9 +61,15 @@ pub struct Covariance<const N: usize> {
 
 crate::state!([const N: usize] Covariance<N> {
     factors, initial, scales, uniform_growth, bound, guard, forgotten, forgotten_at_turn, early, early_decay, power, largest_power, period, until_turn, turn,
-});
+}, bounded);
 
 impl<const N: usize> Covariance<N> {
+    fn bounded(&mut self) {
+        self.period = self.period.max(1);
+        self.until_turn = self.until_turn.clamp(1, self.period);
+        self.turn = self.turn.min(N.saturating_sub(1));
+    }
+
     /// `factors` is P at the start. `bound` is the largest variance of each parameter, in the units
     /// of P; infinite for none.
     pub fn new(factors: UdCovariance<N>, forgetting: Forgetting<N>, bound: [f64; N]) -> Self {

@@ -12,6 +12,7 @@ impl<M: AsMut<[f64]>> crate::state::State for DelayLine<M> {
     fn visit(&mut self, each: &mut dyn FnMut(&mut f64)) {
         self.memory.as_mut().visit(each);
         self.oldest.visit(each);
+        self.oldest = self.oldest.min(self.memory.as_mut().len().saturating_sub(1));
     }
 }
 

@@ -65,7 +65,7 @@ pub struct ErrorBars<const N: usize, const K: usize> {
 
 crate::state!([const N: usize, const K: usize] ErrorBars<N, K> {
     theta, cross, filters, initial_variances, innovation_variance, limit, until_check,
-});
+}, bounded);
 
 /// Follows the error of an estimate through its recursion: [`ErrorBars`], or [`NoErrorBars`] where
 /// they are not wanted.
@@ -114,6 +114,10 @@ impl<const N: usize> ErrorPropagation<N, 0> for NoErrorBars {
 }
 
 impl<const N: usize, const K: usize> ErrorBars<N, K> {
+    fn bounded(&mut self) {
+        self.until_check = self.until_check.clamp(1, CHECK_PERIOD);
+    }
+
     /// From the covariance of theta at the start over the innovation variance, with filters whose
     /// past is right. Innovations move the estimate as if they were no larger than `limit` times
     /// sigma; infinite for no limit.

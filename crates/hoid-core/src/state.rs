@@ -33,18 +33,24 @@ impl State for bool {
     }
 }
 
+/// Counters of 64 and 32 bits stay as far below what they hold as no run counts: one more is never too many,
+/// whatever was restored.
+const MOST: f64 = 9_007_199_254_740_992.0;
+const MOST_OF_32: f64 = 2_147_483_648.0;
+const MOST_OF_USIZE: f64 = if usize::BITS > 32 { MOST } else { MOST_OF_32 };
+
 macro_rules! counters {
-    ($($type:ty),+) => {$(
+    ($($type:ty, $most:expr);+) => {$(
         impl State for $type {
             fn visit(&mut self, each: &mut dyn FnMut(&mut f64)) {
                 let mut number = *self as f64;
                 each(&mut number);
-                *self = number as $type;
+                *self = if number > $most { $most as $type } else { number as $type };
             }
         }
     )+};
 }
-counters!(u32, u64, usize);
+counters!(u32, MOST_OF_32; u64, MOST; usize, MOST_OF_USIZE);
 
 impl<T: State> State for [T] {
     fn visit(&mut self, each: &mut dyn FnMut(&mut f64)) {
@@ -65,13 +71,22 @@ impl<T: State + ?Sized> State for &mut T {
 }
 
 /// Makes a type a [`State`] of the fields that are named:
-/// `state!([const N: usize] Type<N> { field, field })`.
+/// `state!([const N: usize] Type<N> { field, field })`. With `, bounded` behind them the type has a method of that
+/// name, which brings places, lengths and counts back to where they may be: numbers may have been made by anyone.
 #[macro_export]
 macro_rules! state {
     ([$($generics:tt)*] $type:ty { $($field:ident),+ $(,)? }) => {
         impl<$($generics)*> $crate::state::State for $type {
             fn visit(&mut self, each: &mut dyn FnMut(&mut f64)) {
                 $crate::state::visit_all(&mut [$(&mut self.$field),+], each);
+            }
+        }
+    };
+    ([$($generics:tt)*] $type:ty { $($field:ident),+ $(,)? }, $bounded:ident) => {
+        impl<$($generics)*> $crate::state::State for $type {
+            fn visit(&mut self, each: &mut dyn FnMut(&mut f64)) {
+                $crate::state::visit_all(&mut [$(&mut self.$field),+], each);
+                self.$bounded();
             }
         }
     };

@@ -13,23 +13,21 @@
 //! | a head of more than 16 KiB | 431 |
 //! | more than 64 connections with the token at once | 503 |
 //!
-//! **Strangers.** A head has 5 s in all to come. Connections that have not shown the token yet are at
-//! most 32; where one more comes, the oldest of them is closed: who is slow gives way, and the page,
-//! whose head comes at once, is always heard. Where the system has no descriptor or thread left, the
-//! loop waits a moment and goes on.
+//! **Strangers** are those who have not shown the token (`reception`): a head has 5 s in all to come, the
+//! oldest of 256 gives way to the next, and none of them has a thread.
 
 mod http;
+mod reception;
 mod socket;
 
 use std::{
-    collections::VecDeque,
-    net::{Ipv4Addr, Shutdown, SocketAddr, TcpListener, TcpStream},
+    net::{Ipv4Addr, SocketAddr, TcpListener, TcpStream},
     sync::{
-        Arc, Mutex, MutexGuard, PoisonError,
+        Arc, Mutex, PoisonError,
         atomic::{AtomicUsize, Ordering},
     },
     thread,
-    time::{Duration, Instant},
+    time::Duration,
 };
 
 use data_encoding::{BASE64, HEXLOWER};
@@ -38,13 +36,10 @@ use sha2::{Digest, Sha256};
 use crate::{LabError, lab::Lab};
 use http::{Reply, Request};
 
-/// Most connections at once of those that have not shown the token, and of those that have.
-const STRANGERS: usize = 32;
+/// Most connections at once that have shown the token.
 const KNOWN: usize = 64;
-/// Longest time that the head of a request may take to come, all of it.
+/// Longest time that one of them may take for an answer.
 const PATIENCE: Duration = Duration::from_secs(5);
-/// Wait where the system gives no connection.
-const BACK_OFF: Duration = Duration::from_millis(50);
 
 /// The page, built of `page/` by `npm run build`.
 const PAGE: &str = include_str!("../page/dist/lab.html");
@@ -58,62 +53,24 @@ pub struct Server {
     once: Mutex<Option<String>>,
     policy: String,
     lab: Arc<Lab>,
-    strangers: Strangers,
     known: AtomicUsize,
 }
 
-/// Connections that have not shown the token, the oldest first.
-#[derive(Default)]
-struct Strangers(Mutex<VecDeque<(u64, TcpStream)>>);
-
-impl Strangers {
-    fn all(&self) -> MutexGuard<'_, VecDeque<(u64, TcpStream)>> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    /// One more; false where there is no descriptor for it.
-    fn enter(&self, number: u64, stream: &TcpStream) -> bool {
-        let Ok(own) = stream.try_clone() else {
-            self.give_way();
-            return false;
-        };
-        let mut all = self.all();
-        all.push_back((number, own));
-        let many = all.len() > STRANGERS;
-        drop(all);
-        if many {
-            self.give_way();
-        }
-        true
-    }
-
-    /// The oldest is closed.
-    fn give_way(&self) {
-        if let Some((_, oldest)) = self.all().pop_front() {
-            // It is gone already where this fails.
-            let _ = oldest.shutdown(Shutdown::Both);
-        }
-    }
-
-    /// It is over, or has shown the token.
-    fn leave(&self, number: u64) {
-        self.all().retain(|(known, _)| *known != number);
-    }
-}
-
 /// A connection that has shown the token, counted for as long as it is answered.
-struct Known<'a>(&'a AtomicUsize);
+struct Known(Arc<Server>);
 
-impl<'a> Known<'a> {
-    fn enter(all: &'a AtomicUsize) -> Self {
-        all.fetch_add(1, Ordering::Relaxed);
-        Self(all)
+impl Known {
+    /// One more, while there is room.
+    fn enter(server: &Arc<Server>) -> Option<Self> {
+        let before = server.known.fetch_add(1, Ordering::Relaxed);
+        let known = Self(Arc::clone(server));
+        (before < KNOWN).then_some(known)
     }
 }
 
-impl Drop for Known<'_> {
+impl Drop for Known {
     fn drop(&mut self) {
-        self.0.fetch_sub(1, Ordering::Relaxed);
+        self.0.known.fetch_sub(1, Ordering::Relaxed);
     }
 }
 
@@ -139,7 +96,6 @@ impl Server {
             once: Mutex::new(None),
             policy: policy(PAGE),
             lab: Arc::new(lab),
-            strangers: Strangers::default(),
             known: AtomicUsize::new(0),
         })
     }
@@ -170,47 +126,33 @@ impl Server {
     /// Serves for as long as the program runs.
     pub fn serve(self) {
         let server = Arc::new(self);
-        for (number, stream) in (0_u64..).zip(server.listener.incoming()) {
-            let Ok(stream) = stream else {
-                // No descriptor is left, or the peer is gone.
-                server.strangers.give_way();
-                thread::sleep(BACK_OFF);
-                continue;
+        reception::receive(&server.listener, |request, stream| {
+            let busy = |words: &str| Reply::refused(503, words);
+            if let Err(reply) = server.admits(&request) {
+                return Err((reply, stream));
+            }
+            let Some(known) = Known::enter(&server) else {
+                return Err((busy("too many connections"), stream));
             };
-            if !server.strangers.enter(number, &stream) {
-                continue;
+            // A thread that is not made takes its connection along: one to say so on.
+            let other = stream.try_clone();
+            let made = thread::Builder::new().spawn(move || known.0.answer(stream, &request));
+            match (made, other) {
+                (Err(_), Ok(stream)) => Err((busy("the system has no thread for it"), stream)),
+                _ => Ok(()),
             }
-            let own = Arc::clone(&server);
-            let made = thread::Builder::new().spawn(move || {
-                own.answer(stream, number);
-                own.strangers.leave(number);
-            });
-            if made.is_err() {
-                server.strangers.leave(number);
-                thread::sleep(BACK_OFF);
-            }
-        }
+        });
     }
 
-    fn answer(&self, mut stream: TcpStream, number: u64) {
+    fn answer(&self, mut stream: TcpStream, request: &Request) {
         let timed = stream
-            .set_read_timeout(Some(PATIENCE))
+            .set_nonblocking(false)
+            .and(stream.set_read_timeout(Some(PATIENCE)))
             .and(stream.set_write_timeout(Some(PATIENCE)));
         if timed.and(stream.set_nodelay(true)).is_err() {
             return;
         }
-        let request = Request::read(&mut stream, Instant::now() + PATIENCE);
-        let routed = request.and_then(|request| self.routed(&request));
-        let _known = match &routed {
-            Ok(_) => {
-                self.strangers.leave(number);
-                Some(Known::enter(&self.known))
-            }
-            Err(_) => None,
-        };
-        let many = self.known.load(Ordering::Relaxed) > KNOWN;
-        let reply = match routed {
-            Ok(_) if many => Reply::refused(503, "too many connections"),
+        let reply = match self.routed(request) {
             Ok(Route::Socket(key)) => return socket::run(stream, &key, &self.lab),
             Ok(Route::Reply(reply)) | Err(reply) => reply,
         };
@@ -218,7 +160,8 @@ impl Server {
         let _ = reply.write(&mut stream);
     }
 
-    fn routed(&self, request: &Request) -> Result<Route, Reply> {
+    /// Whether a request is one of this page.
+    fn admits(&self, request: &Request) -> Result<(), Reply> {
         let own = |authority: &str| {
             let port = self.address.port();
             authority == format!("127.0.0.1:{port}") || authority == format!("localhost:{port}")
@@ -230,13 +173,9 @@ impl Server {
         if request.origin.as_deref().is_some_and(foreign) {
             return Err(Reply::refused(403, "another origin"));
         }
-        let (token, rest) = request
-            .path
-            .trim_start_matches('/')
-            .split_once('/')
-            .unwrap_or((&request.path, ""));
+        let (token, rest) = request.token();
         if request.method == "GET" && rest.is_empty() && self.is_once(token) {
-            return Ok(Route::Reply(Reply::moved(&self.address())));
+            return Err(Reply::moved(&self.address()));
         }
         if !same(token, &self.token) {
             return Err(Reply::refused(403, "no token: open the address that hoid lab printed"));
@@ -244,7 +183,12 @@ impl Server {
         if request.method != "GET" {
             return Err(Reply::refused(405, "only GET"));
         }
-        let parts: Vec<&str> = rest.split('/').collect();
+        Ok(())
+    }
+
+    /// What an admitted request asks for.
+    fn routed(&self, request: &Request) -> Result<Route, Reply> {
+        let parts: Vec<&str> = request.token().1.split('/').collect();
         let file = |found: Result<Option<(Vec<u8>, &'static str)>, LabError>| match found {
             Ok(Some((body, kind))) => Ok(Route::Reply(Reply::file(body, kind))),
             Ok(None) => Err(Reply::refused(404, "not found")),

@@ -5,8 +5,12 @@ use std::{
     io::{Read as _, Write as _},
     net::TcpStream,
     path::Path,
+    sync::{
+        Arc,
+        atomic::{AtomicBool, Ordering},
+    },
     thread,
-    time::Duration,
+    time::{Duration, Instant},
 };
 
 use hoid_lab::{
@@ -335,6 +339,72 @@ fn slow_strangers_do_not_shut_the_page_out() {
     }
     let reply = at.get(&format!("/{}/", at.token), "");
     assert_eq!(status(&reply), "200");
+}
+
+/// A thousand connections of strangers, each of which begins again as soon as it is closed: silence, half a head,
+/// heads without the token or without an end, sockets, bytes of any kind. The page is answered within a second.
+#[test]
+fn a_thousand_hostile_connections_do_not_shut_the_page_out() {
+    const LONGEST: Duration = Duration::from_secs(1);
+    let dir = tempfile::tempdir().unwrap();
+    let at = served(dir.path(), Mode::Sessions);
+    let over = Arc::new(AtomicBool::new(false));
+    let (strangers, each) = (8, 125);
+    let threads: Vec<_> = (0..strangers)
+        .map(|stranger| {
+            let (host, over) = (at.host.clone(), Arc::clone(&over));
+            thread::spawn(move || {
+                let begin = |k: usize| -> Option<TcpStream> {
+                    let mut stream = TcpStream::connect(&host).ok()?;
+                    stream.set_nonblocking(true).ok()?;
+                    let said: &[u8] = match k % 6 {
+                        0 => b"",
+                        1 => b"GET / HTTP/1.1\r\nX: ",
+                        2 => b"GET /token/ HTTP/1.1\r\nHost: elsewhere\r\n\r\n",
+                        3 => &[b'x'; 20_000],
+                        4 => b"GET /socket HTTP/1.1\r\nConnection: Upgrade\r\nUpgrade: websocket\r\n\r\n",
+                        _ => &[0, 255, 13, 10, 13, 10, 7],
+                    };
+                    let _ = stream.write_all(said);
+                    Some(stream)
+                };
+                let mut all: Vec<Option<TcpStream>> = (0..each).map(|k| begin(k + stranger)).collect();
+                let mut begun = all.len();
+                while !over.load(Ordering::Relaxed) {
+                    for (k, place) in all.iter_mut().enumerate() {
+                        let closed = place.as_mut().is_none_or(|stream| {
+                            let mut reply = [0; 64];
+                            match stream.read(&mut reply) {
+                                Ok(read) => read == 0,
+                                Err(error) => error.kind() != std::io::ErrorKind::WouldBlock,
+                            }
+                        });
+                        if closed {
+                            *place = begin(k + stranger);
+                            begun += 1;
+                        }
+                    }
+                    thread::sleep(Duration::from_millis(10));
+                }
+                begun
+            })
+        })
+        .collect();
+    thread::sleep(Duration::from_millis(300));
+    let mut longest = Duration::ZERO;
+    for _ in 0..20 {
+        let began = Instant::now();
+        let reply = at.get(&format!("/{}/", at.token), "");
+        longest = longest.max(began.elapsed());
+        assert_eq!(status(&reply), "200");
+        thread::sleep(Duration::from_millis(50));
+    }
+    over.store(true, Ordering::Relaxed);
+    let begun: usize = threads.into_iter().map(|thread| thread.join().unwrap()).sum();
+    assert!(
+        longest < LONGEST && begun > strangers * each,
+        "{longest:?}, {begun} strangers"
+    );
 }
 
 /// What a browser is started with is read by others in the list of processes: it serves once.

@@ -214,4 +214,81 @@ mod tests {
             );
         }
     }
+
+    /// Numbers that were changed and sealed anew, as nobody does by accident: the tracker is refused or goes on, and
+    /// no place, length or bound out of them ends the process.
+    #[test]
+    fn numbers_that_were_changed_and_sealed_again_end_nothing() {
+        let record = record();
+        let span = record.span(0.0, 20.0).unwrap();
+        let bj = Structure::BoxJenkins;
+        let of = |method| TrackOptions::new(method, bj, bj.operator_orders(29));
+        let all = [
+            TrackOptions::new(Method::rls(), Structure::Arx, Structure::Arx.operator_orders(29)),
+            of(Method::rpem()),
+            of(Method::physical()).with(&[("track_delay", "0.2..0.35")]).unwrap(),
+            of(Method::multiple_model()),
+            TrackOptions::usual(Method::adaptive(), 29)
+                .with(&[("replay", "5")])
+                .unwrap(),
+            of(Method::ekf()),
+            of(Method::fused()),
+            of(Method::window()).with(&[("refit", "200")]).unwrap(),
+        ];
+        let sample = |k: usize| Sample {
+            e: record.input()[k],
+            u: record.output()[k],
+            reference: None,
+        };
+        let mut state = 54_u64;
+        let mut random = move |below: usize| {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
+            ((state >> 33) as usize) % below.max(1)
+        };
+        let extremes = [
+            0.0,
+            -1.0,
+            1.0,
+            3.0,
+            1e3,
+            1e6,
+            1e18,
+            1e300,
+            -1e300,
+            f64::NAN,
+            f64::INFINITY,
+            f64::NEG_INFINITY,
+            5e-324,
+            0.5,
+        ];
+        for options in all {
+            let mut tracker = Tracker::new(&options, Some(&span), record.sample_time()).unwrap();
+            (2000..2700).for_each(|k| {
+                tracker.update(sample(k), true);
+            });
+            let numbers = tracker.saved();
+            for _ in 0..600 {
+                let mut changed = numbers[..numbers.len() - 1].to_vec();
+                for _ in 0..=random(3) {
+                    let at = random(changed.len());
+                    changed[at] = extremes[random(extremes.len())];
+                }
+                let changed = sealed(changed);
+                if let Ok(mut restored) = Tracker::restored(&options, record.sample_time(), &changed) {
+                    for k in 2700..2760 {
+                        let missing = Sample {
+                            u: f64::NAN,
+                            ..sample(k)
+                        };
+                        restored.update(if k % 20 < 2 { missing } else { sample(k) }, true);
+                    }
+                    let numbers = restored.saved();
+                    let told = (restored.operator(), restored.covariance(), restored.response(3.0));
+                    assert!(numbers.len() > 1 || told.1.is_none());
+                }
+            }
+        }
+    }
 }

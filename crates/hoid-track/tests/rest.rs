@@ -82,8 +82,12 @@ fn smallest(of: &mut [(String, f64)], others: Vec<(String, f64)>) {
 /// A tracker after the stand, and the bars before it: of a guard that goes back the smallest of the numbers that
 /// it may have kept.
 fn through(options: &TrackOptions, record: &Record, stand: Stand, length_s: f64) -> (Tracker, Vec<(String, f64)>) {
-    let guarded = ["adaptive", "multiple-model", "physical"].contains(&options.method.name());
-    let goes_back = guarded && stand == Stand::FrozenU;
+    let goes_back = match options.method.name() {
+        // From the first sample on it learns, and its bars are not the same from one reading to the next.
+        "adaptive" => true,
+        "multiple-model" | "physical" => stand == Stand::FrozenU,
+        _ => false,
+    };
     let ts = record.sample_time().s();
     let first = (BEFORE_S / ts) as usize;
     let span = record.span(0.0, 20.0).unwrap();
@@ -95,7 +99,7 @@ fn through(options: &TrackOptions, record: &Record, stand: Stand, length_s: f64)
     };
     let mut kept: Option<Vec<(String, f64)>> = None;
     for k in 0..first {
-        tracker.update(at(k), k as f64 * ts >= 20.0);
+        tracker.update(at(k), options.method.starts_itself() || k as f64 * ts >= 20.0);
         if goes_back && (k as f64 * ts) >= BEFORE_S - KEPT_S {
             smallest(kept.get_or_insert_with(|| bars(&tracker)), bars(&tracker));
         }
@@ -124,10 +128,7 @@ fn all_options() -> Vec<TrackOptions> {
         .into_iter()
         .map(|method| TrackOptions::usual(method, DELAY))
         .collect();
-    for options in &mut all {
-        // What came before the rest is read again and again, and goes on to be.
-        let _ = options.method.set("replay", "0");
-    }
+    all.extend(TrackOptions::usual(Method::adaptive(), DELAY).with(&[("replay", "0")]));
     for (name, text) in [
         ("memory", "100"),
         ("forgetting", "directional"),

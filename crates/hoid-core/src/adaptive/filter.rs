@@ -63,6 +63,8 @@ pub struct AdaptiveFilter<E> {
     still: u64,
     /// Samples since then.
     settling: u64,
+    /// Samples that went into the filters alone.
+    passed: u64,
 }
 
 impl<E: AsMut<[f64]>> State for AdaptiveFilter<E> {
@@ -84,6 +86,7 @@ impl<E: AsMut<[f64]>> State for AdaptiveFilter<E> {
                 &mut self.age,
                 &mut self.still,
                 &mut self.settling,
+                &mut self.passed,
             ],
             each,
         );
@@ -138,6 +141,7 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
             age: 0,
             still: 0,
             settling: 0,
+            passed: 0,
         })
     }
 
@@ -300,6 +304,7 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         let through = through_filters(&self.saturation, use_of_it, u, u - innovation);
         if innovation.abs() < LARGEST && through.abs() < LARGEST {
             self.history.complete(u, use_of_it);
+            self.passed += 1;
             remember(&mut self.live, use_of_it, through);
             return Step {
                 innovation,
@@ -353,7 +358,7 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         self.history.clear();
         self.detector.pass_over();
         self.saturation = Saturation::new();
-        (self.powers, self.stage, self.age, self.replays) = ([0.0; 3], 0, 0, 0);
+        (self.powers, self.stage, self.age, self.replays, self.passed) = ([0.0; 3], 0, 0, 0, 0);
         self.alternatives = Alternatives::NONE;
         self.restarts += 1;
         self.began = false;
@@ -392,9 +397,9 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         &self.alternatives
     }
 
-    /// Samples of the record so far.
+    /// Samples of the record so far that said something: while nothing arrives nothing grows old.
     pub(super) fn read(&self) -> u64 {
-        self.history.samples()
+        self.history.samples().saturating_sub(self.passed)
     }
 
     pub(super) fn live(&self) -> &Candidate {

@@ -36,7 +36,7 @@ pub struct Bank<const M: usize> {
     detector: ChangeDetector,
 }
 
-crate::state!([const M: usize] Bank<M> { hypotheses, samples, until_birth, births, neuromuscular_from, detector });
+crate::state!([const M: usize] Bank<M> { hypotheses, samples, until_birth, births, neuromuscular_from, detector }, bounded);
 
 /// Mean of the mixture.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -53,6 +53,14 @@ const NEIGHBOURS: usize = 3;
 const LEAST_PROBABILITY: f64 = 1e-12;
 
 impl<const M: usize> Bank<M> {
+    fn bounded(&mut self) {
+        self.until_birth = self.until_birth.clamp(1, self.prior.birth_interval.max(1));
+        for h in self.hypotheses.iter_mut().flatten() {
+            h.born = h.born.min(self.samples);
+            h.extra_delay = h.extra_delay.min(self.prior.delay.count.saturating_sub(1));
+        }
+    }
+
     /// Starts from one hypothesis. `None` when M is below two, the start is not finite or not
     /// within the bounds, the bounds let omega_nm or zeta_nm become zero, or a number of the prior
     /// is outside its range.

@@ -36,7 +36,13 @@ pub struct MultipleModelFilter<const M: usize, const D: usize, B = [Signals; 1]>
 
 crate::state!([const M: usize, const D: usize, B: AsMut<[Signals]>] MultipleModelFilter<M, D, B> {
     bank, response, ring, d, order, u, past, restarts,
-});
+}, bounded);
+
+impl<const M: usize, const D: usize, B> MultipleModelFilter<M, D, B> {
+    fn bounded(&mut self) {
+        self.order = self.order.min(D);
+    }
+}
 
 impl<const M: usize, const D: usize> MultipleModelFilter<M, D> {
     /// Starts from one hypothesis with filters at rest, for a delay that is known. `None` when the

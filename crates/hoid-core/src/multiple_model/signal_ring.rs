@@ -48,6 +48,7 @@ impl<B: AsMut<[Signals]>> crate::state::State for SignalRing<B> {
     fn visit(&mut self, each: &mut dyn FnMut(&mut f64)) {
         self.memory.as_mut().visit(each);
         self.newest.visit(each);
+        self.newest = self.newest.min(self.memory.as_mut().len().saturating_sub(1));
     }
 }
 

@@ -1,9 +1,8 @@
 //! The head of a request, and replies.
 
 use std::{
-    io::{self, Read as _, Write as _},
+    io::{self, Write as _},
     net::TcpStream,
-    time::Instant,
 };
 
 /// Longest head of a request, bytes.
@@ -24,25 +23,19 @@ pub struct Request {
 }
 
 impl Request {
-    /// Reads a head, all of which comes until then.
-    pub fn read(stream: &mut TcpStream, until: Instant) -> Result<Self, Reply> {
-        let bad = || Reply::refused(400, "not a request of HTTP");
-        let mut head = Vec::new();
-        let mut part = [0; 2048];
-        while !head.windows(4).any(|four| four == b"\r\n\r\n") {
-            if head.len() > LONGEST {
-                return Err(Reply::refused(431, "the head of the request is too long"));
-            }
-            let left = until.saturating_duration_since(Instant::now());
-            if left.is_zero() || stream.set_read_timeout(Some(left)).is_err() {
-                return Err(Reply::refused(408, "the request did not come in time"));
-            }
-            match stream.read(&mut part) {
-                Ok(n) if n > 0 => head.extend_from_slice(&part[..n]),
-                _ => return Err(bad()),
-            }
+    /// The request of a head as far as it has come, or why it is none; nothing while there may be more of it.
+    pub fn of(head: &[u8]) -> Option<Result<Self, Reply>> {
+        if !head.windows(4).any(|four| four == b"\r\n\r\n") {
+            let long = head.len() > LONGEST;
+            return long.then(|| Err(Reply::refused(431, "the head of the request is too long")));
         }
-        Self::parse(&head).ok_or_else(bad)
+        Some(Self::parse(head).ok_or_else(|| Reply::refused(400, "not a request of HTTP")))
+    }
+
+    /// The token that it shows, and the path behind it.
+    pub fn token(&self) -> (&str, &str) {
+        let path = self.path.trim_start_matches('/');
+        path.split_once('/').unwrap_or((&self.path, ""))
     }
 
     fn parse(head: &[u8]) -> Option<Self> {
@@ -171,6 +164,11 @@ mod tests {
         assert_eq!(request.socket_key.as_deref(), Some("k"));
         let doubled = b"GET / HTTP/1.1\r\nHost: x\r\nHost: y\r\n\r\n";
         assert_eq!(Request::parse(doubled).unwrap().host, None);
+        assert_eq!(Request::of(head).unwrap().unwrap(), request);
+        for more in [&b""[..], b"GET / HTTP", &head[..head.len() - 1]] {
+            assert!(Request::of(more).is_none());
+        }
+        assert!(Request::of(&[b'x'; LONGEST + 1]).unwrap().is_err());
         for bad in [&b"GET\r\n\r\n"[..], b"\x16\x03\x01\r\n\r\n", b"GET / HTTP/1.1\r\nHost"] {
             assert_eq!(Request::parse(bad), None);
         }

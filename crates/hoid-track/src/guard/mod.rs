@@ -198,7 +198,8 @@ impl State for Guard {
         if let Some(reference) = &mut self.reference {
             reference.visit(each);
         }
-        self.in_ring = self.in_ring.min(self.ring.len());
+        // The next one that is held back has its place.
+        self.in_ring = self.in_ring.min(self.ring.len().saturating_sub(1));
         self.pause.kind = self.pause.kind.min(GuardKind::ALL.len());
         self.pause.channel = self.pause.channel.min(GuardChannel::ALL.len() - 1);
     }

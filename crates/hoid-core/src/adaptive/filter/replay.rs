@@ -160,7 +160,7 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
             let loser = if takes_over { &self.live } else { &trial };
             let behind = (evidence - self.live.evidence).abs();
             self.alternatives
-                .put(self.turn(), loser.operator(), behind, self.history.samples());
+                .put(self.turn(), loser.operator(), behind, self.read());
         }
         if takes_over {
             self.live = trial;

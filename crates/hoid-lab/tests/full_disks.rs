@@ -1,0 +1,261 @@
+//! Disks of 64 kB to 4 MB that fill at any instant of a session: what was told as logged is there, runs that were
+//! verified still are, and the session opens.
+//!
+//! A disk is a `tmpfs` of that size, which Linux lets an administrator mount; elsewhere the test says that it skips.
+#![cfg(target_os = "linux")]
+#![allow(clippy::unwrap_used)]
+
+use std::{
+    collections::BTreeMap,
+    fs,
+    io::Write as _,
+    path::Path,
+    process::{Command, Stdio},
+};
+
+use hoid_lab::{
+    config::{Condition, Config, Limits, Signal},
+    plant::InputMap,
+    session::{Batch, Begun, Event, Frame, How, Logged, RunLog, Session, Stem},
+    task::{Task, held_inputs},
+    verify::check,
+};
+
+const ROUNDS: usize = 200;
+const SMALLEST_KB: f64 = 64.0;
+const LARGEST_KB: f64 = 4096.0;
+const RUNS: usize = 3;
+
+const MAP: InputMap = InputMap {
+    centre: 512.0,
+    span: 300.0,
+    dead: 0.0,
+    gain: 1.0,
+};
+
+/// A disk of its own at a folder, for as long as it lives.
+struct Disk<'a>(&'a Path);
+
+impl<'a> Disk<'a> {
+    fn mount(at: &'a Path, kilobytes: usize) -> Option<Self> {
+        let size = format!("size={kilobytes}k");
+        let mount = Command::new("mount")
+            .args(["-t", "tmpfs", "-o", &size, "tmpfs"])
+            .arg(at)
+            .stderr(Stdio::null())
+            .status();
+        mount.is_ok_and(|status| status.success()).then_some(Self(at))
+    }
+}
+
+impl Drop for Disk<'_> {
+    fn drop(&mut self) {
+        let _ = Command::new("umount").arg(self.0).status();
+    }
+}
+
+fn config() -> Config {
+    Config {
+        condition: vec![Condition {
+            target: Some(Signal::default()),
+            controlled_element: "4/(s(0.2s+1))".to_owned(),
+            measurement_s: 3.0,
+            run_in_s: 1.0,
+            runs: RUNS,
+            ..Condition::default()
+        }],
+        ..Config::default()
+    }
+}
+
+fn batches(task: &Task) -> Vec<Batch> {
+    let events: Vec<Event> = (0..task.ticks / 8)
+        .map(|k| {
+            let stamp = 8.0 * k as f64 + 0.3;
+            let raw = 512.0 + 250.0 * ((k % 97) as f64 / 97.0 - 0.5);
+            Event::from((stamp.ceil(), stamp, stamp + 0.4, raw))
+        })
+        .collect();
+    let inputs: Vec<(usize, f64)> = events.iter().map(|v| (v.tick as usize, MAP.u(v.raw))).collect();
+    let u = held_inputs(&inputs, task.ticks);
+    let signals = task.run(&u);
+    let frames: Vec<Frame> = (0..)
+        .map(|k| 16.7 * f64::from(k) + 1.0)
+        .take_while(|drawn| *drawn < task.ticks as f64)
+        .map(|drawn| Frame::from((drawn - 0.5, drawn, drawn.floor(), signals.e[drawn as usize])))
+        .collect();
+    let within = |ms: f64, first: usize| (first as f64..(first + 50) as f64).contains(&ms);
+    (0..task.ticks)
+        .step_by(50)
+        .map(|first| {
+            let end = (first + 50).min(task.ticks);
+            Batch {
+                first,
+                u: u[first..end].to_vec(),
+                e: signals.e[first..end].to_vec(),
+                events: events.iter().filter(|v| within(v.tick, first)).copied().collect(),
+                frames: frames.iter().filter(|f| within(f.drawn_ms, first)).copied().collect(),
+            }
+        })
+        .collect()
+}
+
+/// Another takes all that is left.
+fn fill(ballast: &Path) {
+    let Ok(mut file) = fs::File::create(ballast) else {
+        return;
+    };
+    for part in [vec![0_u8; 1 << 16], vec![0; 1 << 10], vec![0; 7]] {
+        while file.write_all(&part).is_ok() {}
+    }
+}
+
+fn copied(from: &Path, to: &Path) {
+    fs::create_dir_all(to).unwrap();
+    for entry in fs::read_dir(from).unwrap().map(Result::unwrap) {
+        let target = to.join(entry.file_name());
+        match entry.file_type().unwrap().is_dir() {
+            true => copied(&entry.path(), &target),
+            false => drop(fs::copy(entry.path(), target).unwrap()),
+        }
+    }
+}
+
+/// What was told before the disk was full.
+#[derive(Default)]
+struct Told {
+    /// Ticks that were logged, of each run.
+    ticks: Vec<(Stem, usize)>,
+    verified: Vec<Stem>,
+}
+
+/// A session whose disk is full from a batch on, for so many batches.
+fn session(out: &Path, full: usize, until: usize, told: &mut Told) -> Option<Session> {
+    let ballast = out.join("ballast");
+    let mut session = Session::begin(out, &config(), "P01", false).ok()?;
+    let mut instant = 0_usize;
+    for _ in 0..RUNS {
+        let Ok(number) = session.new_number() else { break };
+        let Some(planned) = session.next() else { break };
+        let condition = session.facts.config.condition[0].clone();
+        let task = Task::new(&condition, 0, number as u64).unwrap();
+        let begun = Begun {
+            hoid: "test".to_owned(),
+            number,
+            planned,
+            training: false,
+            utc: String::new(),
+            condition,
+            cell: 0,
+            replication: number as u64,
+            run_in: task.run_in,
+            ticks: task.ticks,
+            input: MAP,
+            device: "mouse".to_owned(),
+            clock: "browser".to_owned(),
+            refresh_ms: 16.7,
+            zero_ms: 1000.0,
+            limits: Limits::default(),
+            phases: task.phases.clone(),
+        };
+        let stem = session.stem(&begun.condition.name, number);
+        let log = begun
+            .write(&stem, &task)
+            .and_then(|()| RunLog::create(&stem, task.ticks));
+        let mut how = How::Finished;
+        if let Ok(mut log) = log {
+            told.ticks.push((stem.clone(), 0));
+            for batch in batches(&task) {
+                if instant == full {
+                    fill(&ballast);
+                }
+                if instant == until {
+                    let _ = fs::remove_file(&ballast);
+                }
+                instant += 1;
+                if log.append(&batch).is_err() {
+                    how = How::Interrupted;
+                    break;
+                }
+                told.ticks.last_mut().unwrap().1 = batch.first + batch.u.len();
+            }
+            let _ = log.sync();
+        }
+        if session
+            .end(&stem, how, BTreeMap::new())
+            .is_ok_and(|checked| checked.is_verified())
+        {
+            told.verified.push(stem);
+        }
+    }
+    Some(session)
+}
+
+#[test]
+fn a_disk_that_fills_loses_nothing_that_was_told() {
+    let at = tempfile::tempdir().unwrap();
+    let mut state = 54_u64;
+    let mut random = move || {
+        state = state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        (state >> 11) as f64 / (1_u64 << 53) as f64
+    };
+    let (mut opened, mut verified, mut broken) = (0, 0, 0);
+    for round in 0..ROUNDS {
+        let kilobytes = SMALLEST_KB * (LARGEST_KB / SMALLEST_KB).powf(random());
+        let full = (random() * 80.0 * RUNS as f64) as usize;
+        let until = full + (random() * 120.0) as usize;
+        let Some(disk) = Disk::mount(at.path(), kilobytes as usize) else {
+            eprintln!("skipped: no disk of its own can be mounted here");
+            return;
+        };
+        let mut told = Told::default();
+        let session = session(at.path(), full, until, &mut told);
+        let elsewhere = tempfile::tempdir().unwrap();
+        let _ = fs::remove_file(at.path().join("ballast"));
+        copied(at.path(), elsewhere.path());
+        drop(disk);
+        let moved = |path: &Path| elsewhere.path().join(path.strip_prefix(at.path()).unwrap());
+        let Some(session) = session else {
+            assert!(told.ticks.is_empty());
+            continue;
+        };
+        let folder = moved(&session.folder);
+        let again = Session::open(&folder).unwrap_or_else(|error| panic!("{round}, {kilobytes:.0} kB: {error}"));
+        opened += 1;
+        for (number, stem) in Stem::all(&folder).unwrap() {
+            let same = |other: &&Stem| other.text() == stem.text();
+            let ticks = told
+                .ticks
+                .iter()
+                .find(|(other, _)| same(&other))
+                .map_or(0, |(_, ticks)| *ticks);
+            let logged = Logged::read(&stem).unwrap();
+            assert!(
+                logged.numbers.len() >= ticks,
+                "{round}, run {number}: {} of {ticks}",
+                logged.numbers.len()
+            );
+            if told.verified.iter().any(|other| same(&other)) {
+                assert!(check(&stem).unwrap().is_verified(), "{round}, run {number}");
+                assert!(
+                    again
+                        .done
+                        .iter()
+                        .any(|done| done.number == number && done.verdict == "verified")
+                );
+                verified += 1;
+            } else if ticks < 4000 {
+                broken += 1;
+            }
+        }
+        // And it goes on.
+        assert!(again.new_number().is_ok());
+        again.save().unwrap();
+    }
+    assert!(
+        opened > ROUNDS / 2 && verified > ROUNDS / 4 && broken > ROUNDS / 4,
+        "{opened} {verified} {broken}"
+    );
+}
