@@ -353,6 +353,14 @@ impl Mixture {
         c
     }
 
+    /// The mean over the hypotheses of what each says.
+    pub fn mean_of(&self, what: impl Fn(&[f64; STATES], &Covariance) -> f64) -> f64 {
+        self.all()
+            .iter()
+            .map(|h| h.weight() * what(&h.state, &h.covariance))
+            .sum()
+    }
+
     /// Innovation variance.
     pub fn variance(&self) -> f64 {
         self.all().iter().map(|h| h.weight() * h.variance).sum()

@@ -46,6 +46,30 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         core::array::from_fn(|i| core::array::from_fn(|j| own[i][j] + scatter[i][j]))
     }
 
+    /// T_L in s and its variance. Each hypothesis has the T that makes its `E (K_e_dot - T K_e)^2` least, and T_L is
+    /// their mean; the variance is that of the difference by the covariance of all. By that covariance alone T_L
+    /// would be far too short where some unlikely hypotheses, as those of the last second, leave K_e open.
+    pub fn lead_time(&self) -> [f64; 2] {
+        let map = self.gain_and_lead();
+        let pair = |state: &[f64; STATES]| map.map(|row| (0..GAINS).map(|k| row[k] * state[k]).sum::<f64>());
+        let product = |c: &[[f64; STATES]; STATES], i: usize, j: usize| -> f64 {
+            let each = (0..GAINS).map(|a| map[i][a] * (0..GAINS).map(|b| c[a][b] * map[j][b]).sum::<f64>());
+            each.sum()
+        };
+        let lead = self.live().mixture.mean_of(|state, c| {
+            let [k, k_dot] = pair(state);
+            let square = k * k + product(c, 0, 0);
+            match square > 0.0 {
+                true => (k * k_dot + product(c, 0, 1)) / square,
+                false => 0.0,
+            }
+        });
+        let (all, [k, ..]) = (self.operator_covariance(), self.operator());
+        let square = k * k + all[0][0];
+        let variance = all[1][1] - 2.0 * lead * all[0][1] + lead * lead * all[0][0];
+        [lead, variance.max(0.0) / square]
+    }
+
     /// K_e and K_e_dot by the gains of the basis.
     pub fn gain_and_lead(&self) -> [[f64; GAINS]; 2] {
         self.basis().gain_and_lead(&NEAR_RAD_S)

@@ -39,7 +39,7 @@ pub const REPLAYED_S: f64 = 100.0;
 /// How the operator changes.
 const CHANGES: ChangePrior = ChangePrior {
     block: 0.32,
-    between: 60.0,
+    between: 180.0,
     jump: [0.3, 0.4],
     drift: [0.003, 0.05],
     settling: [0.1, 3.0],

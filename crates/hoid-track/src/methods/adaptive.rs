@@ -265,14 +265,6 @@ impl AdaptiveRecursion {
     }
 }
 
-/// T that makes `E (K_e_dot - T K_e)^2` least, and its variance.
-fn lead_time([k_e, k_e_dot]: [f64; 2], c: &[[f64; 2]; 2]) -> [f64; 2] {
-    let square = k_e * k_e + c[0][0];
-    let lead = (k_e * k_e_dot + c[0][1]) / square;
-    let variance = c[1][1] - 2.0 * lead * c[0][1] + lead * lead * c[0][0];
-    [lead, variance.max(0.0) / square]
-}
-
 fn unusable(what: &str) -> IdentError {
     IdentError::BadStart {
         reason: format!("the basis of people cannot be made for {what}; check nk and the sample time"),
@@ -326,10 +318,8 @@ impl Recursion for AdaptiveRecursion {
 
     fn operator(&self) -> Option<OperatorEstimate> {
         let (values, covariance) = (self.model.operator(), self.model.operator_covariance());
-        let [k_e, k_e_dot, ..] = values;
-        let of_gains = [0, 1].map(|i| [0, 1].map(|j| covariance[i][j]));
         let [lead, lead_variance] = match self.model.began() {
-            true => lead_time([k_e, k_e_dot], &of_gains),
+            true => self.model.lead_time(),
             false => [f64::NAN; 2],
         };
         let of = |i: usize| Estimate::with_variance(values[i], covariance[i][i]);

@@ -41,6 +41,48 @@ fn a_change_of_the_person_is_followed() {
     assert!((last.k_e_dot.value - 0.084).abs() < 0.02, "{last:?}");
 }
 
+/// T_L after a change over the truth, rows from 9 s behind it on, the mean of four runs. With the covariance of all
+/// hypotheses in one quotient it was .76.
+#[test]
+fn the_lead_after_a_change_is_not_too_short() {
+    let simulator = Simulator::new(&Scenario::condition(Condition::C4)).unwrap();
+    let (mut sum, mut rows) = (0.0, 0.0);
+    for replication in 0..4 {
+        let seed = RunSeed {
+            seed: 460,
+            cell: 0,
+            replication,
+        };
+        let record = simulator.run(seed, false).unwrap();
+        let truth = record.channel("T_L").unwrap();
+        let trace = track(&record, &options(), 100).unwrap();
+        for row in 0..trace.len() {
+            let k = 100 * row;
+            if record.time_s(k) >= 50.0 {
+                sum += trace.operator(row).unwrap().t_l_s.value / truth[k];
+                rows += 1.0;
+            }
+        }
+    }
+    let over_truth = sum / rows;
+    assert!((over_truth - 1.0).abs() < 0.08, "{over_truth}");
+}
+
+#[test]
+fn of_no_response_at_all_no_lead_is_told_that_is_not_a_number() {
+    let mut tracker = Tracker::new(&options(), None, SampleTime::HUNDREDTH).unwrap();
+    for k in 0..400 {
+        tracker.step((0.07 * f64::from(k)).sin(), 0.0);
+    }
+    if let Ok(operator) = tracker.operator() {
+        let lead = operator.rows()[1].2;
+        assert!(
+            lead.value.is_finite() && lead.standard_error.unwrap().is_finite(),
+            "{lead:?}"
+        );
+    }
+}
+
 #[test]
 fn responses_have_bands_from_the_first_second_on() {
     let record = record(Condition::C1);
