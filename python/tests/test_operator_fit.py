@@ -70,6 +70,12 @@ def test_what_a_fit_holds(found: pyhoid.OperatorFit) -> None:
     assert found.open_loop is not None
     crossover, margin = found.open_loop["crossover_rad_s"], found.open_loop["phase_margin_deg"]
     assert crossover is not None and margin is not None and margin.standard_error is not None
+    shape = found.loop_shape
+    assert shape is not None and shape["stable"] is True
+    lowest = shape["crossovers"][0]
+    assert lowest[0].value == pytest.approx(crossover.value, rel=1e-12)
+    assert lowest[1].standard_error == pytest.approx(margin.standard_error, rel=1e-6)
+    assert shape["gain_margin_db"].value > 0 and shape["gain_margin_db"].standard_error > 0
     assert found.open_loop_intervals is not None
     ends = found.open_loop_intervals["phase_margin_deg"]
     # Student's quantile is wider than the normal one.

@@ -50,8 +50,19 @@ def test_bode_and_describing_function(fit: pyhoid.Fit, c1: pyhoid.Record, tmp_pa
     axes = plots.describing(found, {"BJ": fit})
     assert "describing function" in axes[0].get_legend_handles_labels()[1]
     drawn(axes[0], tmp_path)
+    described = pyhoid.describe(c1, excitation="f_t")
+    points = plots.describing(described)[0].get_lines()[0]
+    assert np.array_equal(points.get_ydata(), described.function["magnitude_db"])
     with pytest.raises(pyhoid.OptionError):
         plots.bode(fit, axes=[magnitude])
+
+
+def test_the_curves_set_the_scale_of_a_bode_plot(fit: pyhoid.Fit) -> None:
+    magnitude, _ = plots.bode(fit, np.geomspace(0.1, 300, 60))
+    values = magnitude.get_lines()[0].get_ydata()
+    low, high = magnitude.get_ylim()
+    # Bands of hundreds of dB beyond pi/Ts do not.
+    assert high - low < 1.6 * np.ptp(values) + 1e-9
 
 
 def test_an_operator_is_drawn_as_a_fit_is(fit: pyhoid.Fit, c1: pyhoid.Record) -> None:

@@ -3,11 +3,13 @@
 use hoid::analysis::{Account, Setting};
 use hoid::ident::{
     Choice, Fit, GreyBoxFit, MarginEstimates,
+    family::LoopShape,
     order_selection::Criterion,
     validation::{GoodnessOfFit, Validation},
 };
 use hoid::model::{
     GainUnit, NotConvertible, Record, Verdict,
+    margins::Crossings,
     uncertainty::{Estimate, OperatorEstimate, RemnantEstimate},
 };
 use hoid::report::numbers;
@@ -321,6 +323,54 @@ pub fn margins(m: &MarginEstimates) -> String {
         or_none(m.gain_margin_db, "dB"),
         or_none(m.phase_crossover_rad_s, "rad/s"),
     )
+}
+
+/// Crossover and margins of a loop that is known in a line, and each crossover where there are several.
+pub fn crossings(all: &Crossings) -> String {
+    let mut line = margins(&all.margins().into());
+    if all.gain.len() > 1 {
+        let each = (all.gain.iter()).map(|c| format!("{:.4} rad/s ({:.1} deg)", c.omega_rad_s, c.margin));
+        line.push_str(&format!(
+            "The gain is one at {} frequencies, each with its phase margin: {}.\n",
+            all.gain.len(),
+            each.collect::<Vec<_>>().join(", ")
+        ));
+    }
+    line
+}
+
+/// What there is to say of the loop of an estimate beside its lowest crossover: the others, the smallest phase margin,
+/// the gain margin, and that it is not stable. Nothing is said of one that crosses once and is stable, unless it is asked for.
+pub fn loop_shape(shape: &LoopShape, always: bool) -> String {
+    if !always && shape.crossovers.len() < 2 && shape.is_stable() != Some(false) {
+        return String::new();
+    }
+    let mut parts = Vec::new();
+    if let ([_, others @ ..], Some((omega, margin))) = (shape.crossovers.as_slice(), shape.smallest_margin())
+        && !others.is_empty()
+    {
+        let each = (others.iter()).map(|(w, m)| format!("{} rad/s ({:.0} deg)", significant(w.value), m.value));
+        parts.push(format!("gain one also at {}", each.collect::<Vec<_>>().join(", ")));
+        parts.push(format!(
+            "smallest phase margin {} deg, at {} rad/s",
+            plus_minus(&margin),
+            significant(omega.value)
+        ));
+    }
+    if let Some((omega, db)) = &shape.gain_margin {
+        parts.push(format!(
+            "gain margin {} dB at {} rad/s",
+            plus_minus(db),
+            significant(omega.value)
+        ));
+    }
+    if shape.is_stable() == Some(false) {
+        parts.push("the closed loop is not stable".to_owned());
+    }
+    if parts.is_empty() {
+        return String::new();
+    }
+    format!("Of this loop: {}.\n", parts.join("; "))
 }
 
 /// Poles and zeros with their natural frequency and damping.

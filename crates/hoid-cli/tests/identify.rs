@@ -406,3 +406,42 @@ fn several_records_start_validation_report_and_margins() {
     let page = fs::read_to_string(d.join("out/report.html")).unwrap();
     assert!(page.contains("<svg") && page.contains("again.csv"), "{}", page.len());
 }
+
+/// The gain of the loop is one at three frequencies with this element: stable at the lowest crossover, not as a whole.
+#[test]
+fn a_loop_that_is_not_stable_is_a_doubt() {
+    let directory = simulated();
+    let d = directory.path();
+    let arguments = [
+        "identify",
+        "c1.csv",
+        "--form",
+        "lead",
+        "--orders",
+        "nd=1",
+        "--controlled-element",
+        "20/s",
+    ];
+    let found = json(d, &[&arguments[..], &["--json"]].concat());
+    let open_loop = &found["open_loop"];
+    let crossovers = open_loop["crossovers"].as_array().unwrap();
+    assert!(crossovers.len() == 3 && open_loop["stable"] == false, "{open_loop}");
+    let value = |of: &serde_json::Value| of["crossover_rad_s"]["value"].as_f64().unwrap();
+    assert!(
+        (value(&crossovers[0]) / value(open_loop) - 1.0).abs() < 1e-12,
+        "{open_loop}"
+    );
+    assert!(open_loop["gain_margin_db"]["value"].as_f64().unwrap() < 0.0);
+    let reasons = found["verdict"]["reasons"].as_array().unwrap();
+    assert!(
+        reasons
+            .iter()
+            .any(|r| r["kind"] == "unstable-loop" && r["severity"] == "doubt"),
+        "{reasons:?}"
+    );
+    let text = good(d, &arguments);
+    assert!(
+        text.contains("Of this loop: gain one also at") && text.contains("is not stable"),
+        "{text}"
+    );
+}

@@ -409,6 +409,22 @@ fn late_lines_are_bridged_and_lines_behind_are_dropped() {
 }
 
 #[test]
+fn a_stream_without_a_sample_is_no_success() {
+    let mut stream = Stream::new(&AT_ONCE);
+    stream.write("t;e;u\n");
+    for k in 0..5 {
+        let line = stream.ask(&format!("0,0{k};0,{k};-0,{k}"));
+        assert!(line["fault"].as_str().unwrap().contains("dropped"), "{line}");
+    }
+    let (status, _, said) = stream.end();
+    assert_eq!(status.code(), Some(1), "{said}");
+    assert!(
+        said.contains("no line of the stream was a sample, 5 lines dropped"),
+        "{said}"
+    );
+}
+
+#[test]
 fn a_warm_up_that_fails_goes_on_until_there_is_something_to_fit() {
     let directory = TempDir::new().unwrap();
     let text = simulated(directory.path(), "1");

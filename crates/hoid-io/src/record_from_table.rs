@@ -65,6 +65,7 @@ pub(crate) fn record_of(
         options,
         file,
         steps,
+        signals: input.into_iter().chain([output]).flat_map(Signal::columns).collect(),
     };
     let grid = reader.time_grid(time)?;
     let input = input.zip(options.input.as_ref());

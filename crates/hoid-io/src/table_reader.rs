@@ -17,6 +17,8 @@ pub(crate) struct TableReader<'a> {
     pub(crate) options: &'a ReadOptions,
     pub(crate) file: String,
     pub(crate) steps: Vec<Step>,
+    /// Columns of the input and the output.
+    pub(crate) signals: Vec<usize>,
 }
 
 impl TableReader<'_> {
@@ -25,6 +27,71 @@ impl TableReader<'_> {
             file: self.file.clone(),
             source,
         }
+    }
+
+    /// The part of these rows in which all signals have values on both sides, where missing ones are bridged: two topics in
+    /// one table do not begin and end in the same row.
+    pub(crate) fn between_values(&mut self, rows: Range<usize>, time: Option<usize>) -> Range<usize> {
+        if !self.options.repair.fill {
+            return rows;
+        }
+        let finite = |column: &usize, row: &usize| self.table.columns[*column].values[*row].is_finite();
+        let begins = |column: &usize| rows.clone().find(|row| finite(column, row));
+        let ends = |column: &usize| rows.clone().rev().find(|row| finite(column, row));
+        let first = self.signals.iter().map(begins).collect::<Option<Vec<_>>>();
+        let last = self.signals.iter().map(ends).collect::<Option<Vec<_>>>();
+        let bounds = (first.and_then(|all| all.into_iter().max())).zip(last.and_then(|all| all.into_iter().min()));
+        let Some((first, last)) = bounds.filter(|(first, last)| first < last) else {
+            return rows;
+        };
+        let (before, behind) = (first - rows.start, rows.end - 1 - last);
+        if before + behind > 0 {
+            let names: Vec<String> = (self.signals.iter())
+                .map(|column| named(&self.table.columns[*column].name))
+                .collect();
+            self.table.notes.push(format!(
+                "{before} rows at the start and {behind} at the end are left out: {} have not all a value there to bridge to",
+                names.join(" and ")
+            ));
+        }
+        // The first and the last row of the part lie between values that the part does not hold.
+        for at in [first, last] {
+            for &column in &self.signals {
+                if let Some(value) = self.between(column, at, &rows, time) {
+                    self.table.columns[column].values[at] = value;
+                }
+            }
+        }
+        first..last + 1
+    }
+
+    /// The value of a column that is missing in a row, on the line between its neighbours; `None` where it is not missing,
+    /// or there is none on a side.
+    fn between(&self, column: usize, at: usize, rows: &Range<usize>, time: Option<usize>) -> Option<f64> {
+        let source = &self.table.columns[column];
+        if !source.values[at].is_nan() || source.texts.binary_search(&at).is_ok() {
+            return None;
+        }
+        let finite = |row: &usize| source.values[*row].is_finite();
+        let (before, behind) = ((rows.start..at).rev().find(finite)?, (at + 1..rows.end).find(finite)?);
+        let x = |row: usize| time.map_or(row as f64, |time| self.table.columns[time].values[row]);
+        let part = (x(at) - x(before)) / (x(behind) - x(before));
+        let value = source.values[before] + part * (source.values[behind] - source.values[before]);
+        value.is_finite().then_some(value)
+    }
+
+    /// The time between two samples of the signal that has the more of them, where that is less than all rows: each of two
+    /// topics in one table has a clock of its own.
+    pub(crate) fn own_times(&self, rows: &Range<usize>, t: &[f64]) -> Option<Vec<f64>> {
+        let of = |column: &usize| -> Vec<f64> {
+            let values = &self.table.columns[*column].values[rows.clone()];
+            // The first and the last row may be filled.
+            let inside = values.iter().zip(t).skip(1).take(values.len().saturating_sub(2));
+            let own = inside.filter(|(value, _)| value.is_finite());
+            own.map(|(_, t)| *t).collect()
+        };
+        let densest = self.signals.iter().map(of).max_by_key(Vec::len)?;
+        (densest.len() > 2 && densest.len() + 2 < t.len()).then_some(densest)
     }
 
     /// The values of a column in use: all finite, the missing ones bridged where that was asked

@@ -79,6 +79,7 @@ impl TableReader<'_> {
         }
         let times: Vec<f64> = (0..self.table.rows).map(|k| start + k as f64 * ts).collect();
         let rows = self.rows(&times)?;
+        let rows = self.between_values(rows, None);
         Ok(TimeGrid {
             start_s: times[rows.start],
             rows,
@@ -91,6 +92,7 @@ impl TableReader<'_> {
     /// The sampling of the column t, or the one to resample it to.
     fn grid_of_t(&mut self, time: usize, given: Option<SampleTime>) -> Result<TimeGrid, IoError> {
         let rows = self.rows(&self.table.columns[time].values)?;
+        let rows = self.between_values(rows, Some(time));
         let t = self.values(time, rows.clone(), None)?;
         let precision = self.table.columns[time].precision;
         let stated = self.table.sample_time_s;
@@ -108,7 +110,8 @@ impl TableReader<'_> {
             }
             (Err(Uneven::Gap { .. } | Uneven::Jitter { .. }), Some(given)) => Ok(given),
             (Err(Uneven::Gap { .. } | Uneven::Jitter { .. }), None) if self.options.repair.resample => {
-                match sampling::typical(&t, precision) {
+                let own = self.own_times(&rows, &t);
+                match sampling::typical(own.as_deref().unwrap_or(&t), precision) {
                     Ok(ts) => Ok(self.sample_time(ts)?),
                     Err(uneven) => Err(uneven),
                 }

@@ -198,6 +198,65 @@ fn fill_bridges_and_says_so() {
     );
 }
 
+/// An outer join of two topics: each row lacks one of the two, and neither begins nor ends with both.
+#[test]
+fn two_topics_in_one_table_are_read_where_both_have_values() {
+    let desk = Desk::new();
+    let both = Repair {
+        fill: true,
+        resample: true,
+    };
+    let ask = |repair| ReadOptions { repair, ..defaults() };
+    // On one clock, e in every second row.
+    let mut text = String::from("t,e,u\n");
+    for k in 0..=21 {
+        let t = 0.01 * f64::from(k);
+        let e = if k % 2 == 1 {
+            format!("{}", 10.0 * t)
+        } else {
+            String::new()
+        };
+        text.push_str(&format!("{t:.2},{e},{}\n", 1.0 - t));
+    }
+    assert!(desk.error(&text, &defaults()).contains("--fill"));
+    let read = desk.read(&text, &ask(FILL)).unwrap();
+    assert_eq!((read.record.len(), read.record.time_s(0)), (21, 0.01));
+    for k in 0..21 {
+        let t = 0.01 * f64::from(k + 1);
+        assert!((read.record.input()[k as usize] - 10.0 * t).abs() < 1e-13);
+    }
+    assert_eq!(
+        read.notes,
+        ["1 rows at the start and 0 at the end are left out: e and u have not all a value there to bridge to"]
+    );
+    // On clocks of their own, 50 and 40 Hz, without a stamp in common: the grid is that of the faster.
+    let mut rows: Vec<(f64, bool)> = (0..50).map(|k| (0.02 * f64::from(k), true)).collect();
+    rows.extend((0..40).map(|k| (0.013 + 0.025 * f64::from(k), false)));
+    rows.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let mut text = String::from("t,e,u\n");
+    for (t, is_e) in rows {
+        let row = if is_e {
+            format!("{t:.3},{},\n", 10.0 * t)
+        } else {
+            format!("{t:.3},,{}\n", 1.0 - t)
+        };
+        text.push_str(&row);
+    }
+    let read = desk.read(&text, &ask(both)).unwrap();
+    assert!((read.record.sample_time().s() - 0.02).abs() < 1e-12);
+    for k in 0..read.record.len() {
+        let t = read.record.time_s(k);
+        assert!(
+            (read.record.input()[k] - 10.0 * t).abs() < 1e-12 && (read.record.output()[k] - (1.0 - t)).abs() < 1e-12
+        );
+    }
+    // Nothing in common at all: the error says so.
+    assert!(
+        desk.error("t,e,u\n0,1,\n1,2,\n2,,1\n3,,2\n", &ask(FILL))
+            .contains("missing up to")
+    );
+}
+
 #[test]
 fn resample_goes_over_gaps_and_jitter() {
     let desk = Desk::new();

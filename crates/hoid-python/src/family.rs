@@ -1,7 +1,7 @@
 //! `pyhoid.identify` by default: the operator of a person, of the family of operators.
 
 use hoid_analysis::Identified;
-use hoid_ident::family::{AgreementMethod, ClusterKind, FormFigures, LoopMeasures, Parameter};
+use hoid_ident::family::{AgreementMethod, ClusterKind, FormFigures, LoopMeasures, LoopShape, Parameter};
 use numpy::{PyArray1, PyArray2, PyReadonlyArray1};
 use pyo3::{prelude::*, types::PyDict};
 
@@ -56,6 +56,21 @@ fn loop_intervals<'py>(py: Python<'py>, measures: Option<LoopMeasures>) -> PyRes
     let all = PyDict::new(py);
     all.set_item("crossover_rad_s", measures.and_then(|m| m.crossover_interval))?;
     all.set_item("phase_margin_deg", measures.and_then(|m| m.phase_margin_interval))?;
+    Ok(all)
+}
+
+/// Every crossing, the smallest phase margin, the gain margin, and whether the closed loop is stable.
+fn shape_parts<'py>(py: Python<'py>, shape: &LoopShape) -> PyResult<Bound<'py, PyDict>> {
+    let all = PyDict::new(py);
+    let crossovers: Vec<(Pair, Pair)> = shape.crossovers.iter().map(|(w, m)| (pair(*w), pair(*m))).collect();
+    all.set_item("crossovers", crossovers)?;
+    all.set_item(
+        "smallest_phase_margin_deg",
+        shape.smallest_margin().map(|(_, m)| pair(m)),
+    )?;
+    all.set_item("gain_margin_db", shape.gain_margin.map(|(_, db)| pair(db)))?;
+    all.set_item("phase_crossover_rad_s", shape.gain_margin.map(|(omega, _)| pair(omega)))?;
+    all.set_item("stable", shape.is_stable())?;
     Ok(all)
 }
 
@@ -244,6 +259,13 @@ impl PyOperatorFit {
     #[getter]
     fn open_loop<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
         let of = |element| loop_parts(py, self.0.fit.loop_measures(0, element));
+        self.0.controlled_element.as_ref().map(of).transpose()
+    }
+
+    /// Every crossing of the loop, and whether it is stable; none without a controlled element.
+    #[getter]
+    fn loop_shape<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
+        let of = |element| shape_parts(py, &self.0.fit.loop_shape(0, element));
         self.0.controlled_element.as_ref().map(of).transpose()
     }
 

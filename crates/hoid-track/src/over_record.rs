@@ -123,6 +123,7 @@ pub(crate) fn track_with(
         trace.change_odds.extend(tracker.change_odds());
     }
     trace.response_doubt = tracker.response_doubt();
+    trace.loop_shape = tracker.open_loop_shape();
     trace.response_is_known = tracker.response_is_known();
     trace.counts = tracker.counts;
     trace.guarded = tracker.guard.is_some();

@@ -62,6 +62,19 @@ impl Response {
         (a * a * c[0][0] + 2.0 * a * b * c[0][1] + b * b * c[1][1]) / (square * square)
     }
 
+    /// Covariance of real and imaginary part of `dH/H`; `None` where there is none.
+    pub(crate) fn relative_covariance(&self) -> Option<[[f64; 2]; 2]> {
+        let [re, im] = self.value;
+        let (real, imaginary) = (self.along([re, im]), self.along([-im, re]));
+        // Along both: their sum holds the covariance twice.
+        let both = self.along([re - im, im + re]);
+        let cross = 0.5 * (both - real - imaginary);
+        [real, imaginary, cross]
+            .iter()
+            .all(|v| v.is_finite())
+            .then_some([[real, cross], [cross, imaginary]])
+    }
+
     /// Real and imaginary part of polynomials theta with these orders.
     pub(crate) fn value_of_polynomials(
         orders: &Orders,
@@ -236,5 +249,18 @@ mod tests {
         assert!((gain.standard_error.unwrap() - DB * 0.01).abs() < 1e-12);
         assert!((phase.standard_error.unwrap() - 0.02_f64.to_degrees()).abs() < 1e-12);
         assert!(at(&THETA, None).gain_db().standard_error.is_none());
+        // dH/H = dH/(-10 j): the imaginary part is along H.
+        let [[a, b], [_, c]] = response.relative_covariance().unwrap();
+        assert!((a - 1e-4).abs() < 1e-15 && b.abs() < 1e-15 && (c - 4e-4).abs() < 1e-15);
+        let oblique = Response {
+            value: [3.0, 4.0],
+            covariance: [[0.04, 0.01], [0.01, 0.09]],
+        };
+        // M C M' with M = [[3, 4], [-4, 3]]/25.
+        let [[a, b], [_, c]] = oblique.relative_covariance().unwrap();
+        for (found, expected) in [(a, 2.04), (b, 0.53), (c, 1.21)] {
+            assert!((found - expected / 625.0).abs() < 1e-15, "{found} {expected}");
+        }
+        assert_eq!(at(&THETA, None).relative_covariance(), None);
     }
 }

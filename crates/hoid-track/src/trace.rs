@@ -12,7 +12,7 @@ use crate::{
     recursion::Delay,
     response::Response,
 };
-use hoid_ident::{Fit, IdentError};
+use hoid_ident::{Fit, IdentError, family::LoopShape};
 
 /// The estimate at every sample that was kept, with its uncertainty.
 #[derive(Debug, Clone, PartialEq)]
@@ -55,6 +55,8 @@ pub struct Trace {
     pub(crate) failures: Option<(usize, String)>,
     /// What the response at the end says against who is said to have held the loop.
     pub(crate) response_doubt: Option<Finding>,
+    /// Every crossing of the loop at the end with its controlled element.
+    pub(crate) loop_shape: Option<LoopShape>,
     /// True where the response at the end is determined at some frequency, whatever gain and lead are.
     pub(crate) response_is_known: bool,
     /// Samples between two rows.
@@ -96,6 +98,7 @@ impl Trace {
             start: None,
             failures: None,
             response_doubt: None,
+            loop_shape: None,
             response_is_known: false,
             every,
             averaged: 1,
@@ -246,6 +249,12 @@ impl Trace {
         }
         let from = (row * count + place) * Response::NUMBERS;
         Response::unpacked(&self.responses[from..from + Response::NUMBERS])
+    }
+
+    /// Every crossing of the loop of the last row with the controlled element of the options, and whether it is
+    /// stable; `None` without one.
+    pub fn loop_shape(&self) -> Option<&LoopShape> {
+        self.loop_shape.as_ref()
     }
 
     /// Crossover and phase margin of a row with the controlled element of the options; `None` without

@@ -1,9 +1,12 @@
 //! A recursive estimate that takes one sample at a time.
 
 use hoid_core::guard::reference::ReferenceModel;
-use hoid_ident::{Fit, IdentError, family::loop_doubt};
+use hoid_ident::{
+    Fit, IdentError,
+    family::{KnownResponse, LoopShape},
+};
 use hoid_model::{
-    Complex64, Finding, NotConvertible, Orders, Record, SampleTime,
+    Complex64, ContinuousTransferFunction, Finding, NotConvertible, Orders, Record, SampleTime,
     uncertainty::{Estimate, OperatorEstimate},
 };
 
@@ -274,23 +277,37 @@ impl Tracker {
         self.options.method.lag_of_basis_s().is_some() && KNOWN_AT_RAD_S.iter().any(known)
     }
 
+    /// Every crossing of the loop of now with its controlled element; `None` without one, or without an estimate.
+    pub(crate) fn open_loop_shape(&self) -> Option<LoopShape> {
+        let element = self.options.controlled_element.as_ref()?;
+        self.response(1.0)?;
+        Some(self.loop_shape(element))
+    }
+
+    fn loop_shape(&self, element: &ContinuousTransferFunction) -> LoopShape {
+        let known = |omega: f64| {
+            let unknown = KnownResponse {
+                value: Complex64::new(f64::NAN, f64::NAN),
+                relative: None,
+            };
+            self.response(omega).map_or(unknown, |response| KnownResponse {
+                value: Complex64::new(response.value[0], response.value[1]),
+                relative: response.relative_covariance(),
+            })
+        };
+        LoopShape::of(known, element, self.sample_time)
+    }
+
     /// What the response of now says against who is said to have held the loop: with a controlled element the loop that
-    /// they would make ([`loop_doubt`]), without one the sign of the response at low frequencies.
+    /// they would make ([`LoopShape::doubt`]), without one the sign of the response at low frequencies.
     pub(crate) fn response_doubt(&self) -> Option<Finding> {
         if let Some(element) = &self.options.controlled_element {
-            let crossing = match self.open_loop()? {
-                Ok(found) => Some((
-                    found.crossover_rad_s.value,
-                    NORMAL * found.phase_margin_deg.standard_error.unwrap_or(0.0),
-                )),
-                Err(NoCrossover::NeverFalls) => None,
+            let reach = match self.open_loop()? {
+                Ok(found) => NORMAL * found.phase_margin_deg.standard_error.unwrap_or(0.0),
+                Err(NoCrossover::NeverFalls) => 0.0,
                 Err(_) => return None,
             };
-            let open_loop = |omega: f64| {
-                let [re, im] = self.response(omega).map_or([f64::NAN; 2], |response| response.value);
-                Complex64::new(re, im) * element.response(omega)
-            };
-            return loop_doubt(open_loop, crossing);
+            return self.loop_shape(element).doubt(reach);
         }
         let phase = self.response(LOW_RAD_S)?.phase_deg();
         let reach = APART * phase.standard_error?;

@@ -63,6 +63,11 @@ class OperatorFit(Model, Result):
     open_loop : dict or None
         ``crossover_rad_s`` and ``phase_margin_deg``, an Estimate each, or None without a crossover;
         None without a controlled element.
+    loop_shape : dict or None
+        The whole of that loop: ``crossovers`` (every frequency in rad/s at which its gain is one, with
+        its phase margin in deg, a pair of Estimates each), ``smallest_phase_margin_deg``,
+        ``gain_margin_db``, ``phase_crossover_rad_s`` (None where there is none), and ``stable``: True,
+        False, or None where that cannot be told. None without a controlled element.
     open_loop_intervals : dict or None
         Their intervals of 95 %, (low, high) each, Student's: the errors rest on few runs or blocks.
     open_loop_person : dict or None
@@ -160,6 +165,15 @@ class OperatorFit(Model, Result):
         self.open_loop: dict[str, Estimate | None] | None = (
             None if found is None else estimates(found)
         )
+        self.loop_shape: dict[str, Any] | None = native.loop_shape
+        if self.loop_shape is not None:
+            self.loop_shape["crossovers"] = [
+                (Estimate(*omega), Estimate(*margin))
+                for omega, margin in self.loop_shape["crossovers"]
+            ]
+            for name, value in self.loop_shape.items():
+                if isinstance(value, tuple):
+                    self.loop_shape[name] = Estimate(*value)
         self.open_loop_intervals: dict[str, tuple[float, float] | None] | None = (
             native.open_loop_intervals
         )

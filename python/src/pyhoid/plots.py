@@ -18,7 +18,7 @@ import numpy as np
 from matplotlib import rcParams
 from matplotlib.axes import Axes
 
-from .description import DescribingFunction
+from .description import DescribingFunction, Description
 from .errors import OptionError
 from .estimates import unit_of
 from .fit import Fit
@@ -245,6 +245,8 @@ def _dress_bode(pair: Sequence[Axes]) -> None:
     for ax in pair:
         ax.set_xscale("log")
         ax.margins(x=0)
+        # The curves set the scale: where a response vanishes its band has no end.
+        _limits(ax, [np.asarray(line.get_ydata(), dtype=float) for line in ax.get_lines()])
     pair[0].set_ylabel("magnitude (dB)")
     pair[1].set_ylabel("phase (deg)")
     pair[1].set_xlabel("ω (rad/s)")
@@ -252,17 +254,21 @@ def _dress_bode(pair: Sequence[Axes]) -> None:
 
 
 def describing(
-    found: DescribingFunction,
+    found: DescribingFunction | Description,
     model: Model | Mapping[str, Model] | Sequence[Model] | None = None,
     *,
     axes: Sequence[Axes] | None = None,
 ) -> Sequence[Axes]:
     """The describing function as points with error bars, over the Bode plot of the models.
 
+    `found` is what `describe` or `describing_function` gives.
+
     Examples
     --------
     >>> pyhoid.plots.describing(pyhoid.describe(records))
     """
+    if isinstance(found, Description):
+        found = found.function
     with style():
         pair = _pair(axes)
         if model is not None:

@@ -22,11 +22,12 @@ pub mod state;
 
 use hoid_ident::{
     MarginEstimates, Termination,
+    family::LoopShape,
     validation::{GoodnessOfFit, LjungBox},
 };
 use hoid_model::{
     Fault, Finding, NotConvertible, Orders, Record, Severity, Verdict,
-    margins::Margins,
+    margins::{Crossing, Crossings},
     uncertainty::{Estimate, OperatorEstimate},
 };
 use serde::Serialize;
@@ -143,12 +144,38 @@ pub fn operator(found: &Result<OperatorEstimate, NotConvertible>) -> Value {
 }
 
 /// Crossover and margins of a loop that is known.
-pub fn margins(m: &Margins) -> Map<String, Value> {
+pub fn margins(all: &Crossings) -> Map<String, Value> {
+    let m = all.margins();
     let mut map = Map::new();
     map.insert("crossover_rad_s".to_owned(), optional(m.crossover_rad_s));
     map.insert("phase_margin_deg".to_owned(), optional(m.phase_margin_deg));
     map.insert("gain_margin_db".to_owned(), optional(m.gain_margin_db));
     map.insert("phase_crossover_rad_s".to_owned(), optional(m.phase_crossover_rad_s));
+    let crossing =
+        |c: &Crossing| json!({"crossover_rad_s": number(c.omega_rad_s), "phase_margin_deg": number(c.margin)});
+    map.insert("crossovers".to_owned(), all.gain.iter().map(crossing).collect());
+    map
+}
+
+/// Every crossing of a loop that was estimated, the phase margin nearest to zero, the gain margin, and whether the closed
+/// loop is stable.
+pub fn loop_shape(shape: &LoopShape) -> Map<String, Value> {
+    let crossing = |(omega, margin): &(Estimate, Estimate)| json!({"crossover_rad_s": estimate(omega), "phase_margin_deg": estimate(margin)});
+    let mut map = Map::new();
+    let all: Vec<Value> = shape.crossovers.iter().map(crossing).collect();
+    map.insert("crossovers".to_owned(), Value::Array(all));
+    let or_null = |e: Option<Estimate>| e.map_or(Value::Null, |e| estimate(&e));
+    let smallest = shape.smallest_margin().map(|(_, margin)| margin);
+    map.insert("smallest_phase_margin_deg".to_owned(), or_null(smallest));
+    map.insert(
+        "gain_margin_db".to_owned(),
+        or_null(shape.gain_margin.map(|(_, db)| db)),
+    );
+    map.insert(
+        "phase_crossover_rad_s".to_owned(),
+        or_null(shape.gain_margin.map(|(omega, _)| omega)),
+    );
+    map.insert("stable".to_owned(), json!(shape.is_stable()));
     map
 }
 

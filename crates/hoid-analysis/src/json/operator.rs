@@ -11,7 +11,7 @@ use hoid_model::{FamilyOperator, uncertainty::Estimate};
 use serde_json::{Map, Value, json};
 
 use super::{
-    envelope, estimate_within, goodness, named, number, optional, orders,
+    envelope, estimate_within, goodness, loop_shape, named, number, optional, orders,
     result::{BatchAnswer, OPERATOR},
     termination,
 };
@@ -38,7 +38,11 @@ impl BatchAnswer for FamilyFit {
         set("orders", orders(&of.polynomial_fit.orders()));
         set("parameters", of.parameters.iter().map(parameter).collect());
         if let Some(element) = &found.controlled_element {
-            set("open_loop", open_loop(fit.loop_measures(0, element).as_ref()));
+            let mut found = open_loop(fit.loop_measures(0, element).as_ref());
+            if let Some(map) = found.as_object_mut() {
+                map.extend(loop_shape(&fit.loop_shape(0, element)));
+            }
+            set("open_loop", found);
         }
         set("loss", number(fit.loss));
         set("innovation_variance", number(fit.innovation_variance));

@@ -3,7 +3,7 @@
 use hoid::io::AnyScenario;
 use hoid::model::{
     FamilyScenario, ModelError,
-    margins::{MANUAL_CONTROL_RANGE_RAD_S, margins},
+    margins::{MANUAL_CONTROL_RANGE_RAD_S, crossings},
     remnant::HIGHEST_ORDER,
     remnant_gain::NoiseDefinition,
 };
@@ -37,7 +37,7 @@ pub fn run(args: &MarginsArgs) -> Result<(), CliError> {
         .operator
         .transfer_function()?
         .series(&state.controlled_element.transfer_function()?);
-    let found = margins(|omega| open_loop.response(omega), MANUAL_CONTROL_RANGE_RAD_S);
+    let found = crossings(|omega| open_loop.response(omega), MANUAL_CONTROL_RANGE_RAD_S);
     let definition = args.noise_definition;
     let gains: Vec<Gain> = (1..=HIGHEST_ORDER)
         .flat_map(|order| args.noise_levels.iter().map(move |&level| (order, level)))
@@ -90,7 +90,7 @@ pub fn run(args: &MarginsArgs) -> Result<(), CliError> {
     output::show(&format!(
         "{}, {state_name} state.\n{}\nRemnant gain K_n for P_n = {share}, T_n = {} s, Ts = {} s:\n{table}\n",
         scenario.name,
-        text::margins(&found.into()),
+        text::crossings(&found),
         scenario.remnant.time_constant_s,
         scenario.sample_time.s(),
     ))?;
@@ -103,7 +103,7 @@ fn of_family(scenario: &FamilyScenario, args: &MarginsArgs) -> Result<(), CliErr
         StateName::Initial => (&scenario.initial, 0),
         StateName::Last => (&scenario.last, 1),
     };
-    let found = state.margins()?;
+    let found = state.crossings()?;
     let simulator = FamilySimulator::new(scenario)?;
     let gains = simulator.remnant_gains()[which];
     let shares: Vec<Option<f64>> = scenario.remnant.iter().map(|part| part.share()).collect();
@@ -132,7 +132,7 @@ fn of_family(scenario: &FamilyScenario, args: &MarginsArgs) -> Result<(), CliErr
         "{}, {} state.\n{}\n{parts}",
         scenario.name,
         name_of(args.state),
-        text::margins(&found.into()),
+        text::crossings(&found),
     ))?;
     Ok(())
 }

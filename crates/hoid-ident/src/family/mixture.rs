@@ -52,7 +52,7 @@ impl Mixture {
                 interval: only.interval,
             });
         }
-        if !(total > 0.0) {
+        if total <= 0.0 || total.is_nan() {
             return None;
         }
         let over = |of: &dyn Fn(&Component) -> f64| components.iter().map(|c| c.weight / total * of(c)).sum::<f64>();
@@ -73,11 +73,14 @@ impl Mixture {
     }
 }
 
+/// Weight, estimate and interval of a form.
+type Part = (f64, f64, (f64, f64));
+
 /// The interval of the mixture; `None` where a form has none.
 fn interval(components: &[Component], total: f64, clusters: usize) -> Option<(f64, f64)> {
     let student = StudentsT::new(0.0, 1.0, freedom(clusters)).ok()?;
     let quantile = quantile(clusters);
-    let parts: Option<Vec<(f64, f64, (f64, f64))>> = (components.iter())
+    let parts: Option<Vec<Part>> = (components.iter())
         .map(|c| Some((c.weight / total, c.estimate.value, c.interval?)))
         .collect();
     let parts = parts?;

@@ -46,6 +46,7 @@
 //! | `mixture` | an estimate over several forms |
 //! | `agreement` | do methods agree |
 //! | `open_loop` | crossover and phase margin |
+//! | `loop_shape` | every crossing, and whether the closed loop is stable |
 //! | `of_polynomials`, `pole_reading` | polynomials back to an operator; which pole is what |
 //! | `judgement` | what makes a result doubtful |
 
@@ -65,6 +66,7 @@ mod judgement;
 mod layout;
 mod line_fit;
 mod lines;
+mod loop_shape;
 mod mixture;
 pub(crate) mod noise;
 mod of_polynomials;
@@ -85,8 +87,9 @@ pub use clusters::ClusterKind;
 pub use estimator::{FamilyEstimator, HIGHEST_NOISE_ORDER};
 pub use instrumental::InstrumentalFit;
 pub use line_fit::LineFit;
+pub use loop_shape::{KnownResponse, LoopShape};
 pub use of_polynomials::{FamilyConversion, family_of_polynomials};
-pub use open_loop::{Crossover, LoopMeasures, loop_doubt, loop_measures};
+pub use open_loop::{Crossover, LoopMeasures, loop_measures};
 pub use parameter::Parameter;
 pub use pole_reading::{PoleRole, RealPole};
 pub use prior::{OperatorPrior, ParameterPrior};

@@ -11,7 +11,7 @@
 use std::f64::consts::{FRAC_PI_3, TAU};
 
 use hoid_model::{
-    Complex64, ContinuousTransferFunction, FamilyOperator, Finding, SampleTime,
+    Complex64, ContinuousTransferFunction, FamilyOperator, SampleTime,
     uncertainty::{Estimate, variance_along},
 };
 
@@ -25,8 +25,6 @@ use super::{
 const RANGE_RAD_S: (f64, f64) = (0.05, 60.0);
 /// Quantile of the normal distribution for 95 %.
 const NORMAL: f64 = 1.959_963_984_540_054;
-/// Largest phase margin that is believed of a person, deg.
-const FARTHEST_MARGIN_DEG: f64 = 120.0;
 /// Points of the scan.
 const POINTS: usize = 150;
 
@@ -165,14 +163,23 @@ impl Crossover {
             low = high;
         }
         let (low, high) = bracket?;
-        let omega_rad_s = zero_between(gain, low, high);
+        Some(Self::at(&open_loop, zero_between(gain, low, high)))
+    }
+
+    /// The one at a frequency where `|L| = 1`.
+    pub(super) fn at(open_loop: impl Fn(f64) -> Complex64, omega_rad_s: f64) -> Self {
         // d ln L / d omega by a central difference of a smooth function.
         let h = 1e-5 * omega_rad_s;
-        Some(Self {
+        Self {
             omega_rad_s,
             margin_deg: (-open_loop(omega_rad_s)).arg().to_degrees(),
             slope: (open_loop(omega_rad_s + h) / open_loop(omega_rad_s - h)).ln() / (2.0 * h),
-        })
+        }
+    }
+
+    /// `d ln L/d omega` there.
+    pub(super) fn slope(&self) -> Complex64 {
+        self.slope
     }
 
     /// How crossover in rad/s and margin in deg move with a relative change `dL/L` there.
@@ -198,30 +205,6 @@ pub fn followed_margin_deg(open_loop: impl Fn(f64) -> Complex64, crossover_rad_s
         last = next;
     }
     180.0 + phase.to_degrees()
-}
-
-/// What an open loop says against who is said to have held it: a record that stays bounded was made in a stable loop,
-/// which has a crossover and no phase margin below zero, and a person's has none above 120 deg. `crossing` is the
-/// crossover in rad/s with half of the 95 % interval of the margin in deg, `None` without a crossover. `None` where
-/// nothing is against it.
-pub fn loop_doubt(open_loop: impl Fn(f64) -> Complex64, crossing: Option<(f64, f64)>) -> Option<Finding> {
-    let remedy = "check the controlled element, the signs and units of e and u and the time between them";
-    let Some((crossover, reach)) = crossing else {
-        return Some(Finding::doubt(
-            "no-crossover",
-            format!("the gain of the loop with this controlled element does not fall through one: {remedy}"),
-        ));
-    };
-    let margin = followed_margin_deg(open_loop, crossover);
-    (margin + reach <= 0.0 || margin > FARTHEST_MARGIN_DEG).then(|| {
-        Finding::doubt(
-            "unstable-loop",
-            format!(
-                "the loop with this controlled element has a phase margin of {margin:.0} deg at {crossover:.1} rad/s, which no \
-                 stable loop of a person has: {remedy}"
-            ),
-        )
-    })
 }
 
 /// Where a function that is positive at `low` and negative at `high` is zero, to rounding, by false

@@ -14,8 +14,9 @@ use super::{
     clusters::ClusterKind,
     instrumental::InstrumentalFit,
     line_fit::LineFit,
+    loop_shape::{KnownResponse, LoopShape},
     mixture::{Component, Mixture},
-    open_loop::{LoopMeasures, loop_doubt, loop_measures},
+    open_loop::{LoopMeasures, loop_measures},
     parameter::Parameter,
     prior::OperatorPrior,
     response_fit::hold,
@@ -214,15 +215,35 @@ impl FamilyFit {
     /// bounded was made in a stable loop, which has a crossover and no phase margin below zero, and a person's has
     /// none above 120 deg. `None` where nothing is against it.
     pub fn loop_finding(&self, record: usize, element: &ContinuousTransferFunction) -> Option<Finding> {
-        let operator = &self.operator(record).operator;
-        let open_loop = |omega: f64| operator.response(omega) * hold(omega, self.sample_time) * element.response(omega);
-        let crossing = self.loop_measures_in_front(record, element).map(|found| {
-            let reach = found
-                .phase_margin_interval
-                .map_or(0.0, |(low, high)| 0.5 * (high - low));
-            (found.crossover_rad_s.value, reach)
-        });
-        loop_doubt(open_loop, crossing)
+        let reach = (self.loop_measures_in_front(record, element))
+            .and_then(|found| found.phase_margin_interval)
+            .map_or(0.0, |(low, high)| 0.5 * (high - low));
+        self.loop_shape(record, element).doubt(reach)
+    }
+
+    /// Every crossing of the loop of a record with a controlled element, and whether it is stable, by the form in
+    /// front.
+    pub fn loop_shape(&self, record: usize, element: &ContinuousTransferFunction) -> LoopShape {
+        let of = self.operator(record);
+        let known = |omega: f64| {
+            let found = of.operator.response_and_gradient(omega);
+            let relative = |covariance: &[f64]| {
+                let along = |part: fn(Complex64) -> f64| -> Vec<f64> {
+                    let gradient = found.gradient.iter().map(|g| part(g / found.value));
+                    gradient.collect()
+                };
+                let (re, im) = (along(|z| z.re), along(|z| z.im));
+                let both: Vec<f64> = re.iter().zip(&im).map(|(a, b)| a + b).collect();
+                let [a, c, sum] = [&re, &im, &both].map(|row| variance_along(row, covariance));
+                let b = 0.5 * (sum - a - c);
+                [[a, b], [b, c]]
+            };
+            KnownResponse {
+                value: found.value * hold(omega, self.sample_time),
+                relative: of.covariance.as_deref().map(relative),
+            }
+        };
+        LoopShape::of(known, element, self.sample_time)
     }
 
     /// Crossover frequency and phase margin of the fit at the lines.

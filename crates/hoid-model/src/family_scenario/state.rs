@@ -2,7 +2,7 @@
 
 use crate::{
     ContinuousTransferFunction, FamilyOperator, ModelError,
-    margins::{MANUAL_CONTROL_RANGE_RAD_S, Margins, closed_loop_is_stable, margins},
+    margins::{Crossings, MANUAL_CONTROL_RANGE_RAD_S, Margins, closed_loop_is_stable, crossings},
     operator_family::Coordinate,
 };
 
@@ -27,8 +27,16 @@ impl FamilyState {
     /// Crossover frequency and margins in continuous time.
     ///
     /// # Errors
-    /// As [`FamilyState::open_loop`]; [`ModelError::UnstableLoop`].
+    /// As [`FamilyState::crossings`].
     pub fn margins(&self) -> Result<Margins, ModelError> {
+        Ok(self.crossings()?.margins())
+    }
+
+    /// Every crossing in continuous time.
+    ///
+    /// # Errors
+    /// As [`FamilyState::open_loop`]; [`ModelError::UnstableLoop`].
+    pub fn crossings(&self) -> Result<Crossings, ModelError> {
         let open_loop = self.open_loop()?;
         if !closed_loop_is_stable(&open_loop) {
             return Err(ModelError::UnstableLoop {
@@ -36,7 +44,7 @@ impl FamilyState {
                     .to_owned(),
             });
         }
-        Ok(margins(|omega| open_loop.response(omega), MANUAL_CONTROL_RANGE_RAD_S))
+        Ok(crossings(|omega| open_loop.response(omega), MANUAL_CONTROL_RANGE_RAD_S))
     }
 
     /// True when both states have the same form, so that one can turn into the other.

@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use num_complex::Complex64;
 
-use super::crossings::LARGEST_TURN_RAD;
+use super::crossings::{LARGEST_TURN_RAD, turn};
 use crate::{ContinuousTransferFunction, polynomial};
 
 /// Bounds the work of the stability test, which gives no proof beyond.
@@ -19,6 +19,57 @@ const MOST_EVALUATIONS: usize = 4_000_000;
 /// millions of radians at the frequencies where the gain exceeds 1/2.
 pub fn closed_loop_is_stable(open_loop: &ContinuousTransferFunction) -> bool {
     Characteristic::new(open_loop).and_then(|f| f.zeros_in_right_half_plane()) == Some(0)
+}
+
+/// Lowest frequency at which a closed loop is followed, over the size of the controlled element's poles and 1 rad/s.
+const LOWEST: f64 = 1e-4;
+/// Distance in rad from a whole number of half turns that is no rounding any more.
+const NO_HALF_TURN_RAD: f64 = 0.5;
+
+/// Number of closed-loop poles in the right half plane of a stable operator with the frequency response `operator`
+/// around a controlled element, in a loop with unit negative feedback.
+///
+/// `None` where that cannot be told: the response is not finite, `|L|` is not below one at `highest_rad_s`, or a
+/// closed-loop pole lies on the imaginary axis.
+pub fn unstable_poles(
+    operator: impl Fn(f64) -> Complex64,
+    element: &ContinuousTransferFunction,
+    highest_rad_s: f64,
+) -> Option<usize> {
+    let order = element.den().len() - 1;
+    let scale = match root_size(element.den()) {
+        0.0 => 1.0,
+        size => size,
+    };
+    let horner = |p: &[f64], s: Complex64| p.iter().fold(Complex64::new(0.0, 0.0), |sum, &c| sum * s + c);
+    let characteristic = |omega: f64| {
+        let s = Complex64::new(0.0, omega);
+        let loop_part = horner(element.num(), s) * (-s * element.delay_s()).exp() * operator(omega);
+        (horner(element.den(), s) + loop_part) / Complex64::new(scale, omega).powu(order as u32)
+    };
+    let low = LOWEST * scale.min(1.0);
+    // The rest of D/(s + a)^n, beyond the last frequency, is followed without the operator.
+    if !(highest_rad_s > low && (operator(highest_rad_s) * element.response(highest_rad_s)).norm() < 1.0) {
+        return None;
+    }
+    let (turned, first, last) = turn(characteristic, (low, highest_rad_s))?;
+    let element_alone = |omega: f64| {
+        let s = Complex64::new(0.0, omega);
+        horner(element.den(), s) / Complex64::new(scale, omega).powu(order as u32)
+    };
+    let far = 1e3 * highest_rad_s.max(scale);
+    let (beyond, from, to) = turn(element_alone, (highest_rad_s, far))?;
+    // F(0) and F(infinity) are real; 1 + L has an argument between -90 and 90 deg from the last frequency on.
+    let at_zero = if first.re >= 0.0 { first } else { -first }.arg();
+    let total = at_zero + turned - (last / from).arg() + beyond - to.arg();
+    let half_turns = (-total / PI).round();
+    ((-total / PI - half_turns).abs() * PI < NO_HALF_TURN_RAD && half_turns >= 0.0).then_some(half_turns as usize)
+}
+
+/// Size of the largest root of a polynomial, from its coefficients.
+fn root_size(p: &[f64]) -> f64 {
+    let relative = (1..p.len()).map(|k| (p[k] / p[0]).abs().powf(1.0 / k as f64));
+    relative.fold(0.0, f64::max)
 }
 
 /// `F(s) / (s + a)^n` on the imaginary axis.
@@ -41,10 +92,6 @@ impl<'a> Characteristic<'a> {
         if biproper && (tau > 0.0 && at_infinity >= 1.0 || num[0] == -1.0) {
             return None;
         }
-        let root_size = |p: &[f64]| {
-            let relative = (1..p.len()).map(|k| (p[k] / p[0]).abs().powf(1.0 / k as f64));
-            relative.fold(0.0, f64::max)
-        };
         let scale = match root_size(den) {
             0.0 => 1.0,
             size => size,

@@ -18,21 +18,69 @@ pub struct Margins {
 /// A range that holds every crossover of manual control, in rad/s.
 pub const MANUAL_CONTROL_RANGE_RAD_S: (f64, f64) = (1e-3, 1e3);
 
+/// A frequency at which the open loop crosses unit gain or the negative real axis.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Crossing {
+    /// The frequency, rad/s.
+    pub omega_rad_s: f64,
+    /// What is left there: of unit gain the phase margin in deg, of the axis the gain margin in dB.
+    pub margin: f64,
+}
+
+/// All frequencies at which an open loop crosses, the lowest first.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Crossings {
+    /// Of unit gain, each with its phase margin in deg, between -180 and 180.
+    pub gain: Vec<Crossing>,
+    /// Of the negative real axis, each with its gain margin in dB.
+    pub phase: Vec<Crossing>,
+}
+
+impl Crossings {
+    /// The margins nearest to zero, the first one of equals.
+    pub fn margins(&self) -> Margins {
+        let nearest = |of: &[Crossing]| {
+            of.iter().copied().reduce(|held, next| {
+                if next.margin.abs() < held.margin.abs() {
+                    next
+                } else {
+                    held
+                }
+            })
+        };
+        let (phase, gain) = (nearest(&self.gain), nearest(&self.phase));
+        Margins {
+            crossover_rad_s: phase.map(|c| c.omega_rad_s),
+            phase_margin_deg: phase.map(|c| c.margin),
+            phase_crossover_rad_s: gain.map(|c| c.omega_rad_s),
+            gain_margin_db: gain.map(|c| c.margin),
+        }
+    }
+}
+
 const POINTS_PER_DECADE: f64 = 100.0;
 /// Largest turn of the phase between neighbours.
 pub(super) const LARGEST_TURN_RAD: f64 = 0.5;
+/// Turn between neighbours beyond which its sense is not certain.
+const MOST_TURN_RAD: f64 = 2.0;
 /// Bounds the work: 4096 points for a step of the grid follow a delay of 90 s at 1000 rad/s.
 const DEEPEST_HALVING: u32 = 12;
-/// Margins of any frequency response: continuous with delay, or discrete with a range that ends at
+/// The margins nearest to zero of any frequency response, as [`crossings`].
+pub fn margins(open_loop: impl Fn(f64) -> Complex64, range_rad_s: (f64, f64)) -> Margins {
+    crossings(open_loop, range_rad_s).margins()
+}
+
+/// Where any frequency response crosses: continuous with delay, or discrete with a range that ends at
 /// pi/Ts (a response there on the negative real axis counts as a phase crossover).
 ///
-/// A range that is not `0 < low < high`, both finite, has no margins; where the response is not
+/// A range that is not `0 < low < high`, both finite, has no crossings; where the response is not
 /// finite it is left out.
-pub fn margins(open_loop: impl Fn(f64) -> Complex64, range_rad_s: (f64, f64)) -> Margins {
+pub fn crossings(open_loop: impl Fn(f64) -> Complex64, range_rad_s: (f64, f64)) -> Crossings {
     let points = scan(&open_loop, range_rad_s);
-    let (mut phase, mut gain) = (Nearest::default(), Nearest::default());
+    let mut found = Crossings::default();
     let phase_margin_deg = |l: Complex64| (-l).arg().to_degrees();
     let gain_margin_db = |l: Complex64| -20.0 * l.norm().log10();
+    let crossing = |omega_rad_s: f64, margin: f64| Crossing { omega_rad_s, margin };
 
     for pair in points.windows(2) {
         let (low, high, l_low, l_high) = (pair[0].omega, pair[1].omega, pair[0].l, pair[1].l);
@@ -42,14 +90,14 @@ pub fn margins(open_loop: impl Fn(f64) -> Complex64, range_rad_s: (f64, f64)) ->
         let above = |l: Complex64| l.norm() >= 1.0;
         if above(l_low) != above(l_high) {
             let omega = bisect(low, high, |w| above(open_loop(w)) == above(l_low));
-            phase.offer(omega, phase_margin_deg(open_loop(omega)));
+            found.gain.push(crossing(omega, phase_margin_deg(open_loop(omega))));
         }
         // The turn between neighbours is small, so that a change of sign in the left half plane is
         // a crossing of its axis.
         let upper = |l: Complex64| l.im >= 0.0;
         if upper(l_low) != upper(l_high) && l_low.re < 0.0 && l_high.re < 0.0 {
             let omega = bisect(low, high, |w| upper(open_loop(w)) == upper(l_low));
-            gain.offer(omega, gain_margin_db(open_loop(omega)));
+            found.phase.push(crossing(omega, gain_margin_db(open_loop(omega))));
         }
     }
     let on_negative_axis = |l: Complex64| l.re < 0.0 && l.im.abs() <= 1e-9 * l.re.abs();
@@ -57,29 +105,25 @@ pub fn margins(open_loop: impl Fn(f64) -> Complex64, range_rad_s: (f64, f64)) ->
         && on_negative_axis(end.l)
         && !on_negative_axis(before.l)
     {
-        gain.offer(end.omega, gain_margin_db(end.l));
+        found.phase.push(crossing(end.omega, gain_margin_db(end.l)));
     }
-    Margins {
-        crossover_rad_s: phase.at,
-        phase_margin_deg: phase.value,
-        phase_crossover_rad_s: gain.at,
-        gain_margin_db: gain.value,
-    }
+    found
 }
 
-/// The candidate nearest to zero, the first one of equals.
-#[derive(Default)]
-struct Nearest {
-    at: Option<f64>,
-    value: Option<f64>,
-}
-
-impl Nearest {
-    fn offer(&mut self, at: f64, value: f64) {
-        if self.value.is_none_or(|held| value.abs() < held.abs()) {
-            (self.at, self.value) = (Some(at), Some(value));
+/// Sum of the turns of a response from the lower to the upper end of a range, rad, with its values at both ends.
+/// `None` where it is not finite, or turns too fast to be followed.
+pub(super) fn turn(of: impl Fn(f64) -> Complex64, range_rad_s: (f64, f64)) -> Option<(f64, Complex64, Complex64)> {
+    let points = scan(&of, range_rad_s);
+    let (first, last) = (points.first()?.l, points.last()?.l);
+    let mut turned = 0.0;
+    for pair in points.windows(2) {
+        let by = (pair[1].l * pair[0].l.conj()).arg();
+        if !by.is_finite() || by.abs() > MOST_TURN_RAD {
+            return None;
         }
+        turned += by;
     }
+    Some((turned, first, last))
 }
 
 /// One frequency of the scan.

@@ -24,12 +24,14 @@
 //! omega, omega from 0 to infinity, Z the number of zeros (Cauchy's argument principle; Mikhailov's
 //! form of the Nyquist criterion). F has no poles, so that open-loop poles at the origin or on the
 //! axis need no detour, and common factors of N and D in the right half plane count as they should.
+//! Of an operator of which only the frequency response Y is known ([`unstable_poles`]), stable and
+//! sampled, `F = D + N Y e^{-s tau}` is followed up to a frequency beyond which `|L| < 1`.
 
 mod closed_loop;
 mod crossings;
 
-pub use closed_loop::closed_loop_is_stable;
-pub use crossings::{MANUAL_CONTROL_RANGE_RAD_S, Margins, margins};
+pub use closed_loop::{closed_loop_is_stable, unstable_poles};
+pub use crossings::{Crossing, Crossings, MANUAL_CONTROL_RANGE_RAD_S, Margins, crossings, margins};
 
 #[cfg(test)]
 mod tests;

@@ -261,3 +261,68 @@ fn marginal_and_hidden_modes_are_not_stable() {
         assert_eq!(closed_loop_is_stable(&tf(&[1e-12], &[1.0, damping, 7.3])), stable);
     }
 }
+
+/// 2.5/s behind an operator with a neuromuscular resonance that lifts |L| above one again: three crossings, and the
+/// margin nearest to zero is not that of the lowest one.
+#[test]
+fn all_crossings_are_given() {
+    let resonance = delayed(&[81.0], &[1.0, 1.0, 81.0], 0.15);
+    let l = resonance.series(&tf(&[2.5], &[1.0, 0.0]));
+    let found = crossings(|w| l.response(w), MANUAL_CONTROL_RANGE_RAD_S);
+    assert_eq!(found.gain.len(), 3, "{found:?}");
+    for c in &found.gain {
+        assert!((l.response(c.omega_rad_s).norm() - 1.0).abs() < 1e-9);
+        assert!((-l.response(c.omega_rad_s)).arg().to_degrees() == c.margin);
+    }
+    assert!(found.gain[0].margin > 0.0 && found.gain[2].margin < 0.0);
+    let margins = found.margins();
+    let nearest = (found.gain.iter().map(|c| c.margin.abs())).fold(f64::INFINITY, f64::min);
+    assert_eq!(margins.phase_margin_deg.unwrap().abs(), nearest);
+    assert_eq!(
+        crossings(|_| Complex64::new(f64::NAN, 0.0), MANUAL_CONTROL_RANGE_RAD_S),
+        Crossings::default()
+    );
+}
+
+#[test]
+fn poles_of_a_response_are_those_of_the_transfer_function() {
+    let operators = [
+        delayed(&[1.0], &[1.0], 0.2),
+        delayed(&[81.0], &[1.0, 1.0, 81.0], 0.15),
+        delayed(&[60.0, 81.0], &[1.0, 6.0, 81.0], 0.3),
+    ];
+    let elements = [
+        tf(&[1.0], &[1.0, 0.0]),
+        tf(&[90.0], &[1.0, 6.0, 0.0]),
+        tf(&[1.0], &[1.0, 0.0, 0.0]),
+        tf(&[1.0], &[1.0, -0.5]),
+        tf(&[1.0, 0.3], &[1.0, 1.0, 4.0]),
+    ];
+    let mut counts = [0; 2];
+    for operator in &operators {
+        for element in &elements {
+            for gain in [0.003, 0.02, 0.3, 0.8, 1.7, 4.0, 9.0, -0.4] {
+                let scaled = scaled(operator, gain);
+                let l = scaled.series(element);
+                let Some(found) = unstable_poles(|w| scaled.response(w), element, 300.0) else {
+                    // Pure gains over a first-order element of high gain are above one there.
+                    assert!(l.response(300.0).norm() > 0.5, "{gain} {operator:?} {element:?}");
+                    continue;
+                };
+                let exact = Characteristic::new(&l)
+                    .and_then(|f| f.zeros_in_right_half_plane())
+                    .unwrap();
+                assert_eq!(found, exact, "{gain} {operator:?} {element:?}");
+                counts[usize::from(found > 0)] += 1;
+            }
+        }
+    }
+    assert!(counts[0] > 20 && counts[1] > 20, "{counts:?}");
+    let integrator = &elements[0];
+    assert_eq!(
+        unstable_poles(|_| Complex64::new(f64::NAN, 0.0), integrator, 300.0),
+        None
+    );
+    assert_eq!(unstable_poles(|_| Complex64::new(1e4, 0.0), integrator, 300.0), None);
+    assert_eq!(unstable_poles(|_| Complex64::new(1.0, 0.0), integrator, f64::NAN), None);
+}

@@ -177,9 +177,11 @@ mod tests {
                 unit: "s",
                 value,
                 standard_error,
+                standard_error_person: standard_error,
                 interval,
                 prior_share: 0.0,
                 determined,
+                averaged_over: Vec::new(),
             })
         };
         assert_eq!(of(2.0, Some(0.128), Some((1.7, 2.4)), true), "2.00 \u{b1} 0.13");

@@ -60,17 +60,18 @@ impl Found<'_> {
     /// Crossover and margin in the form of all reports.
     pub fn margins(&self) -> Option<MarginEstimates> {
         let found = self.fit.loop_measures(0, self.element?)?;
+        let gain_margin = self.fit.loop_shape(0, self.element?).gain_margin;
         Some(MarginEstimates {
             crossover_rad_s: Some(found.crossover_rad_s),
             phase_margin_deg: Some(found.phase_margin_deg),
-            phase_crossover_rad_s: None,
-            gain_margin_db: None,
+            phase_crossover_rad_s: gain_margin.map(|(omega, _)| omega),
+            gain_margin_db: gain_margin.map(|(_, db)| db),
         })
     }
 
     /// The answer, and with `verbose` what is behind it.
     pub fn page(&self, verbose: bool) -> Result<String, CliError> {
-        let mut page = self.answer()?;
+        let mut page = self.answer(verbose)?;
         if !verbose {
             page.push_str(text::MORE);
             return Ok(page);
@@ -86,7 +87,7 @@ impl Found<'_> {
     }
 
     /// Verdict, parameters with their intervals, loop, fit, and what they are of.
-    fn answer(&self) -> Result<String, CliError> {
+    fn answer(&self, verbose: bool) -> Result<String, CliError> {
         let fit = self.fit;
         let gain = self.records.first().map(GainUnit::of).unwrap_or_default();
         let mut page = text::verdict(&fit.verdict);
@@ -105,6 +106,7 @@ impl Found<'_> {
         if let Some(element) = self.element {
             let here = fit.loop_measures(0, element);
             page.push_str(&format!("Open loop with {element}: {}\n", measures(here.as_ref())));
+            page.push_str(&text::loop_shape(&fit.loop_shape(0, element), verbose));
         }
         page.push_str(&self.of_person());
         let quality = self.identified.quality()?;

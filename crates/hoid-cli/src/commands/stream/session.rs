@@ -343,6 +343,14 @@ impl Session {
 
     /// A stream that ended without an estimate has not given what was asked.
     pub fn end(&self) -> Result<(), CliError> {
+        let c = self.counts;
+        if c.samples == 0 && c.dropped > 0 {
+            return Err(CliError::NotDetermined(format!(
+                "no line of the stream was a sample, {} dropped; expected e,u or t,e,u with decimal points, or an object of JSON; \
+                 what was wrong stands in the lines of the output",
+                text::counted(c.dropped, "line")
+            )));
+        }
         match &self.live {
             Live::Tracking(_) => Ok(()),
             Live::Collecting(_) => Err(CliError::NotDetermined(

@@ -134,6 +134,9 @@ impl Tracked<'_> {
         });
         if let Some(found) = trace.open_loop(row) {
             last["open_loop"] = json::open_loop(&found);
+            if let (Value::Object(map), Some(shape), Ok(_)) = (&mut last["open_loop"], trace.loop_shape(), found) {
+                map.extend(json::loop_shape(shape));
+            }
         }
         last
     }

@@ -158,12 +158,17 @@ impl Tracked<'_> {
             return String::new();
         };
         let mut words = match self.trace.open_loop(row) {
-            Some(Ok(found)) => format!(
-                "Open loop at {:.2} s: crossover {} rad/s, phase margin {} deg.\n",
-                self.trace.times_s()[row],
-                text::plus_minus(&found.crossover_rad_s),
-                text::plus_minus(&found.phase_margin_deg)
-            ),
+            Some(Ok(found)) => {
+                format!(
+                    "Open loop at {:.2} s: crossover {} rad/s, phase margin {} deg.\n",
+                    self.trace.times_s()[row],
+                    text::plus_minus(&found.crossover_rad_s),
+                    text::plus_minus(&found.phase_margin_deg)
+                ) + &self
+                    .trace
+                    .loop_shape()
+                    .map_or_else(String::new, |shape| text::loop_shape(shape, false))
+            }
             _ => String::new(),
         };
         if let Some(reason) = reason {

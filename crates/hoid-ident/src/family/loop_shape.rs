@@ -1,0 +1,279 @@
+//! The whole of an open loop with its controlled element: every crossing with its error, and whether the closed loop
+//! is stable.
+//!
+//! `L = Y Y_c`, Y the sampled response of what was estimated, Y_c exact. With the covariance of real and imaginary part
+//! of `dL/L = dY/Y` at a frequency, a crossing of `|L| = 1` and the phase there move as [`super::open_loop`] says, and
+//! one of the negative real axis by `d omega = -Im(dL/L)/Im(d ln L/d omega)`, so that the gain margin moves by
+//! `-(20/ln 10) (Re(dL/L) + Re(d ln L/d omega) d omega)` dB.
+//!
+//! A closed loop that is not stable becomes stable only when L moves over -1 at some frequency. How many standard errors
+//! away that is, is the least of `(1 + L)' C_L^-1 (1 + L)` over frequency, chi-squared with two degrees of freedom
+//! where the loop is at the limit of stability.
+
+use std::f64::consts::LN_10;
+
+use hoid_model::{
+    Complex64, ContinuousTransferFunction, Finding, SampleTime,
+    margins::{Crossing, crossings, unstable_poles},
+    uncertainty::Estimate,
+};
+
+use super::open_loop::{Crossover, followed_margin_deg};
+
+/// Where crossings are looked for, rad/s.
+const RANGE_RAD_S: (f64, f64) = (0.05, 60.0);
+/// Largest phase margin that is believed of a person, deg.
+const FARTHEST_MARGIN_DEG: f64 = 120.0;
+/// Quantile of 95 % of chi-squared with two degrees of freedom.
+const CHI_SQUARED: f64 = 5.991_464_547_107_979;
+/// Points at which the distance from -1 is looked for.
+const POINTS: usize = 400;
+
+/// What is known of an operator at a frequency: its sampled response, and the covariance of real and imaginary part
+/// of its relative change.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct KnownResponse {
+    /// Y.
+    pub value: Complex64,
+    /// Covariance of `dY/Y`; `None` where none is known.
+    pub relative: Option<[[f64; 2]; 2]>,
+}
+
+/// Everything that an open loop says without being asked for one crossing.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LoopShape {
+    /// All frequencies in rad/s at which `|L| = 1`, the lowest first, each with its phase margin in deg.
+    pub crossovers: Vec<(Estimate, Estimate)>,
+    /// The frequency in rad/s at which L crosses the negative real axis nearest to -1, with the gain margin in dB.
+    pub gain_margin: Option<(Estimate, Estimate)>,
+    /// Closed-loop poles in the right half plane; `None` where that cannot be told.
+    pub unstable_poles: Option<usize>,
+    /// Least chi-squared of a loop at the limit of stability; `None` without a covariance.
+    distance: Option<f64>,
+    /// Phase margin in deg at the lowest crossover, followed from low frequencies.
+    followed_deg: Option<f64>,
+}
+
+impl LoopShape {
+    /// Of an operator and its controlled element.
+    pub fn of(
+        operator: impl Fn(f64) -> KnownResponse,
+        element: &ContinuousTransferFunction,
+        sample_time: SampleTime,
+    ) -> Self {
+        let highest = RANGE_RAD_S.1.min(0.9 * sample_time.nyquist_rad_s());
+        let open_loop = |omega: f64| operator(omega).value * element.response(omega);
+        let found = crossings(open_loop, (RANGE_RAD_S.0.min(0.5 * highest), highest));
+        let with_error = |value: f64, omega: f64, along: [f64; 2]| match operator(omega).relative {
+            Some(c) => {
+                let [a, b] = along;
+                Estimate::with_variance(value, a * a * c[0][0] + 2.0 * a * b * c[0][1] + b * b * c[1][1])
+            }
+            None => Estimate::fixed(value),
+        };
+        let crossover = |c: &Crossing| {
+            let there = Crossover::at(open_loop, c.omega_rad_s);
+            let [re, im] = [Complex64::new(1.0, 0.0), Complex64::new(0.0, 1.0)].map(|d| there.moved_by(d));
+            let omega = c.omega_rad_s;
+            (
+                with_error(omega, omega, [re[0], im[0]]),
+                with_error(c.margin, omega, [re[1], im[1]]),
+            )
+        };
+        let nearest = (found.phase.iter()).min_by(|a, b| a.margin.abs().total_cmp(&b.margin.abs()));
+        let gain_margin = nearest.map(|c| {
+            let omega = c.omega_rad_s;
+            let slope = Crossover::at(open_loop, omega).slope();
+            let by_im = -1.0 / slope.im;
+            let db = -20.0 / LN_10;
+            (
+                with_error(omega, omega, [0.0, by_im]),
+                with_error(c.margin, omega, [db, db * slope.re * by_im]),
+            )
+        });
+        let crossovers: Vec<_> = found.gain.iter().map(crossover).collect();
+        let unstable = unstable_poles(|omega| operator(omega).value, element, highest);
+        let first = found.gain.first().map(|c| c.omega_rad_s);
+        Self {
+            followed_deg: first.map(|omega| followed_margin_deg(open_loop, omega)),
+            distance: (unstable > Some(0))
+                .then(|| distance_from_the_limit(&operator, element, highest))
+                .flatten(),
+            crossovers,
+            gain_margin,
+            unstable_poles: unstable,
+        }
+    }
+
+    /// The phase margin nearest to zero in deg, with its frequency in rad/s.
+    pub fn smallest_margin(&self) -> Option<(Estimate, Estimate)> {
+        let nearest = |held: &(Estimate, Estimate), next: &(Estimate, Estimate)| {
+            held.1.value.abs().total_cmp(&next.1.value.abs())
+        };
+        self.crossovers.iter().copied().min_by(nearest)
+    }
+
+    /// True where the closed loop is stable; `None` where that cannot be told.
+    pub fn is_stable(&self) -> Option<bool> {
+        self.unstable_poles.map(|count| count == 0)
+    }
+
+    /// What the loop says against who is said to have held it: a record that stays bounded was made in a stable loop,
+    /// which has a crossover and no phase margin below zero, and a person's has none above 120 deg. `reach_deg` is half
+    /// of the 95 % interval of the margin at the lowest crossover. `None` where nothing is against it.
+    pub fn doubt(&self, reach_deg: f64) -> Option<Finding> {
+        let remedy = "check the controlled element, the signs and units of e and u and the time between them";
+        let (Some((crossover, _)), Some(margin)) = (self.crossovers.first(), self.followed_deg) else {
+            return Some(Finding::doubt(
+                "no-crossover",
+                format!("the gain of the loop with this controlled element does not fall through one: {remedy}"),
+            ));
+        };
+        if margin + reach_deg <= 0.0 || margin > FARTHEST_MARGIN_DEG {
+            return Some(Finding::doubt(
+                "unstable-loop",
+                format!(
+                    "the loop with this controlled element has a phase margin of {margin:.0} deg at {:.1} rad/s, which no \
+                     stable loop of a person has: {remedy}",
+                    crossover.value
+                ),
+            ));
+        }
+        if self.is_stable() != Some(false) {
+            return None;
+        }
+        let at = self.in_words();
+        Some(if self.distance.is_some_and(|distance| distance < CHI_SQUARED) {
+            Finding::note(
+                "unstable-loop",
+                format!(
+                    "the loop with this controlled element is not stable by its values ({at}), but within their errors it is"
+                ),
+            )
+        } else {
+            Finding::doubt(
+                "unstable-loop",
+                format!(
+                    "the loop with this controlled element is not stable ({at}), and who holds an unstable loop makes no record \
+                     that stays bounded: {remedy}"
+                ),
+            )
+        })
+    }
+
+    /// Every crossover with its margin.
+    fn in_words(&self) -> String {
+        let each = self.crossovers.iter();
+        let each =
+            each.map(|(omega, margin)| format!("{:.1} rad/s, phase margin {:.0} deg", omega.value, margin.value));
+        format!("gain one at {}", each.collect::<Vec<_>>().join("; "))
+    }
+}
+
+/// Least chi-squared of a change of the operator that brings L to -1 somewhere.
+fn distance_from_the_limit(
+    operator: &impl Fn(f64) -> KnownResponse,
+    element: &ContinuousTransferFunction,
+    highest: f64,
+) -> Option<f64> {
+    let at = |i: usize| RANGE_RAD_S.0 * (highest / RANGE_RAD_S.0).powf(i as f64 / (POINTS as f64 - 1.0));
+    let distances = (0..POINTS).filter_map(|i| {
+        let omega = at(i);
+        let known = operator(omega);
+        let [[a, b], [_, c]] = known.relative?;
+        // (1 + L)/L: the relative change of Y that brings it there.
+        let open_loop = known.value * element.response(omega);
+        let d = (Complex64::new(1.0, 0.0) + open_loop) / open_loop;
+        // One parameter alone moves along a line.
+        let (a, c) = (a + 1e-9 * (a + c), c + 1e-9 * (a + c));
+        let distance = (c * d.re * d.re - 2.0 * b * d.re * d.im + a * d.im * d.im) / (a * c - b * b);
+        distance.is_finite().then_some(distance)
+    });
+    distances.reduce(f64::min)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// 2.5/s behind a gain with a neuromuscular resonance at 9 rad/s: |L| is one at three frequencies.
+    fn resonant(omega: f64) -> Complex64 {
+        let s = Complex64::new(0.0, omega);
+        Complex64::from_polar(1.0, -0.15 * omega) * 81.0 / (s * s + s + 81.0)
+    }
+
+    fn shape(of: impl Fn(f64) -> Complex64, variance: Option<f64>) -> LoopShape {
+        let element = ContinuousTransferFunction::new(&[2.5], &[1.0, 0.0]).unwrap();
+        let known = |omega: f64| KnownResponse {
+            value: of(omega),
+            relative: variance.map(|v| [[v, 0.0], [0.0, v]]),
+        };
+        LoopShape::of(known, &element, SampleTime::HUNDREDTH)
+    }
+
+    #[test]
+    fn a_loop_that_rises_above_one_again_is_not_stable() {
+        let found = shape(resonant, Some(1e-4));
+        assert_eq!((found.crossovers.len(), found.unstable_poles), (3, Some(2)));
+        let [low, middle, high] = [0, 1, 2].map(|k| found.crossovers[k]);
+        assert!(
+            low.1.value > 60.0 && high.1.value < 0.0 && middle.0.value > low.0.value,
+            "{found:?}"
+        );
+        assert!(found.gain_margin.unwrap().1.value < 0.0);
+        let doubt = found.doubt(1.0).unwrap();
+        assert_eq!(
+            (doubt.kind, doubt.severity),
+            ("unstable-loop", hoid_model::Severity::Doubt)
+        );
+        assert!(doubt.words.contains("is not stable (gain one at"), "{}", doubt.words);
+        // Large errors: it may be stable.
+        let note = shape(resonant, Some(0.3)).doubt(1.0).unwrap();
+        assert_eq!(note.severity, hoid_model::Severity::Note);
+        // Without errors the values count.
+        assert_eq!(
+            shape(resonant, None).doubt(1.0).unwrap().severity,
+            hoid_model::Severity::Doubt
+        );
+    }
+
+    #[test]
+    fn errors_are_those_of_finite_differences() {
+        let l = |gain: f64, turn: f64| move |w: f64| Complex64::from_polar(gain, turn - 0.15 * w);
+        let found = shape(l(1.0, 0.0), Some(1e-6));
+        let moved = |gain: f64, turn: f64| shape(l(gain, turn), None);
+        let h = 1e-5;
+        let ends = [
+            (moved(1.0 + h, 0.0), moved(1.0 - h, 0.0)),
+            (moved(1.0, h), moved(1.0, -h)),
+        ];
+        let expected = |of: fn(&LoopShape) -> f64| {
+            let slopes = (ends.iter()).map(|(up, down)| (of(up) - of(down)) / (2.0 * h));
+            1e-3 * slopes.map(|s| s * s).sum::<f64>().sqrt()
+        };
+        let ((omega, margin), (at, gain)) = (found.crossovers[0], found.gain_margin.unwrap());
+        for (estimate, expected) in [
+            (omega, expected(|f| f.crossovers[0].0.value)),
+            (margin, expected(|f| f.crossovers[0].1.value)),
+            (at, expected(|f| f.gain_margin.unwrap().0.value)),
+            (gain, expected(|f| f.gain_margin.unwrap().1.value)),
+        ] {
+            let error = estimate.standard_error.unwrap();
+            assert!((error / expected - 1.0).abs() < 1e-5, "{error} {expected}");
+        }
+        assert_eq!((found.is_stable(), found.doubt(0.1)), (Some(true), None));
+        assert_eq!(found.smallest_margin(), Some((omega, margin)));
+    }
+
+    #[test]
+    fn a_loop_without_a_crossover_or_a_number_has_a_doubt() {
+        for of in [1e-6, f64::NAN] {
+            let found = shape(|_| Complex64::new(of, 0.0), Some(1e-6));
+            assert_eq!(found.doubt(0.0).unwrap().kind, "no-crossover");
+            assert_eq!(found.gain_margin, None);
+        }
+        // The sign turned over.
+        let found = shape(|w| Complex64::from_polar(-1.0, -0.15 * w), Some(1e-6));
+        assert_eq!(found.doubt(1.0).unwrap().kind, "unstable-loop");
+    }
+}
