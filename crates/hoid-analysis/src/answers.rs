@@ -96,8 +96,11 @@ fn answered(name: &str, why: Option<String>) -> Answered {
     }
 }
 
+/// An estimate with its interval of 95 %.
+type Measured = (Estimate, Option<(f64, f64)>);
+
 /// Crossover and margin, `None` for those that the loop does not have, with their intervals.
-fn of_loop(measures: [Option<(Estimate, Option<(f64, f64)>)>; 2]) -> impl Iterator<Item = Answered> {
+fn of_loop(measures: [Option<Measured>; 2]) -> impl Iterator<Item = Answered> {
     let words = ["the crossover", "the phase margin"];
     (0..2).map(move |k| {
         let why = match measures[k] {

@@ -20,7 +20,7 @@ pub struct Identification<E = FamilyEstimator> {
     pub rate: Decimation,
     /// What the person controls: adds the loop to the verdict.
     pub controlled_element: Option<ContinuousTransferFunction>,
-    /// What the verdict is about ([`crate::answers`]); by default the response and the loop.
+    /// What the verdict is about ([`crate::Answers`]); by default the response and the loop.
     pub answers: Vec<String>,
 }
 
