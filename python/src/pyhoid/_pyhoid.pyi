@@ -17,7 +17,16 @@ _Array = npt.NDArray[np.float64]
 _Path = str | PathLike[str]
 _Pair = tuple[float, float | None]
 _Ends = tuple[int, int]
-_Parameter = tuple[str, str, float, float | None, tuple[float, float] | None, float, bool]
+_Parameter = tuple[
+    str,
+    str,
+    float,
+    list[float | None],
+    tuple[float, float] | None,
+    float,
+    bool,
+    list[str],
+]
 _Verdict = tuple[str, list[str], list[str]]
 _Progress = Callable[[int, int], object] | None
 _Left = tuple[bool, int, list[Any]]
