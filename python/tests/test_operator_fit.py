@@ -80,14 +80,15 @@ def test_what_a_fit_holds(found: pyhoid.OperatorFit) -> None:
     shape = found.loop_shape
     assert shape is not None and shape["stable"] is True
     lowest = shape["crossovers"][0]
-    assert lowest[0].value == pytest.approx(crossover.value, rel=1e-12)
-    assert lowest[1].standard_error == pytest.approx(margin.standard_error, rel=1e-6)
+    # The shape is that of the form in front, the crossover the mean over forms.
+    assert abs(lowest[0].value - crossover.value) < 2 * (crossover.standard_error or 0.0)
+    assert lowest[1].standard_error > 0
     assert shape["gain_margin_db"].value > 0 and shape["gain_margin_db"].standard_error > 0
     assert found.open_loop_intervals is not None
     ends = found.open_loop_intervals["phase_margin_deg"]
-    # Student's quantile is wider than the normal one.
-    assert ends is not None and ends[1] - margin.value > 1.96 * margin.standard_error
-    assert ends[0] + ends[1] == pytest.approx(2 * margin.value)
+    # Of a mixture over forms, by Student's quantiles: wider than the normal one.
+    assert ends is not None and ends[0] < margin.value < ends[1]
+    assert ends[1] - ends[0] > 2 * 1.96 * margin.standard_error
     at_lines = found.lines["open_loop"]["crossover_rad_s"]
     assert at_lines.value == pytest.approx(crossover.value, rel=0.2)
     assert found.agreement is not None and 0 <= found.agreement["p_value"] <= 1
