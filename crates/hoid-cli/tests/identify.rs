@@ -432,12 +432,12 @@ fn a_loop_that_is_not_stable_is_a_doubt() {
         "{open_loop}"
     );
     assert!(open_loop["gain_margin_db"]["value"].as_f64().unwrap() < 0.0);
-    let reasons = found["verdict"]["reasons"].as_array().unwrap();
+    let findings = found["verdict"]["findings"].as_array().unwrap();
     assert!(
-        reasons
+        findings
             .iter()
-            .any(|r| r["kind"] == "unstable-loop" && r["severity"] == "doubt"),
-        "{reasons:?}"
+            .any(|f| f["kind"] == "unstable-loop" && f["severity"] == "doubt"),
+        "{findings:?}"
     );
     let text = good(d, &arguments);
     assert!(
