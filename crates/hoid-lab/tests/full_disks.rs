@@ -5,6 +5,9 @@
 #![cfg(target_os = "linux")]
 #![allow(clippy::unwrap_used)]
 
+#[path = "common/run.rs"]
+mod run;
+
 use std::{
     collections::BTreeMap,
     fs,
@@ -14,9 +17,9 @@ use std::{
 };
 
 use hoid_lab::{
-    config::{Condition, Config, Limits, Signal},
+    config::{Condition, Config, Signal},
     plant::InputMap,
-    session::{Batch, Begun, Event, Frame, How, Logged, RunLog, Session, Stem},
+    session::{Batch, Event, Frame, How, Logged, RunLog, Session, Stem},
     task::{Task, held_inputs},
     verify::check,
 };
@@ -136,27 +139,8 @@ fn session(out: &Path, full: usize, until: usize, told: &mut Told) -> Option<Ses
     let mut instant = 0_usize;
     for _ in 0..RUNS {
         let Ok(number) = session.new_number() else { break };
-        let Some(planned) = session.next() else { break };
-        let condition = session.facts.config.condition[0].clone();
-        let task = Task::new(&condition, 0, number as u64).unwrap();
-        let begun = Begun {
-            hoid: "test".to_owned(),
-            number,
-            planned,
-            training: false,
-            utc: String::new(),
-            condition,
-            cell: 0,
-            replication: number as u64,
-            run_in: task.run_in,
-            ticks: task.ticks,
-            input: MAP,
-            device: "mouse".to_owned(),
-            clock: "browser".to_owned(),
-            refresh_ms: 16.7,
-            zero_ms: 1000.0,
-            limits: Limits::default(),
-            phases: task.phases.clone(),
+        let Some((begun, task)) = run::begun(&session, number, MAP) else {
+            break;
         };
         let stem = session.stem(&begun.condition.name, number);
         let log = begun

@@ -2,10 +2,13 @@
 //! when something of them is changed.
 #![allow(clippy::unwrap_used)]
 
+#[path = "common/run.rs"]
+mod run;
+
 use std::{collections::BTreeMap, fs, path::Path};
 
 use hoid_lab::{
-    config::{Condition, Config, Limits, Signal},
+    config::{Condition, Config, Signal},
     plant::InputMap,
     session::{Batch, Begun, Event, Frame, How, RunLog, Session, Stem},
     task::{Task, held_inputs},
@@ -38,28 +41,7 @@ const MAP: InputMap = InputMap {
 };
 
 fn begun(session: &Session, number: usize) -> (Begun, Task) {
-    let condition = session.facts.config.condition[0].clone();
-    let task = Task::new(&condition, 0, number as u64).unwrap();
-    let begun = Begun {
-        hoid: "test".to_owned(),
-        number,
-        planned: session.next().unwrap(),
-        training: false,
-        utc: String::new(),
-        condition,
-        cell: 0,
-        replication: number as u64,
-        run_in: task.run_in,
-        ticks: task.ticks,
-        input: MAP,
-        device: "mouse".to_owned(),
-        clock: "browser".to_owned(),
-        refresh_ms: 16.7,
-        zero_ms: 1000.0,
-        limits: Limits::default(),
-        phases: task.phases.clone(),
-    };
-    (begun, task)
+    run::begun(session, number, MAP).unwrap()
 }
 
 /// Batches of a run up to a tick: an event each 8 ms, a frame each 16.7 ms.

@@ -4,9 +4,7 @@
 //! The order matters: both methods are compared with their own errors, and only then does their
 //! difference become a part of the errors of the operator (`Covariances::add_bias`).
 
-use hoid_model::{
-    Complex64, FamilyOperator, Finding, Form, Record, Verdict, operator_family::Coordinate, uncertainty::variance_along,
-};
+use hoid_model::{FamilyOperator, Finding, Form, Record, Verdict, operator_family::Coordinate};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::{
@@ -409,11 +407,7 @@ fn knows_the_response(of: &OperatorInForm) -> bool {
 fn response_errors(operator: &FamilyOperator, covariance: Option<&[f64]>) -> Option<[f64; BAND_RAD_S.len()]> {
     let covariance = covariance?;
     Some(BAND_RAD_S.map(|omega| {
-        let response = operator.response_and_gradient(omega);
-        let along = |part: fn(Complex64) -> f64| -> f64 {
-            let gradient: Vec<f64> = response.gradient.iter().map(|g| part(g / response.value)).collect();
-            variance_along(&gradient, covariance)
-        };
-        (along(|z| z.re) + along(|z| z.im)).sqrt()
+        let [[gain, _], [_, phase]] = operator.response_and_gradient(omega).relative_covariance(covariance);
+        (gain + phase).sqrt()
     }))
 }

@@ -221,13 +221,11 @@ pub(super) fn operator_of(
 
 /// What has the name of a parameter in each of the forms, averaged.
 fn averaged(own: &Parameter, weighed: &[WeighedForm], record: usize, clusters: usize) -> Option<Parameter> {
-    let of = |form: &'_ WeighedForm| -> Option<(_, f64, Parameter)> {
+    let each = weighed.iter().filter_map(|form| {
         let mut all = form.of(record)?.parameters.iter();
-        Some((form.form, form.weight, all.find(|p| p.name == own.name)?.clone()))
-    };
-    let all: Vec<_> = weighed.iter().filter_map(of).collect();
-    let each: Vec<_> = all.iter().map(|(form, weight, p)| (*form, *weight, p)).collect();
-    Parameter::averaged(&each, clusters)
+        Some((form.form, form.weight, all.find(|p| p.name == own.name)?))
+    });
+    Parameter::averaged(&each.collect::<Vec<_>>(), clusters)
 }
 
 /// The operators of a fit, by its form alone.

@@ -3,9 +3,8 @@
 use std::f64::consts::{LN_10, PI};
 
 use hoid_model::{
-    Complex64, ContinuousTransferFunction, FamilyOperator, Finding, Form, SampleTime, Verdict,
-    operator_family::Coordinate,
-    uncertainty::{Estimate, variance_along},
+    ContinuousTransferFunction, FamilyOperator, Finding, Form, SampleTime, Verdict, operator_family::Coordinate,
+    uncertainty::Estimate,
 };
 
 use super::{
@@ -179,23 +178,26 @@ impl FamilyFit {
         let front = &self.operator(record).operator;
         let point = |&omega: &f64| {
             let middle = front.response(omega);
-            let along = |part: fn(Complex64) -> f64| {
-                let of = |form: &WeighedForm| {
-                    let of = form.of(record)?;
-                    let found = of.operator.response_and_gradient(omega);
-                    let gradient: Vec<f64> = found.gradient.iter().map(|g| part(g / found.value)).collect();
-                    let variance = of.covariance.as_deref().map(|c| variance_along(&gradient, c).max(0.0));
-                    Some(Component {
-                        weight: form.weight,
-                        estimate: Estimate {
-                            value: part((found.value / middle).ln()),
-                            standard_error: variance.map(f64::sqrt),
-                        },
-                        interval: None,
-                    })
+            // Of each form ln of its response over that of the form in front, with variances of gain and phase.
+            let of = |form: &WeighedForm| {
+                let of = form.of(record)?;
+                let found = of.operator.response_and_gradient(omega);
+                let relative = of.covariance.as_deref().map(|c| found.relative_covariance(c));
+                let off = (found.value / middle).ln();
+                Some((form.weight, [off.re, off.im], relative))
+            };
+            let all: Vec<_> = self.weighed.iter().filter_map(of).collect();
+            let along = |part: usize| {
+                let component = |&(weight, off, relative): &(f64, [f64; 2], Option<[[f64; 2]; 2]>)| Component {
+                    weight,
+                    estimate: Estimate {
+                        value: off[part],
+                        standard_error: relative.map(|c| c[part][part].max(0.0).sqrt()),
+                    },
+                    interval: None,
                 };
-                let all: Vec<Component> = self.weighed.iter().filter_map(of).collect();
-                Mixture::of(&all, self.clusters).map_or(Estimate::fixed(0.0), |mixture| mixture.estimate)
+                let mixture = Mixture::of(&all.iter().map(component).collect::<Vec<_>>(), self.clusters);
+                mixture.map_or(Estimate::fixed(0.0), |mixture| mixture.estimate)
             };
             let held = middle * hold(omega, self.sample_time);
             let scaled = |from: f64, unit: f64, e: Estimate| Estimate {
@@ -204,8 +206,8 @@ impl FamilyFit {
             };
             ResponsePoint {
                 omega_rad_s: omega,
-                magnitude_db: scaled(20.0 * held.norm().log10(), 20.0 / LN_10, along(|z| z.re)),
-                phase_deg: scaled(held.arg().to_degrees(), 180.0 / PI, along(|z| z.im)),
+                magnitude_db: scaled(20.0 * held.norm().log10(), 20.0 / LN_10, along(0)),
+                phase_deg: scaled(held.arg().to_degrees(), 180.0 / PI, along(1)),
             }
         };
         omega_rad_s.iter().map(point).collect()
@@ -227,20 +229,9 @@ impl FamilyFit {
         let of = self.operator(record);
         let known = |omega: f64| {
             let found = of.operator.response_and_gradient(omega);
-            let relative = |covariance: &[f64]| {
-                let along = |part: fn(Complex64) -> f64| -> Vec<f64> {
-                    let gradient = found.gradient.iter().map(|g| part(g / found.value));
-                    gradient.collect()
-                };
-                let (re, im) = (along(|z| z.re), along(|z| z.im));
-                let both: Vec<f64> = re.iter().zip(&im).map(|(a, b)| a + b).collect();
-                let [a, c, sum] = [&re, &im, &both].map(|row| variance_along(row, covariance));
-                let b = 0.5 * (sum - a - c);
-                [[a, b], [b, c]]
-            };
             KnownResponse {
                 value: found.value * hold(omega, self.sample_time),
-                relative: of.covariance.as_deref().map(relative),
+                relative: of.covariance.as_deref().map(|c| found.relative_covariance(c)),
             }
         };
         LoopShape::of(known, element, self.sample_time)

@@ -49,7 +49,7 @@ mod open_loop;
 mod options;
 mod ratio;
 mod remnant;
-mod spectrum;
+pub(crate) mod spectrum;
 mod unwrapping;
 mod window;
 

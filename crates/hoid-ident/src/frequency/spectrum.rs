@@ -10,7 +10,7 @@ use hoid_model::Complex64;
 use realfft::RealFftPlanner;
 
 /// `X_k`, k = 0 .. N/2.
-pub(super) fn coefficients(values: &[f64]) -> Vec<Complex64> {
+pub(crate) fn coefficients(values: &[f64]) -> Vec<Complex64> {
     let n = values.len();
     if n == 0 {
         return Vec::new();

@@ -16,14 +16,14 @@
 
 use std::f64::consts::{PI, TAU};
 
-use hoid_model::{Complex64, Finding, Record};
+use hoid_model::{Complex64, Finding, Record, uncertainty::variance_along};
 use rand_chacha::{
     ChaCha8Rng,
     rand_core::{Rng, SeedableRng},
 };
-use realfft::RealFftPlanner;
 
-use crate::{family::noise::NoiseProducts, linalg::least_squares::solve_symmetric};
+use super::whitened::{NOISE, thinning};
+use crate::{family::noise::NoiseProducts, frequency::spectrum, linalg::least_squares::solve_symmetric};
 
 /// Highest frequency that is asked, rad/s.
 const HIGHEST_RAD_S: f64 = 25.0;
@@ -33,9 +33,6 @@ const DELAYS_S: [f64; 8] = [0.05, 0.1, 0.16, 0.23, 0.31, 0.4, 0.52, 0.7];
 const LAG_RATE: f64 = 0.3;
 /// Usual neuromuscular system: rad/s, and damping.
 const NEUROMUSCULAR: (f64, f64) = (11.0, 0.4);
-/// Order of the whitening filters, and the rate to which records are thinned for them, Hz.
-const ORDER: usize = 16;
-const RATE_HZ: f64 = 50.0;
 /// Records without a relation that are drawn.
 const SURROGATES: usize = 1999;
 /// Fewest frequencies.
@@ -96,11 +93,11 @@ pub fn response(records: &[Record]) -> Option<Response> {
         return None;
     }
     let power: f64 = all.iter().flat_map(|s| &s.u).map(Complex64::norm_sqr).sum();
-    let gram = gram(&all);
+    let inverse = inverse_gram(&all)?;
     // Of each frequency and delay the products of columns and output; a surrogate turns them.
     let products: Vec<[[Complex64; COLUMNS]; DELAYS_S.len()]> = all.iter().flat_map(Spectra::products).collect();
     let mut turns = vec![Complex64::ONE; products.len()];
-    let share = |turns: &[Complex64]| -> Option<f64> {
+    let share = |turns: &[Complex64]| -> f64 {
         let mut sums = [[0.0; COLUMNS]; DELAYS_S.len()];
         for (product, turn) in products.iter().zip(turns) {
             for (sum, column) in sums.iter_mut().zip(product) {
@@ -109,13 +106,10 @@ pub fn response(records: &[Record]) -> Option<Response> {
                 }
             }
         }
-        let explained = sums.iter().map(|right| {
-            let b = solve_symmetric(&gram, right)?;
-            Some(b.iter().zip(right).map(|(b, r)| b * r).sum::<f64>())
-        });
-        explained.flatten().reduce(f64::max).map(|most| most / power)
+        let explained = sums.iter().map(|right| variance_along(right, &inverse));
+        explained.fold(f64::NEG_INFINITY, f64::max) / power
     };
-    let own = share(&turns)?;
+    let own = share(&turns);
     if !own.is_finite() {
         return None;
     }
@@ -126,7 +120,7 @@ pub fn response(records: &[Record]) -> Option<Response> {
             // 32 bits of a phase are more than enough.
             *turn = Complex64::from_polar(1.0, TAU * f64::from(generator.next_u32()) / 4_294_967_296.0);
         }
-        reached_by += usize::from(share(&turns)? >= own);
+        reached_by += usize::from(share(&turns) >= own);
     }
     Some(Response {
         share: own,
@@ -135,8 +129,9 @@ pub fn response(records: &[Record]) -> Option<Response> {
     })
 }
 
-/// `sum Re(x_i* x_j)`: no delay and no phase of E changes it.
-fn gram(all: &[Spectra]) -> [f64; COLUMNS * COLUMNS] {
+/// Inverse by rows of `sum Re(x_i* x_j)`, which no delay and no phase of E changes; `None` where columns are not
+/// independent.
+fn inverse_gram(all: &[Spectra]) -> Option<Vec<f64>> {
     let mut gram = [0.0; COLUMNS * COLUMNS];
     for spectra in all {
         for (columns, e) in spectra.columns.iter().zip(&spectra.e) {
@@ -147,12 +142,17 @@ fn gram(all: &[Spectra]) -> [f64; COLUMNS * COLUMNS] {
             }
         }
     }
-    gram
+    let column = |i: usize| {
+        let unit: [f64; COLUMNS] = std::array::from_fn(|j| f64::from(i == j));
+        solve_symmetric(&gram, &unit)
+    };
+    let columns: Option<Vec<Vec<f64>>> = (0..COLUMNS).map(column).collect();
+    Some(columns?.concat())
 }
 
 impl Spectra {
     fn of(record: &Record) -> Option<Self> {
-        let thin = (1.0 / (record.sample_time().s() * RATE_HZ) + 1e-6).floor().max(1.0) as usize;
+        let thin = thinning(record.sample_time().s());
         let sample_time_s = thin as f64 * record.sample_time().s();
         let (e, d_e) = whitened(record.input(), thin)?;
         let (u, d_u) = whitened(record.output(), thin)?;
@@ -197,13 +197,13 @@ fn whitened(channel: &[f64], thin: usize) -> Option<(Vec<f64>, Vec<f64>)> {
         .collect();
     let mean = thinned.iter().sum::<f64>() / thinned.len() as f64;
     thinned.iter_mut().for_each(|v| *v -= mean);
-    if thinned.len() < 8 * ORDER || !thinned.iter().all(|v| v.is_finite()) {
+    if thinned.len() < 8 * NOISE || !thinned.iter().all(|v| v.is_finite()) {
         return None;
     }
     let series = [thinned];
-    let d = NoiseProducts::new(&series, ORDER).fit(ORDER)?.d;
+    let d = NoiseProducts::new(&series, NOISE).fit(NOISE)?.d;
     let [thinned] = series;
-    let white = (ORDER..thinned.len())
+    let white = (NOISE..thinned.len())
         .map(|t| thinned[t] + (d.iter().enumerate()).map(|(k, d)| d * thinned[t - k - 1]).sum::<f64>())
         .collect();
     Some((white, d))
@@ -217,13 +217,11 @@ fn filter(d: &[f64], omega_ts: f64) -> Complex64 {
     })
 }
 
+/// `sum x_t e^{-j omega t}` in these bins.
 fn coefficients(values: &[f64], bins: std::ops::RangeInclusive<usize>) -> Vec<Complex64> {
-    let transform = RealFftPlanner::<f64>::new().plan_fft_forward(values.len());
-    let mut input = values.to_vec();
-    let mut output = transform.make_output_vec();
-    // Both lengths are those that the plan was made for, so that there is no error to report.
-    let _ = transform.process(&mut input, &mut output);
-    output[bins].to_vec()
+    // Amplitudes of sinusoids there: a record counts by its length here.
+    let scale = 0.5 * values.len() as f64;
+    spectrum::coefficients(values)[bins].iter().map(|x| x * scale).collect()
 }
 
 #[cfg(test)]

@@ -62,6 +62,22 @@ pub struct FamilyResponse {
     pub gradient: Vec<Complex64>,
 }
 
+impl FamilyResponse {
+    /// Covariance of real and imaginary part of `dY/Y = d ln Y`, of gain and phase, from that of the coordinates by
+    /// rows.
+    pub fn relative_covariance(&self, covariance: &[f64]) -> [[f64; 2]; 2] {
+        let along = |part: fn(Complex64) -> f64| -> Vec<f64> {
+            let gradient = self.gradient.iter().map(|g| part(g / self.value));
+            gradient.collect()
+        };
+        // Along both: their sum holds the covariance of the two twice.
+        let [a, c, both] = [along(|z| z.re), along(|z| z.im), along(|z| z.re + z.im)]
+            .map(|gradient| variance_along(&gradient, covariance));
+        let b = 0.5 * (both - a - c);
+        [[a, b], [b, c]]
+    }
+}
+
 /// A parameter as it is reported.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct NamedParameter {
@@ -392,6 +408,19 @@ mod tests {
 
     fn usual(form: Form) -> FamilyOperator {
         operator(form, true, 0.1837)
+    }
+
+    /// A gain moves the real part of `dY/Y`, a delay the imaginary part, and both together neither's other.
+    #[test]
+    fn relative_covariance_of_a_gain_and_a_delay() {
+        let operator = FamilyOperator::new(Form::Gain, false, &[2.0, 0.3]).unwrap();
+        let response = operator.response_and_gradient(5.0);
+        let [[gain, both], [again, phase]] = response.relative_covariance(&[0.04, 0.003, 0.003, 0.01]);
+        let expected = [0.04 / 4.0, -5.0 * 0.003 / 2.0, 25.0 * 0.01];
+        for (found, expected) in [gain, both, phase].into_iter().zip(expected) {
+            assert!((found - expected).abs() < 1e-14, "{found} {expected}");
+        }
+        assert_eq!(both, again);
     }
 
     #[test]

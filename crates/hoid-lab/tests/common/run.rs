@@ -1,0 +1,35 @@
+//! A run of a session as its page begins it.
+
+use hoid_lab::{
+    config::Limits,
+    plant::InputMap,
+    session::{Begun, Session},
+    task::Task,
+};
+
+/// The next run, under a number.
+pub fn begun(session: &Session, number: usize, input: InputMap) -> Option<(Begun, Task)> {
+    let planned = session.next()?;
+    let condition = session.facts.config.condition[0].clone();
+    let task = Task::new(&condition, 0, number as u64).ok()?;
+    let begun = Begun {
+        hoid: "test".to_owned(),
+        number,
+        planned,
+        training: false,
+        utc: String::new(),
+        condition,
+        cell: 0,
+        replication: number as u64,
+        run_in: task.run_in,
+        ticks: task.ticks,
+        input,
+        device: "mouse".to_owned(),
+        clock: "browser".to_owned(),
+        refresh_ms: 16.7,
+        zero_ms: 1000.0,
+        limits: Limits::default(),
+        phases: task.phases.clone(),
+    };
+    Some((begun, task))
+}
