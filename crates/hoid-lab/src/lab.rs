@@ -78,6 +78,7 @@ struct Shared {
 
 struct Page {
     role: Option<Role>,
+    browser: BTreeMap<String, String>,
     sender: Sender<Outgoing>,
 }
 
@@ -165,11 +166,19 @@ impl Lab {
     /// A page is there; its number.
     pub fn join(&self, sender: Sender<Outgoing>) -> u64 {
         let id = self.next_page.fetch_add(1, Ordering::Relaxed);
-        self.shared.pages().insert(id, Page { role: None, sender });
+        self.shared.pages().insert(
+            id,
+            Page {
+                role: None,
+                browser: BTreeMap::new(),
+                sender,
+            },
+        );
         id
     }
 
-    /// A page is gone; a run of it is broken off.
+    /// A page is gone; a run of it is broken off, and the session goes on in the newest window that is left: a page
+    /// that is loaded again may have come before the old one is known to be gone.
     pub fn leave(&self, id: u64) {
         self.shared.pages().remove(&id);
         let mut state = self.shared.state();
@@ -178,7 +187,14 @@ impl Lab {
             state.ready = None;
             // Its files cannot be closed: the session says so when it is opened next.
             let _ = self.shared.end_run(&mut state, How::Interrupted, BTreeMap::new());
+            let left = self.shared.newest_person();
+            if let Some(newest) = left {
+                let _ = self.shared.give(&mut state, newest);
+            }
             drop(state);
+            if let Some(newest) = left {
+                self.shared.tell(&ToPage::Yours {}, |page, _| page == newest);
+            }
             self.shared.tell_state();
         }
     }
@@ -298,16 +314,13 @@ impl Shared {
         }
         if let Some(page) = self.pages().get_mut(&id) {
             page.role = Some(role);
+            page.browser = browser;
         }
         let mut state = self.state();
         if role == Role::Person && state.run.is_none() {
             // The newest window has the session; an older one is told that it has not.
-            let before = state.person.replace(id).filter(|before| *before != id);
-            state.ready = None;
-            if let Some(session) = state.session.as_mut().filter(|_| self.mode == Mode::Sessions) {
-                session.facts.browser.clone_from(&browser);
-                session.save()?;
-            }
+            let before = state.person.filter(|before| *before != id);
+            self.give(&mut state, id)?;
             if let Some(before) = before {
                 let words = "The session goes on in another window; this one looks on.".to_owned();
                 self.tell(&ToPage::Refused { words, elsewhere: true }, |page, _| page == before);
@@ -319,6 +332,34 @@ impl Shared {
         drop(state);
         self.tell_state();
         Ok(())
+    }
+
+    /// The window of the person that came last.
+    fn newest_person(&self) -> Option<u64> {
+        let pages = self.pages();
+        pages
+            .iter()
+            .rev()
+            .find(|(_, page)| page.role == Some(Role::Person))
+            .map(|(id, _)| *id)
+    }
+
+    /// The session goes on in the window `id`.
+    fn give(&self, state: &mut Current, id: u64) -> Result<(), LabError> {
+        state.person = Some(id);
+        state.ready = None;
+        let browser = self
+            .pages()
+            .get(&id)
+            .map(|page| page.browser.clone())
+            .unwrap_or_default();
+        match state.session.as_mut().filter(|_| self.mode == Mode::Sessions) {
+            Some(session) => {
+                session.facts.browser = browser;
+                session.save()
+            }
+            None => Ok(()),
+        }
     }
 
     fn consent(&self, state: &mut Current, subject: &str, agreed: bool, cc0: bool) -> Result<(), LabError> {

@@ -93,6 +93,8 @@ pub enum ToPage<'a> {
     Live { number: usize, line: &'a LiveLine },
     /// What was asked for cannot be; `elsewhere` where the session is in another window.
     Refused { words: String, elsewhere: bool },
+    /// The session goes on in this window, whose other window is gone.
+    Yours {},
 }
 
 /// How a session stands.

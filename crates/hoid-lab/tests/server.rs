@@ -251,7 +251,9 @@ fn a_window_that_is_closed_breaks_its_run_off() {
             .unwrap()
             .contains("another window")
     );
+    // With the first one gone the session goes on in it.
     drop(person);
+    second.hear("yours");
     loop {
         let state = second.hear("state");
         if state["running"].is_null() {
@@ -260,6 +262,7 @@ fn a_window_that_is_closed_breaks_its_run_off() {
             break;
         }
     }
+    assert_eq!(second.begin(), 2);
     let folder = dir.path().join("sub-P01/ses-01");
     assert!(
         Session::read(&folder).unwrap().done[0]

@@ -71,6 +71,10 @@ function hear(message: FromServer): void {
       return;
     case "live":
       return live(message.number, message.line);
+    case "yours":
+      elsewhere = false;
+      screen = "start";
+      return;
     case "refused":
       if (message.elsewhere) {
         elsewhere = true;

@@ -86,7 +86,8 @@ export type FromServer =
   | RunMessage
   | { type: "verdict"; done: Done; measures: Measures }
   | { type: "live"; number: number; line: LiveLine }
-  | { type: "refused"; words: string; elsewhere: boolean };
+  | { type: "refused"; words: string; elsewhere: boolean }
+  | { type: "yours" };
 
 export type FromPage =
   | { type: "hello"; role: "person" | "experimenter"; browser: Record<string, string> }
