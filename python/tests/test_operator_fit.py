@@ -207,3 +207,13 @@ def test_guesses_of_coefficients_have_their_own_name(c1: pyhoid.Record) -> None:
     of_coefficients: Any = {"f1": (-1.9, 1.0)}
     with pytest.raises(pyhoid.OptionError, match="prior belongs to"):
         pyhoid.identify(c1, "bj", prior=of_coefficients)
+
+
+def test_a_simulation_without_noise_gives_its_operator_back() -> None:
+    record = pyhoid.simulate("C1", noise_level=0.0)
+    found = pyhoid.identify(record)
+    assert (found.form, found.verdict.level) == ("lead", "trustworthy")
+    truth = {"K_e": 0.09, "T_L": 0.4, "omega_nm": 11.25, "zeta_nm": 0.35, "tau_e": 0.28}
+    for name, value in truth.items():
+        assert found.parameters[name].value == pytest.approx(value, rel=1e-9)
+    assert [row["weight"] for row in found.forms if row["weight"] > 0] == [1.0]

@@ -130,13 +130,14 @@ const fn slow_of(name: &'static str, package: &'static str, example: &'static st
     }
 }
 
-const SLOW: [Slow; 10] = [
+const SLOW: [Slow; 11] = [
     slow_of("people-coverage", "hoid", "people_coverage"),
     Slow {
         program: Some("hoid-cli"),
         ..slow_of("faults", "hoid", "faults")
     },
     slow_of("faults-clean", "hoid-ident", "faults_clean"),
+    slow_of("little-noise", "hoid-ident", "little_noise"),
     slow_of("tracker-faults", "hoid", "tracker_faults"),
     Slow {
         profile: "dev",

@@ -445,3 +445,84 @@ fn a_loop_that_is_not_stable_is_a_doubt() {
         "{text}"
     );
 }
+
+/// What anybody tries first: a simulation without noise gives its operator back, and says that there is no noise.
+#[test]
+fn a_simulation_without_noise_gives_its_operator_back() {
+    let directory = TempDir::new().unwrap();
+    let d = directory.path();
+    let elements = ["90/(s(s+6))", "30/(s(s+.2))"];
+    for ((condition, gain), element) in [("C1", [0.09, 0.4]), ("C2", [0.07, 1.2])].into_iter().zip(elements) {
+        let simulate = [
+            "simulate",
+            "--condition",
+            condition,
+            "--noise-level",
+            "0",
+            "--out",
+            "run.csv",
+        ];
+        good(d, &simulate);
+        let found = json(d, &["identify", "run.csv", "--controlled-element", element, "--json"]);
+        let verdict = &found["verdict"];
+        assert_eq!(
+            (&found["form"], &verdict["level"]),
+            (&"lead".into(), &"trustworthy".into())
+        );
+        let truth = [
+            ("omega_nm", 11.25),
+            ("zeta_nm", 0.35),
+            ("tau_e", 0.28),
+            ("K_e", gain[0]),
+            ("T_L", gain[1]),
+        ];
+        for (name, expected) in truth {
+            let value = found["operator"][name]["value"].as_f64().unwrap();
+            assert!((value / expected - 1.0).abs() < 1e-9, "{condition} {name}: {value}");
+        }
+        let findings = verdict["findings"]
+            .as_array()
+            .or(verdict["reasons"].as_array())
+            .unwrap();
+        assert!(findings.iter().any(|r| r["kind"] == "no-noise"), "{verdict}");
+        let weights: Vec<f64> = (found["forms"].as_array().unwrap().iter())
+            .filter_map(|form| form["weight"].as_f64().filter(|w| *w > 0.0))
+            .collect();
+        assert_eq!(weights, [1.0]);
+        assert_eq!(found["open_loop"]["stable"], true);
+    }
+}
+
+/// With noise at any share of the power of u from rounding to a thousandth the form is the same, and nothing is a doubt.
+#[test]
+fn a_simulation_with_little_noise_is_identified() {
+    let directory = TempDir::new().unwrap();
+    let d = directory.path();
+    for level in ["1e-12", "1e-9", "1e-6", "1e-3"] {
+        let simulate = [
+            "simulate",
+            "--condition",
+            "C1",
+            "--seed",
+            "3",
+            "--noise-level",
+            level,
+            "--out",
+            "run.csv",
+        ];
+        good(d, &simulate);
+        let found = json(d, &["identify", "run.csv", "--json"]);
+        let verdict = &found["verdict"]["level"];
+        assert_eq!(
+            (&found["form"], verdict),
+            (&"lead".into(), &"trustworthy".into()),
+            "{level}"
+        );
+        // Of a gain: 0.3 sqrt(share), and some rounding.
+        let allowed = 0.3 * level.parse::<f64>().unwrap().sqrt();
+        for (name, expected) in [("K_e", 0.09), ("K_e_dot", 0.036), ("tau_e", 0.28)] {
+            let value = found["operator"][name]["value"].as_f64().unwrap();
+            assert!((value / expected - 1.0).abs() < allowed, "{level} {name}: {value}");
+        }
+    }
+}

@@ -353,10 +353,7 @@ impl Fit {
                 needed,
             });
         }
-        let data = Data {
-            e: record.input(),
-            u: record.output(),
-        };
+        let data = Data::new(record.input(), record.output());
         let criterion = Criterion::of_record(orders, data, self.initial_state, first);
         Ok(Series {
             first,

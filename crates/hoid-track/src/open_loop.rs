@@ -110,7 +110,7 @@ impl OpenLoop {
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
-    use hoid_ident::family::loop_measures;
+    use hoid_ident::family::{Intersample, loop_measures};
     use hoid_model::{FamilyOperator, Form, uncertainty::variance_along};
 
     use super::*;
@@ -131,7 +131,7 @@ mod tests {
         let covariance: Vec<f64> = (0..36)
             .map(|k| sizes[k / 6] * sizes[k % 6] * if k / 6 == k % 6 { 1.0 } else { 0.3 })
             .collect();
-        let expected = loop_measures(&operator, Some(&covariance), &element, TS).unwrap();
+        let expected = loop_measures(&operator, Some(&covariance), &element, (TS, Intersample::Auto)).unwrap();
         let parts = |h: Complex64| [h.re, h.im];
         let whole = |omega: f64| {
             let found = operator.response_and_gradient(omega);

@@ -10,6 +10,9 @@
 //! With a stationary past ([`crate::criterion::stationary_noise`]) the states of the noise model
 //! have a known covariance `sigma^2 L L'`: they are `L z` with z of variance sigma^2, and z counts
 //! as further residuals. G then has the rows `[I; G L]` for them.
+//!
+//! A level of u, the constant that is no response to e, enters as linearly, through `-(D/C) 1`, and is
+//! eliminated with the states. It does not die away: its basis vector is as long as the record.
 
 use hoid_core::filter::{SecondOrder, divide_in_place};
 
@@ -32,6 +35,8 @@ pub(crate) struct InitialStateResponses {
     h: Vec<f64>,
     /// Number of states of 1/F; those of the noise model come after them.
     nf: usize,
+    /// Place of the level.
+    level: Option<usize>,
     prior_rows: usize,
 }
 
@@ -48,6 +53,8 @@ pub(crate) struct Past<'a> {
     /// Square roots of the weights of the residuals, from the first residual on; none where all
     /// count the same.
     pub weights: Option<&'a [f64]>,
+    /// Whether u has a level.
+    pub level: bool,
 }
 
 impl InitialStateResponses {
@@ -88,6 +95,16 @@ impl InitialStateResponses {
                 Some(noise) => columns.extend((0..unknown).map(|j| noise.response(&responses, j))),
             }
         }
+        if past.level {
+            let mut level = vec![-1.0; rows + lead];
+            let ones = vec![-1.0; rows + lead];
+            for (i, di) in d.iter().enumerate() {
+                add_scaled(level.get_mut(i + 1..).unwrap_or_default(), *di, &ones);
+            }
+            level.drain(..lead);
+            divide_in_place(c, &mut level);
+            columns.push(level);
+        }
         if let Some(weights) = past.weights {
             for column in &mut columns {
                 column.iter_mut().zip(weights).for_each(|(x, w)| *x *= w);
@@ -96,13 +113,15 @@ impl InitialStateResponses {
         let mut free = Self {
             h,
             nf: f.len(),
+            level: past.level.then(|| columns.len() - 1),
             prior_rows,
             ..Self::default()
         };
         for (index, column) in columns.into_iter().enumerate() {
             let mut whole = vec![0.0; prior_rows];
-            if index >= f.len() && prior_rows > 0 {
-                whole[index - f.len()] = 1.0;
+            // Of a state of the noise.
+            if let Some(z) = index.checked_sub(f.len()).and_then(|state| whole.get_mut(state)) {
+                *z = 1.0;
             }
             whole.extend(column);
             free.orthonormalise(index, whole);
@@ -156,9 +175,11 @@ impl InitialStateResponses {
                 states[l] -= self.r[k][l] * states[k];
             }
         }
-        // States of the noise model do not act on w.
-        for (&index, &x) in self.kept.iter().zip(&states).filter(|(index, _)| **index < self.nf) {
-            if index < w.len() {
+        // States of the noise model do not act on w, nor does a level.
+        for (&index, &x) in self.kept.iter().zip(&states) {
+            if Some(index) == self.level {
+                v.iter_mut().for_each(|v| *v -= x);
+            } else if index < self.nf.min(w.len()) {
                 add_scaled(&mut w[index..], x, &self.h);
                 add_scaled(&mut v[index..], -x, &self.h);
             }

@@ -25,7 +25,8 @@
 //! function of theta alone, its gradient is `-psi' eps` exactly (the states are optimal), and the
 //! Gauss-Newton matrix is `psi' (I - Q Q') psi` (the approximation of L. Kaufman, *BIT* 15 (1975)
 //! 49-57). A shifted signal differs from the true derivative only by a free response of 1/F or 1/C,
-//! which lies in the span of Q: shifting stays exact.
+//! which lies in the span of Q: shifting stays exact. So does it where u has a level ([`Data::level`]),
+//! which is one more such state.
 //!
 //! With [`InitialState::Backcast`] the past of w is unknown as before, but that of the noise is
 //! stationary ([`stationary_noise`]): the residuals start nd samples earlier, and the state of the

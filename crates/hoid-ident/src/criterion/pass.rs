@@ -67,7 +67,7 @@ impl Criterion<'_> {
         ws: &mut Workspace,
         show: &mut dyn FnMut(&EliminatedStates, Range<usize>, &Workspace),
     ) -> Option<EliminatedStates> {
-        let Data { e, u } = self.data[record];
+        let Data { e, u, .. } = self.data[record];
         let plain = self.weights.is_none() && self.initial != InitialState::Backcast;
         // Long lags leave the head no residuals.
         let least = 2 * (self.first + self.orders.nk) + SPAN;
@@ -77,6 +77,7 @@ impl Criterion<'_> {
         let begin = Data {
             e: &e[..head.min(e.len())],
             u: &u[..head],
+            ..self.data[record]
         };
         let states = self.residual_pass(theta, record, begin, ws);
         if !states.responses.have_died(head - self.first) {

@@ -10,16 +10,19 @@ use crate::linalg::products::variance;
 pub(crate) struct Data<'a> {
     pub e: &'a [f64],
     pub u: &'a [f64],
+    /// Whether u has a constant that is no response to e, an unknown as the initial states are.
+    pub level: bool,
 }
 
 impl<'a> Data<'a> {
+    /// Input and output without a level.
+    pub fn new(e: &'a [f64], u: &'a [f64]) -> Self {
+        Self { e, u, level: false }
+    }
+
     /// Input and output of each record.
     pub fn of(records: &'a [Record]) -> Vec<Self> {
-        let one = |r: &'a Record| Self {
-            e: r.input(),
-            u: r.output(),
-        };
-        records.iter().map(one).collect()
+        records.iter().map(|r| Self::new(r.input(), r.output())).collect()
     }
 }
 
@@ -60,14 +63,15 @@ impl<'a> Criterion<'a> {
         self.data.iter().map(|d| d.u.len().saturating_sub(self.first)).sum()
     }
 
-    /// Number of initial states over all records.
+    /// Number of initial states and levels over all records.
     pub fn states(&self) -> usize {
-        match self.initial {
-            InitialState::Zero => 0,
-            InitialState::Estimate => self.data.len() * (self.orders.nf + self.orders.nc),
+        let of_record = match self.initial {
+            InitialState::Zero => return 0,
+            InitialState::Estimate => self.orders.nf + self.orders.nc,
             // The states of the noise are random numbers with a known variance, not parameters.
-            InitialState::Backcast => self.data.len() * self.orders.nf,
-        }
+            InitialState::Backcast => self.orders.nf,
+        };
+        self.data.len() * of_record + self.data.iter().filter(|d| d.level).count()
     }
 
     /// First sample at which w and v are computed.

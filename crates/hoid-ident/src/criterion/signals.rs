@@ -68,6 +68,7 @@ impl Criterion<'_> {
                 lead: self.first - regressed,
                 noise: states.noise.as_ref(),
                 weights,
+                level: data.level,
             };
             states.responses = InitialStateResponses::of(&past, n - self.first);
             states.z = states

@@ -111,14 +111,12 @@ fn criterion<'a>(orders: Orders, data: Vec<Data<'a>>, initial: InitialState) -> 
 fn gradient_agrees_with_finite_differences_in_both_modes() {
     let (e, u) = record(300);
     for initial in [InitialState::Zero, InitialState::Estimate, InitialState::Backcast] {
-        for (orders, theta) in cases() {
-            let data = vec![
-                Data { e: &e, u: &u },
-                Data {
-                    e: &e[40..170],
-                    u: &u[40..170],
-                },
-            ];
+        for ((orders, theta), level) in cases()
+            .into_iter()
+            .flat_map(|case| [(case.clone(), false), (case, true)])
+        {
+            let both = [Data::new(&e, &u), Data::new(&e[40..170], &u[40..170])];
+            let data = both.map(|data| Data { level, ..data }).to_vec();
             let c = criterion(orders, data, initial);
             let mut ws = Workspace::default();
             let exact = c.linearise(&theta, &mut ws);
@@ -136,7 +134,7 @@ fn gradient_agrees_with_finite_differences_in_both_modes() {
                 let scale = exact.gram[i * theta.len() + i].sqrt() * exact.sum_of_squares.sqrt();
                 assert!(
                     (slope - ours).abs() < 1e-7 * scale,
-                    "{initial:?} {orders} {}: {ours} and {slope}",
+                    "{initial:?} {orders} level {level} {}: {ours} and {slope}",
                     orders.parameter_names()[i]
                 );
             }
@@ -156,7 +154,7 @@ fn residuals_obey_the_model_equation() {
         nk: 3,
         ..Orders::default()
     };
-    let c = criterion(orders, vec![Data { e: &e, u: &u }], InitialState::Zero);
+    let c = criterion(orders, vec![Data::new(&e, &u)], InitialState::Zero);
     let eps = c.residuals_of(&theta, 0, &mut Workspace::default());
     // Written out sample by sample with zeros before the record.
     let get = |x: &[f64], t: usize, lag: usize| if t >= lag { x[t - lag] } else { 0.0 };
@@ -175,8 +173,15 @@ fn estimated_states_leave_nothing_to_gain() {
     // Shifting w by any free response must not lower the loss: the residual is orthogonal to the
     // basis.
     let (e, u) = record(300);
-    for (orders, theta) in cases() {
-        let c = criterion(orders, vec![Data { e: &e, u: &u }], InitialState::Estimate);
+    for ((orders, theta), level) in cases()
+        .into_iter()
+        .flat_map(|case| [(case.clone(), false), (case, true)])
+    {
+        let data = Data {
+            level,
+            ..Data::new(&e, &u)
+        };
+        let c = criterion(orders, vec![data], InitialState::Estimate);
         let eps = c.residuals_of(&theta, 0, &mut Workspace::default());
         let parts = Polynomials::split(&orders, &theta);
         let past = Past {
@@ -186,9 +191,13 @@ fn estimated_states_leave_nothing_to_gain() {
             lead: orders.nd,
             noise: None,
             weights: None,
+            level,
         };
         let free = InitialStateResponses::of(&past, eps.len());
-        assert_eq!(free.basis().count(), orders.nf + orders.nc, "{orders}");
+        assert_eq!(
+            (free.basis().count(), c.states()),
+            (c.states(), orders.nf + orders.nc + usize::from(level))
+        );
         for q in free.basis() {
             assert!(dot(q, &eps[..q.len()]).abs() < 1e-12);
         }
@@ -211,10 +220,7 @@ fn estimated_states_of_a_noise_free_record_are_exact() {
         nk: 3,
         ..Orders::default()
     };
-    let data = Data {
-        e: &e[100..],
-        u: &u[100..],
-    };
+    let data = Data::new(&e[100..], &u[100..]);
     let c = criterion(orders, vec![data], InitialState::Estimate);
     assert!(
         c.residuals_of(&theta, 0, &mut Workspace::default())
@@ -227,6 +233,23 @@ fn estimated_states_of_a_noise_free_record_are_exact() {
             .iter()
             .any(|v| v.abs() > 1e-2)
     );
+    // So they are where u has a level.
+    let lifted: Vec<f64> = u[100..].iter().map(|u| u + 3.0).collect();
+    let left = |level: bool| {
+        let data = Data {
+            level,
+            ..Data::new(&e[100..], &lifted)
+        };
+        let residuals =
+            criterion(orders, vec![data], InitialState::Estimate).residuals_of(&theta, 0, &mut Workspace::default());
+        residuals.iter().fold(0.0_f64, |most, v| most.max(v.abs()))
+    };
+    assert!(
+        left(true) < 1e-12 && left(false) > 0.1,
+        "{} {}",
+        left(true),
+        left(false)
+    );
 }
 
 #[test]
@@ -238,7 +261,7 @@ fn the_unconditional_sum_of_squares_is_that_of_the_covariance_matrix() {
         ..Orders::default()
     };
     let theta = vec![-1.5, 0.7, 0.4];
-    let c = criterion(orders, vec![Data { e: &[], u: &u }], InitialState::Backcast);
+    let c = criterion(orders, vec![Data::new(&[], &u)], InitialState::Backcast);
     let ours = c.linearise(&theta, &mut Workspace::default()).sum_of_squares;
     // Autocovariance of C/A eps from its impulse response; the poles have the modulus 0.84,
     // 0.84^400 = 1e-30.
@@ -258,7 +281,7 @@ fn weights_act_as_a_diagonal_matrix_and_keep_the_gradient_exact() {
     let (e, u) = record(200);
     for initial in [InitialState::Zero, InitialState::Estimate, InitialState::Backcast] {
         for (orders, theta) in cases().into_iter().take(4) {
-            let plain = criterion(orders, vec![Data { e: &e, u: &u }], initial);
+            let plain = criterion(orders, vec![Data::new(&e, &u)], initial);
             let weights = vec![
                 (plain.first..200)
                     .map(|t| if t % 7 == 0 { 0.3 } else { 1.0 })
@@ -297,7 +320,7 @@ fn weights_act_as_a_diagonal_matrix_and_keep_the_gradient_exact() {
 fn a_later_first_residual_leaves_the_gradient_exact() {
     let (e, u) = record(300);
     let (orders, theta) = cases().remove(1);
-    let data = vec![Data { e: &e, u: &u }];
+    let data = vec![Data::new(&e, &u)];
     let late = Criterion {
         first: 40,
         ..criterion(orders, data, InitialState::Estimate)
@@ -335,7 +358,7 @@ fn add_in_spans(
 fn long_records_pass_span_by_span_to_the_same_sums() {
     // Heads of which the rest is whole spans and a part of one.
     let (e, u) = record(9001);
-    let long = Data { e: &e, u: &u };
+    let long = Data::new(&e, &u);
     let head = 4096;
     for initial in [InitialState::Zero, InitialState::Estimate] {
         for (orders, theta) in cases() {
@@ -389,7 +412,7 @@ fn long_records_pass_span_by_span_to_the_same_sums() {
 #[test]
 fn what_does_not_die_away_passes_whole() {
     let (e, u) = record(9001);
-    let data = vec![Data { e: &e, u: &u }];
+    let data = vec![Data::new(&e, &u)];
     let orders = Orders {
         nb: 1,
         nk: 2,

@@ -7,8 +7,8 @@
 
 use hoid_model::{Complex64, Record, Structure};
 
-use super::response_fit::MeasuredResponse;
-use crate::{Estimator, IdentError};
+use super::{prediction::NONE, response_fit::MeasuredResponse};
+use crate::{Estimator, Fit, IdentError, ResponsePoint};
 
 /// Order of A.
 const POLES: usize = 16;
@@ -22,42 +22,78 @@ const POINTS: usize = 24;
 /// Longest part of the response to an error that B holds, s.
 const RESPONSE_S: f64 = 0.7;
 
-/// The response with its variances.
-///
-/// # Errors
-/// Those of the regression with the fewest coefficients.
-pub(super) fn arx_response(records: &[Record]) -> Result<Vec<MeasuredResponse>, IdentError> {
-    let ts = records[0].sample_time();
+/// A response without a form.
+#[derive(Debug, Clone)]
+pub(super) struct ArxResponse {
+    /// With its variances.
+    pub points: Vec<MeasuredResponse>,
+    /// Share of the power of u that the innovations have.
+    innovations: f64,
+}
+
+impl ArxResponse {
+    /// Of all records together: a smooth record determines fewer coefficients.
+    ///
+    /// # Errors
+    /// Those of the regression with the fewest coefficients.
+    pub fn of(records: &[Record]) -> Result<Self, IdentError> {
+        regressed(records, false)
+    }
+
+    /// The same where there is hardly any noise, to as many coefficients of B as there may be: u without noise leaves
+    /// those of A open, and B is to be as long as the delay. `None` where there is more.
+    pub fn without_noise(records: &[Record]) -> Option<Self> {
+        regressed(records, true).ok().filter(|found| found.innovations < NONE)
+    }
+
+    fn of_fit(records: &[Record], fit: &Fit) -> Self {
+        let ts = records[0].sample_time();
+        let squares: f64 = records.iter().flat_map(Record::output).map(|u| u * u).sum();
+        let samples: usize = records.iter().map(Record::len).sum();
+        let highest = BAND_RAD_S.1.min(0.8 * ts.nyquist_rad_s());
+        let omega: Vec<f64> = (0..POINTS)
+            .map(|i| BAND_RAD_S.0 * (highest / BAND_RAD_S.0).powf(i as f64 / (POINTS as f64 - 1.0)))
+            .collect();
+        Self {
+            points: fit.frequency_response(&omega).iter().map(measured).collect(),
+            innovations: fit.innovation_variance() * samples as f64 / squares,
+        }
+    }
+}
+
+/// The regression with half as many coefficients, of A alone or of both, as long as the records do not determine them.
+fn regressed(records: &[Record], of_a_alone: bool) -> Result<ArxResponse, IdentError> {
+    let gains = (RESPONSE_S / records[0].sample_time().s()).ceil() as usize;
     let shortest = records.iter().map(Record::len).min().unwrap_or(0);
-    let gains = ((RESPONSE_S / ts.s()).ceil() as usize)
-        .clamp(4, MOST_GAINS)
-        .min(shortest / 8);
     let mut orders = Structure::Arx.operator_orders(1);
     orders.na = POLES.min(shortest / 12).max(2);
-    orders.nb = gains.max(2);
-    let mut found = Estimator::new(Structure::Arx, orders).fit(records);
-    // A smooth record does not determine so many coefficients: as many as it does.
-    while found.is_err() && orders.na.max(orders.nb) > FEWEST {
-        orders.na = orders.na.div_ceil(2).max(2);
-        orders.nb = orders.nb.div_ceil(2).max(2);
-        found = Estimator::new(Structure::Arx, orders).fit(records);
-    }
-    let fit = found?;
-    let highest = BAND_RAD_S.1.min(0.8 * ts.nyquist_rad_s());
-    let omega: Vec<f64> = (0..POINTS)
-        .map(|i| BAND_RAD_S.0 * (highest / BAND_RAD_S.0).powf(i as f64 / (POINTS as f64 - 1.0)))
-        .collect();
-    let of = |point: &crate::ResponsePoint| {
-        let gain = 10f64.powf(point.magnitude_db.value / 20.0);
-        let error = |e: Option<f64>| e.unwrap_or(0.0);
-        let relative = error(point.magnitude_db.standard_error) * std::f64::consts::LN_10 / 20.0;
-        let turn = error(point.phase_deg.standard_error).to_radians();
-        MeasuredResponse {
-            omega_rad_s: point.omega_rad_s,
-            response: Complex64::from_polar(gain, point.phase_deg.value.to_radians()),
-            // Never better known than to a thousandth: an exact fit has no variance.
-            variance: gain * gain * (relative * relative + turn * turn).max(1e-6),
+    orders.nb = gains.clamp(4, MOST_GAINS).min(shortest / 8).max(2);
+    loop {
+        let found = Estimator::new(Structure::Arx, orders).fit(records);
+        let has_more = if of_a_alone {
+            orders.na > 2
+        } else {
+            orders.na.max(orders.nb) > FEWEST
+        };
+        if found.is_ok() || !has_more {
+            return found.map(|fit| ArxResponse::of_fit(records, &fit));
         }
-    };
-    Ok(fit.frequency_response(&omega).iter().map(of).collect())
+        orders.na = orders.na.div_ceil(2).max(2);
+        if !of_a_alone {
+            orders.nb = orders.nb.div_ceil(2).max(2);
+        }
+    }
+}
+
+fn measured(point: &ResponsePoint) -> MeasuredResponse {
+    let gain = 10f64.powf(point.magnitude_db.value / 20.0);
+    let error = |e: Option<f64>| e.unwrap_or(0.0);
+    let relative = error(point.magnitude_db.standard_error) * std::f64::consts::LN_10 / 20.0;
+    let turn = error(point.phase_deg.standard_error).to_radians();
+    MeasuredResponse {
+        omega_rad_s: point.omega_rad_s,
+        response: Complex64::from_polar(gain, point.phase_deg.value.to_radians()),
+        // Never better known than to a thousandth: an exact fit has no variance.
+        variance: gain * gain * (relative * relative + turn * turn).max(1e-6),
+    }
 }

@@ -61,7 +61,7 @@ pub(super) struct Chosen<'p, 'a> {
     pub records: &'p [Record],
     /// Channel of the recorded excitation.
     pub excitation: Option<&'p str>,
-    /// Variation of a person's gain from one run to the next, as a part of it.
+    /// Variation of a person's gain from one run to the next, as a part of it; zero where there is no noise, of no person.
     pub run_to_run: f64,
     /// Highest order of the noise models that the estimate is held against.
     pub highest_order: usize,
@@ -79,6 +79,8 @@ impl Chosen<'_, '_> {
         } else {
             self.prediction.data.len()
         };
+        let noise_free = self.prediction.noise_free();
+        let unseen = self.prediction.little_noise.is_none();
         let mut errors = Errors::of(fit, self.run_to_run, workspace);
         let error_ratio = errors.largest_ratio(fit);
         // What the estimate owes to its noise model: a part of its errors, and of what methods may
@@ -89,14 +91,17 @@ impl Chosen<'_, '_> {
             Some(Ok(found)) => (Some(found), None),
             Some(Err(error)) => (None, Some(error.to_string())),
         };
-        let agreement = agreement_of(
-            fit,
-            &Estimated::of(fit, &errors, 0)?,
-            self.lines.fit.as_ref(),
-            instrumental.as_ref().filter(|found| found.termination.converged()),
-            &others,
-        );
-        add_bias(&mut errors, fit, self.lines.fit.as_ref(), separate, &others);
+        let mut agreement = None;
+        if noise_free.is_none() {
+            agreement = agreement_of(
+                fit,
+                &Estimated::of(fit, &errors, 0)?,
+                self.lines.fit.as_ref(),
+                instrumental.as_ref().filter(|found| found.termination.converged()),
+                &others,
+            );
+            add_bias(&mut errors, fit, self.lines.fit.as_ref(), separate, (&others, unseen));
+        }
         let mut weighed = vec![in_form(fit, &errors, self.weight, separate)?];
         for other in &self.beside {
             let form = self.weighed(other, separate, workspace)?;
@@ -109,7 +114,10 @@ impl Chosen<'_, '_> {
         for record in 0..separate {
             operators.push(operator_of(fit, &errors, &weighed, record)?);
         }
-        let free_model = free_model(fit, workspace);
+        let free_model = match noise_free {
+            None => free_model(fit, workspace),
+            Some(_) => None,
+        };
         let residuals = residuals(fit, workspace);
         let of_delay = layout.delays().first().copied().unwrap_or(0);
         let all_parameters: Vec<_> = operators.iter().flat_map(|o| o.parameters.clone()).collect();
@@ -118,6 +126,7 @@ impl Chosen<'_, '_> {
             delay: (fit.eta()[of_delay], layout.limits()[of_delay]),
             parameters: &all_parameters,
             residuals,
+            noise_free,
             not_constant: constancy(fit, self.run_to_run, workspace),
             lines: self.lines.fit.as_ref(),
             no_lines: self.lines.why_none.as_deref(),
@@ -160,6 +169,9 @@ impl Chosen<'_, '_> {
             innovation_variance: fit.innovation_variance,
             residuals: fit.residuals,
             termination: fit.minimum.termination,
+            intersample: layout.intersample,
+            course_is_known: self.prediction.course_is_known,
+            noise_free,
             sample_time: layout.sample_time,
             verdict,
         })
@@ -167,7 +179,9 @@ impl Chosen<'_, '_> {
 
     /// Refined instrumental variables with the recorded excitation, for one operator of all records.
     fn instrumental(&self, separate: usize, workspace: &mut Workspace) -> Option<Result<InstrumentalFit, IdentError>> {
-        let channel = self.excitation.filter(|_| separate == 1)?;
+        let channel = self
+            .excitation
+            .filter(|_| separate == 1 && self.prediction.noise_free().is_none())?;
         let own = self.fit.layout().coordinates_of(self.fit.eta(), 0);
         let auxiliary = match &self.lines.fit {
             Some(lines) => {
@@ -202,20 +216,24 @@ impl Chosen<'_, '_> {
     fn weighed(&self, of: &Beside<'_>, separate: usize, workspace: &mut Workspace) -> Result<WeighedForm, IdentError> {
         let mut errors = Errors::of(&of.fit, self.run_to_run, workspace);
         let others = rivals(self.prediction, &of.fit, self.highest_order, workspace);
-        add_bias(&mut errors, &of.fit, of.lines.as_ref(), separate, &others);
+        if self.prediction.noise_free().is_none() {
+            let unseen = self.prediction.little_noise.is_none();
+            add_bias(&mut errors, &of.fit, of.lines.as_ref(), separate, (&others, unseen));
+        }
         in_form(&of.fit, &errors, of.weight, separate)
     }
 }
 
 /// What the fit may be off by becomes a part of its errors: its difference to the fit at the
 /// lines, and, for what the lines leave to the prior or without lines, its differences to fits
-/// with other noise models ([`super::sensitivity`]).
+/// with other noise models ([`super::sensitivity`]). `unseen` is false where there is little noise, and little of what no
+/// noise model shows.
 fn add_bias(
     errors: &mut Errors,
     fit: &PredictionFit<'_>,
     lines: Option<&LineFit>,
     separate: usize,
-    others: &[Vec<f64>],
+    (others, unseen): (&[Vec<f64>], bool),
 ) {
     let Some(covariances) = &mut errors.covariances else {
         return;
@@ -237,7 +255,8 @@ fn add_bias(
                 covariances.add_bias(fit, other);
                 covariances.add_besides(fit, other, MORE_WITHOUT_LINES, |_| true);
             }
-            for (place, (coordinate, _)) in fit.layout().elements.iter().enumerate() {
+            let elements = fit.layout().elements.iter().enumerate().filter(|_| unseen);
+            for (place, (coordinate, _)) in elements {
                 let unseen = UNSEEN_WITHOUT_LINES.iter().find(|(of, _)| of == coordinate);
                 covariances.besides[place] += unseen.map_or(0.0, |(_, deviation)| deviation * deviation);
             }

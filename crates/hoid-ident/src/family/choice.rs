@@ -1,7 +1,7 @@
 //! Which forms the data leave, and which of them stands in front.
 //!
 //! Each form has Akaike's criterion, `chi^2 + 2 p` at the lines of an excitation, or `n ln V/kappa + 2 p` of the
-//! prediction error, kappa the inflation of variances. Estimates are averaged over forms by their weights
+//! prediction error, kappa the inflation of variances; with little noise Schwarz's ([`super::comparison`]). Estimates are averaged over forms by their weights
 //! ([`super::mixture`]); parameters have the names of the form in front, the simplest within 2 of the least
 //! (K. P. Burnham and D. R. Anderson, *Model Selection and Multimodel Inference*, 2002, section 2.6: no evidence
 //! against it).
@@ -15,7 +15,8 @@ pub struct FormFigures {
     pub form: Form,
     /// Loss of the prediction error fit.
     pub loss: Option<f64>,
-    /// Akaike's criterion: `chi^2 + 2 p` at the lines, or `n ln V/kappa + 2 p`.
+    /// Akaike's criterion: `chi^2 + 2 p` at the lines, or `n ln V/kappa + 2 p`; with little noise Schwarz's, `ln n` in
+    /// place of 2.
     pub criterion: Option<f64>,
     /// Weight in what is averaged over forms; zero for a form that the data cannot determine, or refute.
     pub weight: f64,

@@ -2,7 +2,8 @@
 //!
 //! Where an excitation was recorded, forms are compared at its lines; else by their prediction
 //! errors, all in units of one inflation kappa, so that a form does not look well by its own large
-//! variance. A form whose parameters the data leave open counts only where all are so.
+//! variance. Where there is little noise ([`super::low_noise`]) there is a true form to be found, and a parameter costs Schwarz's `ln n` (G.
+//! Schwarz, *Annals of Statistics* 6 (1978) 461-464) in place of Akaike's 2. A form whose parameters the data leave open counts only where all are so.
 
 use hoid_model::{FamilyOperator, Form, operator_family::Coordinate};
 
@@ -11,12 +12,15 @@ use super::{
     covariances::{self, Covariances},
     judgement::MOST_DAMPED,
     line_fit::LineFit,
+    prediction::Prediction,
     prediction_fit::PredictionFit,
 };
 use crate::IdentError;
 
 /// Difference of criteria of two forms that are one.
 const THE_SAME: f64 = 0.05;
+/// Sums of squares over another, without noise, that are no worse.
+const NO_BETTER: f64 = 1.1;
 /// Standard errors from zero of a gain that is known.
 const LEAST_ERRORS: f64 = 2.0;
 
@@ -37,13 +41,15 @@ pub(super) struct Comparison {
 
 impl Comparison {
     /// The forms are ordered from the simplest.
-    pub fn of(tried: &[Tried<'_>]) -> Self {
-        let inflation = common_inflation(tried);
-        let criteria: Vec<Option<f64>> = tried.iter().map(|t| criterion(t, inflation)).collect();
+    pub fn of(tried: &[Tried<'_>], prediction: &Prediction<'_>) -> Self {
+        let criteria = criteria(tried, prediction);
         let mut counting = criteria.clone();
         // A form that lacks a lag, where there is one, takes the neuromuscular poles for it.
         retain(&mut counting, |i| !has_lost_its_muscles(&tried[i]));
         retain(&mut counting, |i| tried[i].fit.as_ref().is_ok_and(|fit| !is_open(fit)));
+        if prediction.noise_free().is_some() {
+            simplest_alone(&mut counting, tried, prediction.equal());
+        }
         count_once(&mut counting, tried);
         let (front, weights) = weigh(&counting).map_or((None, Vec::new()), |(front, weights)| (Some(front), weights));
         let figures = tried.iter().zip(criteria).enumerate();
@@ -66,6 +72,19 @@ fn count_once(counting: &mut [Option<f64>], tried: &[Tried<'_>]) {
     {
         counting[quadratic] = None;
     }
+}
+
+/// Without noise a form that is not right leaves a multiple of one that is: of those that fit equally well, the simplest
+/// are left. Sums of squares below `equal` are one.
+fn simplest_alone(counting: &mut [Option<f64>], tried: &[Tried<'_>], equal: f64) {
+    let fit = |i: usize| tried[i].fit.as_ref().ok();
+    let squares = |i: usize| fit(i).map_or(f64::INFINITY, |fit| (fit.loss * fit.residuals as f64).max(equal));
+    let size = |i: usize| fit(i).map_or(usize::MAX, |fit| fit.layout().operator_elements());
+    let those = |counting: &[Option<f64>]| (0..tried.len()).filter(|i| counting[*i].is_some()).collect::<Vec<_>>();
+    let least = those(counting).into_iter().map(squares).fold(f64::INFINITY, f64::min);
+    retain(counting, |i| squares(i) <= NO_BETTER * least);
+    let fewest = those(counting).into_iter().map(size).min();
+    retain(counting, |i| Some(size(i)) == fewest);
 }
 
 /// Leaves those that are good, where any of those that count is.
@@ -117,14 +136,28 @@ fn common_inflation(tried: &[Tried<'_>]) -> f64 {
     all.get(all.len() / 2).copied().unwrap_or(1.0)
 }
 
-/// Akaike's criterion; `None` for a form that could not be fitted.
-fn criterion(tried: &Tried<'_>, inflation: f64) -> Option<f64> {
-    let fit = tried.fit.as_ref().ok()?;
-    let misfit = match &tried.lines {
-        Some(of_lines) => of_lines.chi_squared,
-        None => fit.residuals as f64 * fit.loss.ln() / inflation,
+/// The criterion of each form; `None` for one that could not be fitted.
+fn criteria(tried: &[Tried<'_>], prediction: &Prediction<'_>) -> Vec<Option<f64>> {
+    let little_noise = prediction.little_noise.is_some();
+    let inflation = if little_noise {
+        // That of others is their misfit.
+        let fits = tried.iter().filter_map(|t| t.fit.as_ref().ok());
+        let least = fits.min_by(|a, b| a.loss.total_cmp(&b.loss));
+        least.map_or(1.0, |fit| fit.inflation)
+    } else {
+        common_inflation(tried)
     };
-    Some(misfit + 2.0 * fit.layout().operator_elements() as f64)
+    let of = |tried: &Tried<'_>| {
+        let fit = tried.fit.as_ref().ok()?;
+        let n = fit.residuals as f64;
+        let misfit = match &tried.lines {
+            Some(of_lines) => of_lines.chi_squared,
+            None => n * fit.loss.max(prediction.equal() / n).ln() / inflation,
+        };
+        let cost = if little_noise { n.ln() } else { 2.0 };
+        Some(misfit + cost * fit.layout().operator_elements() as f64)
+    };
+    tried.iter().map(of).collect()
 }
 
 fn figures_of(tried: &Tried<'_>, criterion: Option<f64>, weight: f64) -> FormFigures {

@@ -1,15 +1,17 @@
 //! From records of a person to their operator: what may be chosen, and the searches of each form.
 //! The steps are those of the [module](super).
 
-use hoid_model::{Detrend, Form, Record, SampleTime, Structure, operator_family::Coordinate};
+use hoid_model::{Detrend, Form, Record, Structure, operator_family::Coordinate};
 
 use super::{
-    arx_response::arx_response,
+    arx_response::ArxResponse,
     assembly::{AtLines, Beside, Chosen},
     comparison::{Comparison, Tried},
+    intersample::Intersample,
     line_fit::{LineFit, by_simplicity, line_fit},
     lines::LineData,
-    noise::NoiseProducts,
+    low_noise::{LittleNoise, Starts},
+    noise::{Autoregression, NoiseProducts},
     prediction::{NoiseOrders, Prediction},
     prediction_fit::PredictionFit,
     prior::OperatorPrior,
@@ -32,6 +34,9 @@ const HIGHEST_BESIDE_NC: usize = 8;
 /// Most pairs (nc, nd) that are compared where there is an nc.
 const MOST_NOISE_PAIRS: usize = 60;
 
+/// Why nothing is fitted to the lines where there is little noise.
+const TOO_LITTLE_NOISE: &str = "there is less noise than leakage";
+
 /// What is to be estimated of a person, and how.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FamilyEstimator {
@@ -43,6 +48,8 @@ pub struct FamilyEstimator {
     pub prior: OperatorPrior,
     /// Shortest and longest delay tau_e in s. Default 0.02 to 0.8.
     pub delay_range_s: (f64, f64),
+    /// What the error does between its samples. Default [`Intersample::Auto`].
+    pub intersample: Intersample,
     /// Orders nc of the noise model to choose from. Default 0.
     pub nc: std::ops::RangeInclusive<usize>,
     /// Orders nd of the noise model to choose from. Default 0 to 24.
@@ -73,6 +80,7 @@ impl Default for FamilyEstimator {
             neuromuscular: true,
             prior: OperatorPrior::population(),
             delay_range_s: (0.02, 0.8),
+            intersample: Intersample::Auto,
             nc: 0..=0,
             nd: 0..=HIGHEST_NOISE_ORDER,
             excitation: None,
@@ -157,41 +165,39 @@ impl FamilyEstimator {
         records: &[Record],
         describing: Option<Result<DescribingFunction, IdentError>>,
     ) -> Result<FamilyFit, IdentError> {
-        let sample_time = informative_data::common_sample_time(records)?;
+        informative_data::common_sample_time(records)?;
         let records: Vec<Record> = records.iter().map(|r| r.clone().detrended(self.detrend)).collect();
         let forms = self.sorted_forms()?;
-        let highest = (*self.nc.end(), *self.nd.end());
-        let pairs: Vec<(Form, bool)> = forms.iter().map(|form| (*form, self.neuromuscular)).collect();
-        let first = Prediction::first_residual(&pairs, highest, self.delay_range_s, self.initial_state, sample_time)?;
-        self.check(&records, first)?;
+        let mut prediction = self.prediction(self.intersample, &records, &forms)?;
+        self.check(&records, prediction.first)?;
 
-        let (describing, no_lines) = match describing {
+        let (describing, mut no_lines) = match describing {
             None => (None, None),
             Some(Ok(found)) => (Some(found), None),
             Some(Err(error)) => (None, Some(error.to_string())),
         };
         let lines = describing.as_ref().map(LineData::new);
         // It gives starts alone: the lines do as well.
-        let response = match arx_response(&records) {
+        let response = match ArxResponse::of(&records) {
             Err(error) if lines.is_none() => return Err(error),
-            found => found.unwrap_or_default(),
-        };
-        let prediction = Prediction {
-            data: Data::of(&records),
-            sample_time,
-            initial: self.initial_state,
-            first,
-            delay_range_s: self.delay_range_s,
-            prior: self.prior.clone(),
-            individual: self.individual.clone(),
-            search: self.search,
+            found => found.map_or(Vec::new(), |found| found.points),
         };
         let mut workspace = Workspace::of_thread();
         let mut starts = Vec::new();
         for &form in &forms {
-            starts.push(self.start(form, lines.as_ref(), &response, sample_time)?);
+            starts.push(self.start(form, lines.as_ref(), &response, &prediction)?);
         }
-        let noise = self.noise_orders(&prediction, &starts, &mut workspace)?;
+        let noise = match self.with_little_noise(&prediction, &records, &mut starts, &mut workspace)? {
+            Some(found) => {
+                // They hold the leakage of the record and of its aliases more than such noise.
+                starts.iter_mut().for_each(|start| start.lines = None);
+                no_lines = no_lines.or_else(|| lines.map(|_| TOO_LITTLE_NOISE.to_owned()));
+                prediction = found;
+                prediction.noise_free().map(|_| (*self.nc.start(), *self.nd.start()))
+            }
+            None => None,
+        };
+        let noise = noise.map_or_else(|| self.noise_orders(&prediction, &starts, &mut workspace), Ok)?;
         let count = starts.len();
         let mut tried: Vec<Tried<'_>> = Vec::with_capacity(count);
         for start in starts {
@@ -204,7 +210,7 @@ impl FamilyEstimator {
             });
         }
         progress::step("forms", count, count);
-        let Comparison { front, figures } = Comparison::of(&tried);
+        let Comparison { front, figures } = Comparison::of(&tried, &prediction);
         let Some(front) = front else {
             return Err(tried
                 .into_iter()
@@ -235,7 +241,10 @@ impl FamilyEstimator {
             prediction: &prediction,
             records: &records,
             excitation: self.excitation.as_deref(),
-            run_to_run: self.run_to_run,
+            run_to_run: match prediction.noise_free() {
+                None => self.run_to_run,
+                Some(_) => 0.0,
+            },
             highest_order: *self.nd.end(),
         };
         chosen.result(&mut workspace)
@@ -256,6 +265,95 @@ impl FamilyEstimator {
             });
         }
         Ok(forms)
+    }
+
+    /// The records over this course of the error, with what all forms have in common.
+    fn prediction<'a>(
+        &self,
+        intersample: Intersample,
+        records: &'a [Record],
+        forms: &[Form],
+    ) -> Result<Prediction<'a>, IdentError> {
+        let sample_time = records[0].sample_time();
+        let shortest = intersample.shortest_delay_s(sample_time);
+        let (low, high) = self.delay_range_s;
+        let delay_range_s = (low.max(shortest), high.max(shortest));
+        let first = Prediction::first_residual(
+            &forms.iter().map(|form| (*form, self.neuromuscular)).collect::<Vec<_>>(),
+            (*self.nc.end(), *self.nd.end()),
+            delay_range_s,
+            self.initial_state,
+            (sample_time, intersample),
+        )?;
+        Ok(Prediction {
+            data: Data::of(records),
+            sample_time,
+            intersample,
+            course_is_known: intersample != Intersample::Auto,
+            little_noise: None,
+            initial: self.initial_state,
+            first,
+            delay_range_s,
+            prior: self.prior.clone(),
+            individual: self.individual.clone(),
+            search: self.search,
+        })
+    }
+
+    /// Where there is little noise: the records over the course of the error that they show, with a level where one was
+    /// taken out, and the starts where output errors end. `None` where there is more.
+    fn with_little_noise<'a>(
+        &self,
+        smooth: &Prediction<'_>,
+        records: &'a [Record],
+        starts: &mut [Start],
+        workspace: &mut Workspace,
+    ) -> Result<Option<Prediction<'a>>, IdentError> {
+        let forms: Vec<Form> = starts.iter().map(|start| start.form).collect();
+        let with_level = |intersample| {
+            let mut found = self.prediction(intersample, records, &forms)?;
+            let level = self.detrend == Detrend::Mean;
+            found.data.iter_mut().for_each(|d| d.level = level);
+            Ok::<_, IdentError>(found)
+        };
+        let mut from: Vec<Starts> = starts.iter().map(|s| (s.form, s.coordinates.clone())).collect();
+        let clean = ArxResponse::without_noise(records);
+        if let Some(clean) = &clean {
+            for (form, coordinates) in &mut from {
+                coordinates.extend(self.start(*form, None, &clean.points, smooth)?.coordinates);
+            }
+        }
+        let mut search = |prediction: &Prediction<'_>, from: &[Starts]| {
+            LittleNoise::of(prediction, self.neuromuscular, from, clean.is_some(), workspace)
+        };
+        let mut prediction = with_level(smooth.intersample)?;
+        let Some(mut found) = search(&prediction, &from) else {
+            return Ok(None);
+        };
+        found.move_to_ends(&mut from, 0.0);
+        if self.intersample == Intersample::Auto {
+            let held = with_level(Intersample::Zoh)?;
+            if let Some(other) = search(&held, &from) {
+                let (course, is_known) = LittleNoise::course(&found, &other);
+                match course {
+                    Intersample::Auto => {}
+                    Intersample::Zoh => {
+                        (prediction, found) = (held, other);
+                        found.move_to_ends(&mut from, 0.0);
+                    }
+                    Intersample::Foh => {
+                        prediction = with_level(course)?;
+                        found.move_to_ends(&mut from, 0.5 * smooth.sample_time.s());
+                    }
+                }
+                prediction.course_is_known = is_known;
+            }
+        }
+        for (start, (_, coordinates)) in starts.iter_mut().zip(from) {
+            start.coordinates = coordinates;
+        }
+        prediction.little_noise = Some(found.share);
+        Ok(Some(prediction))
     }
 
     fn check(&self, records: &[Record], first: usize) -> Result<(), IdentError> {
@@ -321,7 +419,7 @@ impl FamilyEstimator {
         form: Form,
         lines: Option<&LineData<'_>>,
         response: &[MeasuredResponse],
-        sample_time: SampleTime,
+        prediction: &Prediction<'_>,
     ) -> Result<Start, IdentError> {
         let of = |points| {
             ResponseCriterion::new(
@@ -329,8 +427,8 @@ impl FamilyEstimator {
                 self.neuromuscular,
                 points,
                 &self.prior,
-                self.delay_range_s,
-                sample_time,
+                prediction.delay_range_s,
+                (prediction.sample_time, prediction.intersample),
             )
         };
         let mut start = Start {
@@ -339,7 +437,7 @@ impl FamilyEstimator {
             coordinates: Vec::new(),
         };
         if let Some(lines) = lines {
-            let (fit, found) = line_fit(lines, &of(&lines.points), &self.search, sample_time)?;
+            let (fit, found) = line_fit(lines, &of(&lines.points), &self.search)?;
             start.coordinates.push(found.coordinates);
             start.lines = Some(fit);
         }
@@ -357,25 +455,30 @@ impl FamilyEstimator {
         workspace: &mut Workspace,
     ) -> Result<NoiseOrders, IdentError> {
         let highest = *self.nd.end();
-        let mut best: Option<(f64, Form, Vec<f64>, NoiseProducts)> = None;
+        let mut left: Vec<(Form, &Vec<f64>, NoiseProducts)> = Vec::new();
         for &Start {
             form, ref coordinates, ..
         } in starts
         {
             for start in coordinates {
-                let Ok(series) = prediction.unexplained((form, self.neuromuscular), start, workspace) else {
-                    continue;
-                };
-                let products = NoiseProducts::new(&series, highest);
-                let Some(loss) = products.fit(highest).map(|f| f.loss) else {
-                    continue;
-                };
-                if best.as_ref().is_none_or(|(known, ..)| loss < *known) {
-                    best = Some((loss, form, start.clone(), products));
+                if let Ok(series) = prediction.unexplained((form, self.neuromuscular), start, workspace) {
+                    left.push((form, start, NoiseProducts::new(&series, highest)));
                 }
             }
         }
-        let (_, form, start, products) = best.ok_or(IdentError::NoFiniteLoss)?;
+        let losses = |fit: fn(&NoiseProducts, usize) -> Option<Autoregression>| {
+            let of = |(i, (_, _, products)): (usize, &(Form, &Vec<f64>, NoiseProducts))| {
+                Some((fit(products, highest)?.loss, i))
+            };
+            left.iter()
+                .enumerate()
+                .filter_map(of)
+                .min_by(|a, b| a.0.total_cmp(&b.0))
+        };
+        let (_, least) = losses(NoiseProducts::fit)
+            .or_else(|| losses(NoiseProducts::fit_up_to))
+            .ok_or(IdentError::NoFiniteLoss)?;
+        let (form, start, products) = left.swap_remove(least);
         let autoregression = products.best_order(self.nd.clone()).ok_or(IdentError::NoFiniteLoss)?;
         if *self.nc.end() == 0 {
             return Ok((0, autoregression));
@@ -383,7 +486,7 @@ impl FamilyEstimator {
         let mut least: Option<(f64, NoiseOrders)> = None;
         for nc in self.nc.clone() {
             for nd in self.nd.clone() {
-                let Ok(fit) = prediction.fit((form, self.neuromuscular), (nc, nd), &start, workspace) else {
+                let Ok(fit) = prediction.fit((form, self.neuromuscular), (nc, nd), start, workspace) else {
                     continue;
                 };
                 let value = fit.residuals as f64 * fit.loss.ln() + 2.0 * (nc + nd) as f64;

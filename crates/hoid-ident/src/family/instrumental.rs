@@ -233,7 +233,7 @@ impl<'p, 'a> Instrumental<'p, 'a> {
                 }
                 let e = &input.inputs[record];
                 let u = simulated_output(&mapped.orders, &mapped.theta, e);
-                let (_, made) = self.of_record(&eta, record, Data { e, u: &u }, workspace)?;
+                let (_, made) = self.of_record(&eta, record, Data::new(e, &u), workspace)?;
                 for (to, from) in z.iter_mut().zip(&made) {
                     to[begun + own.start..begun + own.end].copy_from_slice(&from[own.clone()]);
                 }
@@ -410,7 +410,7 @@ mod tests {
     use hoid_sim::people::{Person, Plant, Population, RemnantKind, Task};
 
     use super::*;
-    use crate::family::FamilyEstimator;
+    use crate::family::{FamilyEstimator, Intersample};
 
     const NOISE_ORDER: usize = 8;
 
@@ -471,11 +471,14 @@ mod tests {
             noise,
             estimator.delay_range_s,
             estimator.initial_state,
-            SampleTime::SIXTIETH,
+            (SampleTime::SIXTIETH, Intersample::Auto),
         );
         let prediction = Prediction {
             data: Data::of(&records),
             sample_time: SampleTime::SIXTIETH,
+            intersample: Intersample::Auto,
+            course_is_known: false,
+            little_noise: None,
             initial: estimator.initial_state,
             first: first.unwrap(),
             delay_range_s: estimator.delay_range_s,

@@ -37,6 +37,8 @@ pub(super) struct Judged<'a> {
     pub delay: (f64, (f64, f64)),
     pub parameters: &'a [Parameter],
     pub residuals: ResidualMeasures,
+    /// Share of the power of u that is left, where it is no noise.
+    pub noise_free: Option<f64>,
     /// A doubt where the person is not the same throughout.
     pub not_constant: Option<Finding>,
     pub lines: Option<&'a LineFit>,
@@ -82,6 +84,18 @@ pub(super) fn findings(judged: &Judged<'_>) -> Vec<Finding> {
     }
     determined(judged, &mut all);
     all.extend(unsettled(judged.weighed));
+    if let Some(share) = judged.noise_free {
+        // What is left are the digits of the data, which no test of residuals and no other method is made for.
+        all.push(Finding::note(
+            "no-noise",
+            format!(
+                "there is no noise: the operator explains u to {:.0e} of its size, as in a simulation and of no person; error bars \
+                 are those of the digits of the data",
+                share.sqrt()
+            ),
+        ));
+        return all;
+    }
     all.extend(judged.residuals.findings());
     all.extend(judged.not_constant.clone());
     methods(judged, &mut all);

@@ -12,6 +12,7 @@ use hoid_model::{
     operator_family::{Coordinate, Form},
 };
 
+use super::intersample::Intersample;
 use crate::grey_box::parametrisation::{Mapped, Parametrisation};
 
 /// Places of the parameters of each record.
@@ -22,6 +23,8 @@ pub(super) struct FamilyLayout {
     pub nc: usize,
     pub nd: usize,
     pub sample_time: SampleTime,
+    /// What the error does between its samples.
+    pub intersample: Intersample,
     /// Place in eta of each slot, for each record.
     positions: Vec<Vec<usize>>,
     limits: Vec<(f64, f64)>,
@@ -36,7 +39,7 @@ impl FamilyLayout {
         records: usize,
         individual: &[Coordinate],
         bounds: &[(f64, f64)],
-        sample_time: SampleTime,
+        (sample_time, intersample): (SampleTime, Intersample),
     ) -> Self {
         let mut layout = Self {
             form,
@@ -44,6 +47,7 @@ impl FamilyLayout {
             nc,
             nd,
             sample_time,
+            intersample,
             positions: vec![Vec::new(); records],
             limits: Vec::new(),
             elements: Vec::new(),
@@ -133,7 +137,7 @@ impl Parametrisation for FamilyLayout {
     fn orders(&self, nk: usize) -> Orders {
         Orders {
             na: 0,
-            nb: self.order() + 2,
+            nb: self.intersample.gains(self.order(), self.form.degree()),
             nc: self.nc,
             nd: self.nd,
             nf: self.order(),
@@ -148,10 +152,7 @@ impl Parametrisation for FamilyLayout {
 
     fn map(&self, eta: &[f64], record: usize, sample: Option<usize>) -> Result<Mapped, ModelError> {
         let operator = self.operator(eta, record)?;
-        let held = match sample {
-            Some(sample) => operator.interpolate_within(sample, self.sample_time)?,
-            None => operator.interpolate(self.sample_time)?,
-        };
+        let held = self.intersample.discrete(&operator, sample, self.sample_time)?;
         let noise = &eta[self.elements.len()..];
         let nb = held.b.len();
         let (coordinates, extra) = (self.coordinates(), noise.len());

@@ -1,6 +1,6 @@
 //! The operator at the lines of the excitation, with its errors by the jackknife over runs.
 
-use hoid_model::{FamilyOperator, Form, SampleTime, uncertainty::Estimate};
+use hoid_model::{FamilyOperator, Form, uncertainty::Estimate};
 
 use super::{
     jackknife::{add_open_part, jackknife},
@@ -63,7 +63,6 @@ pub(super) fn line_fit(
     lines: &LineData<'_>,
     criterion: &ResponseCriterion<'_>,
     search: &SearchOptions,
-    sample_time: SampleTime,
 ) -> Result<(LineFit, ResponseMinimum), IdentError> {
     let found = criterion.fit(search)?;
     let (form, neuromuscular) = (criterion.form, criterion.neuromuscular);
@@ -76,7 +75,8 @@ pub(super) fn line_fit(
             let Some(without) = criterion.with_points(&points).fit_from(&found.coordinates, search) else {
                 continue;
             };
-            held_out.push(lines.chi_squared_of_run(run, &operator_of(&without.coordinates)?, sample_time));
+            let operator = operator_of(&without.coordinates)?;
+            held_out.push(lines.chi_squared_of_run(run, |omega| criterion.sampled(&operator, omega)));
             others.push(without.coordinates);
         }
     }

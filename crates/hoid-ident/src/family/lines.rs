@@ -8,9 +8,9 @@
 //! median of `r_j/b_j`, what runs differ by beyond their remnant (moderated variances; G. K. Smyth,
 //! *Statistical Applications in Genetics and Molecular Biology* 3 (2004), article 3).
 
-use hoid_model::{Complex64, FamilyOperator, SampleTime};
+use hoid_model::Complex64;
 
-use super::response_fit::{MeasuredResponse, hold};
+use super::response_fit::MeasuredResponse;
 use crate::frequency::DescribingFunction;
 
 /// Degrees of freedom nu_0 of what a variance is drawn towards.
@@ -71,13 +71,13 @@ impl<'d> LineData<'d> {
         self.points.iter().zip(&self.describing.lines).map(fewer).collect()
     }
 
-    /// chi^2 of one run against an operator that was fitted without it.
-    pub fn chi_squared_of_run(&self, run: usize, operator: &FamilyOperator, sample_time: SampleTime) -> f64 {
+    /// chi^2 of one run against the sampled response of an operator that was fitted without it.
+    pub fn chi_squared_of_run(&self, run: usize, sampled: impl Fn(f64) -> Complex64) -> f64 {
         let n = self.runs() as f64;
         let of = |(point, line): (&MeasuredResponse, &crate::frequency::Line)| {
             let (a, b) = line.ratio.0[run];
             let whole: Complex64 = line.ratio.0.iter().map(|(_, b)| b).sum();
-            let model = operator.response(point.omega_rad_s) * hold(point.omega_rad_s, sample_time);
+            let model = sampled(point.omega_rad_s);
             // An error of n times the variance of the mean.
             2.0 * ((a - model * b) * n / whole).norm_sqr() / (n * point.variance)
         };

@@ -45,6 +45,8 @@
 //! | `choice` | the weights of the forms, and which of them stands in front |
 //! | `mixture` | an estimate over several forms |
 //! | `agreement` | do methods agree |
+//! | `intersample` | what the error does between its samples |
+//! | `low_noise` | starts by output error, where there is little noise or none |
 //! | `open_loop` | crossover and phase margin |
 //! | `loop_shape` | every crossing, and whether the closed loop is stable |
 //! | `of_polynomials`, `pole_reading` | polynomials back to an operator; which pole is what |
@@ -61,12 +63,14 @@ mod covariances;
 mod estimated;
 mod estimator;
 mod instrumental;
+mod intersample;
 mod jackknife;
 mod judgement;
 mod layout;
 mod line_fit;
 mod lines;
 mod loop_shape;
+mod low_noise;
 mod mixture;
 pub(crate) mod noise;
 mod of_polynomials;
@@ -86,6 +90,7 @@ pub use choice::FormFigures;
 pub use clusters::ClusterKind;
 pub use estimator::{FamilyEstimator, HIGHEST_NOISE_ORDER};
 pub use instrumental::InstrumentalFit;
+pub use intersample::Intersample;
 pub use line_fit::LineFit;
 pub use loop_shape::{KnownResponse, LoopShape};
 pub use of_polynomials::{FamilyConversion, family_of_polynomials};

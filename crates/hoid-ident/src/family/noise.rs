@@ -84,6 +84,14 @@ impl NoiseProducts {
         })
     }
 
+    /// The autoregression of this order, or of the highest below it that there is, with zeros for what it lacks: a smooth v
+    /// without noise is foretold by fewer coefficients to rounding.
+    pub fn fit_up_to(&self, order: usize) -> Option<Autoregression> {
+        let mut found = (0..=order).rev().find_map(|order| self.fit(order))?;
+        found.d.resize(order, 0.0);
+        Some(found)
+    }
+
     /// The order of Akaike's criterion among these.
     pub fn best_order(&self, orders: impl Iterator<Item = usize>) -> Option<usize> {
         let n = self.count as f64;
@@ -191,8 +199,20 @@ mod tests {
     }
 
     #[test]
+    fn a_smooth_series_has_as_many_coefficients_as_it_needs() {
+        let v: Vec<f64> = (0..400).map(|t| (0.1 * f64::from(t)).sin()).collect();
+        let products = NoiseProducts::new(&[v], 24);
+        let found = products.fit_up_to(24).unwrap();
+        assert!(
+            found.d.len() == 24 && found.loss > 0.0 && found.loss < 1e-12,
+            "{found:?}"
+        );
+    }
+
+    #[test]
     fn nothing_to_model_is_no_model() {
-        assert_eq!(NoiseProducts::new(&[vec![0.0; 50]], 4).best_order(0..=4), None);
+        let none = NoiseProducts::new(&[vec![0.0; 50]], 4);
+        assert_eq!((none.best_order(0..=4), none.fit_up_to(4)), (None, None));
         assert_eq!(NoiseProducts::new(&[vec![1.0; 3]], 4).fit(1), None);
     }
 }

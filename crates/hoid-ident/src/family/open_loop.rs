@@ -17,8 +17,8 @@ use hoid_model::{
 
 use super::{
     clusters::quantile,
+    intersample::Intersample,
     mixture::{Component, Mixture, widened},
-    response_fit::hold,
 };
 
 /// Where crossovers are looked for, rad/s.
@@ -236,15 +236,16 @@ fn zero_between(of: impl Fn(f64) -> f64, mut low: (f64, f64), mut high: (f64, f6
     last
 }
 
-/// The measures of an operator whose coordinates have this covariance; `None` where `|L|` does not
-/// fall through one.
+/// The measures of an operator whose coordinates have this covariance, and whose error has this sample time in s and
+/// this course between its samples; `None` where `|L|` does not fall through one.
 pub fn loop_measures(
     operator: &FamilyOperator,
     covariance: Option<&[f64]>,
     element: &ContinuousTransferFunction,
-    sample_time: SampleTime,
+    (sample_time, intersample): (SampleTime, Intersample),
 ) -> Option<LoopMeasures> {
-    let open_loop = |omega: f64| operator.response(omega) * hold(omega, sample_time) * element.response(omega);
+    let open_loop =
+        |omega: f64| operator.response(omega) * intersample.response(omega, sample_time) * element.response(omega);
     let found = Crossover::lowest(open_loop, sample_time)?;
     let response = operator.response_and_gradient(found.omega_rad_s);
     let moved: Vec<[f64; 2]> = (response.gradient.iter())
@@ -270,13 +271,14 @@ mod tests {
         FamilyOperator::new(Form::LeadLag, true, x).unwrap()
     }
 
+    const AUTO: Intersample = Intersample::Auto;
     const X: [f64; 6] = [5.6, 0.6, 0.1, 2.7, -1.7, 0.14];
 
     #[test]
     fn a_gain_over_an_integrator_crosses_at_the_gain() {
         let gain = FamilyOperator::new(Form::Gain, true, &[2.0, 100.0_f64.ln(), 0.7_f64.ln(), 0.1]).unwrap();
         let element = ContinuousTransferFunction::new(&[1.0], &[1.0, 0.0]).unwrap();
-        let found = loop_measures(&gain, None, &element, SampleTime::new(1e-4).unwrap()).unwrap();
+        let found = loop_measures(&gain, None, &element, (SampleTime::new(1e-4).unwrap(), AUTO)).unwrap();
         assert!((found.crossover_rad_s.value - 2.0).abs() < 1e-3);
         // 90 deg less the delay and 2 zeta/omega of the neuromuscular part.
         let expected = 90.0 - (2.0_f64 * (0.1 + 0.014)).to_degrees();
@@ -303,11 +305,11 @@ mod tests {
         for i in 0..6 {
             let mut covariance = vec![0.0; 36];
             covariance[i * 7] = 1e-8;
-            let found = loop_measures(&operator(&X), Some(&covariance), &element, ts).unwrap();
+            let found = loop_measures(&operator(&X), Some(&covariance), &element, (ts, AUTO)).unwrap();
             let at = |by: f64| {
                 let mut x = X;
                 x[i] += by;
-                loop_measures(&operator(&x), None, &element, ts).unwrap()
+                loop_measures(&operator(&x), None, &element, (ts, AUTO)).unwrap()
             };
             let (up, down) = (at(1e-4), at(-1e-4));
             let slope = |get: fn(&LoopMeasures) -> f64| ((get(&up) - get(&down)) / 2e-4).abs();
@@ -327,7 +329,7 @@ mod tests {
         let element = ContinuousTransferFunction::new(&[90.0], &[1.0, 6.0, 0.0]).unwrap();
         for scale in [0.02, 0.1, 0.5] {
             let of = FamilyOperator::new(Form::LeadLag, true, &[scale * X[0], X[1], X[2], X[3], X[4], X[5]]).unwrap();
-            let open_loop = |w: f64| of.response(w) * hold(w, SampleTime::HUNDREDTH) * element.response(w);
+            let open_loop = |w: f64| of.response(w) * AUTO.response(w, SampleTime::HUNDREDTH) * element.response(w);
             let found = Crossover::lowest(open_loop, SampleTime::HUNDREDTH).unwrap();
             assert!(
                 (open_loop(found.omega_rad_s).norm() - 1.0).abs() < 1e-12,
@@ -343,6 +345,9 @@ mod tests {
     fn no_crossover_is_none() {
         let small = FamilyOperator::new(Form::Gain, true, &[1e-6, 2.4, -1.0, 0.1]).unwrap();
         let element = ContinuousTransferFunction::new(&[1.0], &[1.0, 1.0]).unwrap();
-        assert_eq!(loop_measures(&small, None, &element, SampleTime::HUNDREDTH), None);
+        assert_eq!(
+            loop_measures(&small, None, &element, (SampleTime::HUNDREDTH, AUTO)),
+            None
+        );
     }
 }

@@ -17,21 +17,27 @@ use hoid_model::{
 use super::{
     clusters::Clusters,
     coordinates, covariances,
+    intersample::Intersample,
     layout::FamilyLayout,
-    noise::NoiseProducts,
+    noise::{Autoregression, NoiseProducts},
     prediction_fit::{OPEN, PredictionFit},
     prior::OperatorPrior,
 };
 use crate::{
-    IdentError, InitialState, SearchOptions,
+    IdentError, InitialState, Reason, SearchOptions,
     criterion::{Criterion, Data, Workspace, first_residual},
     grey_box::{
         objective::{Penalty, PhysicalCriterion},
         parametrisation::Parametrisation,
     },
+    linalg::least_squares::dot,
     optimize::{Linearisation, Minimum},
 };
 
+/// Share of the power of u below which what an operator leaves is no noise, but the digits of a file.
+pub(super) const NONE: f64 = 1e-8;
+/// Share below which one form does not fit better than another: where a search without noise comes to rest is chance.
+pub(super) const EQUAL: f64 = 1e-18;
 /// Rounds in which sigma^2 and kappa of the prior are brought up to date.
 const ROUNDS: usize = 3;
 /// Relative change of the weight of the prior that needs no other round.
@@ -42,6 +48,12 @@ const SETTLED: f64 = 0.05;
 pub(super) struct Prediction<'a> {
     pub data: Vec<Data<'a>>,
     pub sample_time: SampleTime,
+    /// What the error does between its samples.
+    pub intersample: Intersample,
+    /// Whether the data show that, or somebody has said it.
+    pub course_is_known: bool,
+    /// Share of the power of u that an output error leaves, where it is little.
+    pub little_noise: Option<f64>,
     pub initial: InitialState,
     /// First residual that counts, the same for all forms.
     pub first: usize,
@@ -61,12 +73,19 @@ impl<'a> Prediction<'a> {
         (nc, nd): NoiseOrders,
         delay_range_s: (f64, f64),
         initial: InitialState,
-        sample_time: SampleTime,
+        (sample_time, intersample): (SampleTime, Intersample),
     ) -> Result<usize, IdentError> {
         let mut first = 0;
         for &(form, neuromuscular) in forms {
             let limits = coordinates::limits(form, neuromuscular, delay_range_s, sample_time);
-            let layout = FamilyLayout::new((form, neuromuscular), (nc, nd), 1, &[], &limits, sample_time);
+            let layout = FamilyLayout::new(
+                (form, neuromuscular),
+                (nc, nd),
+                1,
+                &[],
+                &limits,
+                (sample_time, intersample),
+            );
             first = first.max(first_residual(&layout.orders(layout.longest_nk()?), initial));
         }
         Ok(first)
@@ -75,7 +94,8 @@ impl<'a> Prediction<'a> {
     fn layout(&self, form: (Form, bool), noise: NoiseOrders) -> FamilyLayout {
         let limits = coordinates::limits(form.0, form.1, self.delay_range_s, self.sample_time);
         let records = self.data.len();
-        FamilyLayout::new(form, noise, records, &self.individual, &limits, self.sample_time)
+        let sampling = (self.sample_time, self.intersample);
+        FamilyLayout::new(form, noise, records, &self.individual, &limits, sampling)
     }
 
     pub fn criterion(&self, form: (Form, bool), noise: NoiseOrders) -> PhysicalCriterion<'a, FamilyLayout> {
@@ -124,7 +144,15 @@ impl<'a> Prediction<'a> {
     ) -> Result<PredictionFit<'a>, IdentError> {
         let series = self.unexplained(form, start, workspace)?;
         let products = NoiseProducts::new(&series, noise.1);
-        let start_of_noise = products.fit(noise.1).ok_or(IdentError::NoFiniteLoss)?;
+        let start_of_noise = match products.fit_up_to(noise.1) {
+            Some(found) => found,
+            // Nothing is left but rounding: there is nothing to model.
+            None if self.noise_free().is_some() => Autoregression {
+                d: vec![0.0; noise.1],
+                loss: self.rounding(),
+            },
+            None => return Err(IdentError::NoFiniteLoss),
+        };
         let mut criterion = self.criterion(form, noise);
         let coefficients = [vec![0.0; noise.0], start_of_noise.d].concat();
         let mut eta = criterion.layout.spread(start, &coefficients);
@@ -133,9 +161,13 @@ impl<'a> Prediction<'a> {
         let mut found = None;
         for round in 0..ROUNDS {
             criterion.penalty = scaled(&unit, weight);
-            let minimum = criterion
+            let mut minimum = criterion
                 .search(eta, &self.search, None, workspace)
                 .ok_or(IdentError::NoFiniteLoss)?;
+            // Where nothing is left no step leads further down.
+            if minimum.at.sum_of_squares < self.equal() {
+                minimum.termination.reason = Reason::ExactFit;
+            }
             let fit = self.judged(criterion.clone(), minimum, workspace)?;
             let next = fit.innovation_variance * fit.inflation;
             eta = fit.minimum.theta.clone();
@@ -188,6 +220,32 @@ impl<'a> Prediction<'a> {
         unit.into_iter().flat_map(places).collect()
     }
 
+    /// Number of samples that count.
+    pub fn samples(&self) -> usize {
+        self.data.iter().map(|d| d.u.len().saturating_sub(self.first)).sum()
+    }
+
+    /// Sum of squares of u, of the samples that count.
+    pub fn power(&self) -> f64 {
+        let of = |d: &Data<'_>| d.u.get(self.first..).map_or(0.0, |u| dot(u, u));
+        self.data.iter().map(of).sum()
+    }
+
+    /// Share of the power of u that is left, where it is no noise.
+    pub fn noise_free(&self) -> Option<f64> {
+        self.little_noise.filter(|share| *share < NONE)
+    }
+
+    /// Sum of squares below which one form does not fit better than another; zero where there is noise.
+    pub fn equal(&self) -> f64 {
+        self.noise_free().map_or(0.0, |_| EQUAL * self.power())
+    }
+
+    /// A mean square of residuals that is less than rounding by far, in place of zero, which has no logarithm.
+    fn rounding(&self) -> f64 {
+        f64::EPSILON.powi(2) * self.power() / self.samples().max(1) as f64
+    }
+
     /// Loss, innovation variance, clusters and their inflation at a minimum.
     fn judged(
         &self,
@@ -197,7 +255,10 @@ impl<'a> Prediction<'a> {
     ) -> Result<PredictionFit<'a>, IdentError> {
         let (n, states) = (criterion.residuals(), criterion.states());
         let penalty = penalty_at(&criterion.penalty, &minimum.theta);
-        let squares = minimum.at.sum_of_squares - penalty;
+        let mut squares = minimum.at.sum_of_squares - penalty;
+        if self.noise_free().is_some() {
+            squares = squares.max(self.rounding() * n as f64);
+        }
         let p = minimum.theta.len();
         let freedom = n
             .checked_sub(p + states)

@@ -15,7 +15,7 @@ use hoid_model::{
     operator_family::{Coordinate, Form},
 };
 
-use super::{coordinates, prior::OperatorPrior};
+use super::{coordinates, intersample::Intersample, prior::OperatorPrior};
 use crate::{
     IdentError, SearchOptions, Termination,
     criterion::Workspace,
@@ -38,20 +38,14 @@ pub struct MeasuredResponse {
     pub variance: f64,
 }
 
-/// What the error between its samples does to a sinusoid: straight lines, half a sample late
-/// ([`FamilyOperator::interpolate`]).
-pub(super) fn hold(omega_rad_s: f64, sample_time: SampleTime) -> Complex64 {
-    let half = 0.5 * omega_rad_s * sample_time.s();
-    let sinc = if half.abs() < 1e-8 { 1.0 } else { half.sin() / half };
-    Complex64::from_polar(sinc * sinc, -half)
-}
-
 /// The criterion over the coordinates of a form.
 #[derive(Debug, Clone)]
 pub(super) struct ResponseCriterion<'p> {
     pub form: Form,
     pub neuromuscular: bool,
     pub sample_time: SampleTime,
+    /// What the error does between its samples.
+    pub intersample: Intersample,
     pub points: &'p [MeasuredResponse],
     pub limits: Vec<(f64, f64)>,
     pub penalty: Vec<Penalty>,
@@ -75,12 +69,13 @@ impl<'p> ResponseCriterion<'p> {
         points: &'p [MeasuredResponse],
         prior: &OperatorPrior,
         delay_range_s: (f64, f64),
-        sample_time: SampleTime,
+        (sample_time, intersample): (SampleTime, Intersample),
     ) -> Self {
         Self {
             form,
             neuromuscular,
             sample_time,
+            intersample,
             points,
             limits: coordinates::limits(form, neuromuscular, delay_range_s, sample_time),
             penalty: prior.penalties(form, neuromuscular),
@@ -94,6 +89,7 @@ impl<'p> ResponseCriterion<'p> {
             form: self.form,
             neuromuscular: self.neuromuscular,
             sample_time: self.sample_time,
+            intersample: self.intersample,
             limits: self.limits.clone(),
             penalty: self.penalty.clone(),
         }
@@ -169,11 +165,16 @@ impl<'p> ResponseCriterion<'p> {
             .collect()
     }
 
+    /// The response of an operator from sample to sample.
+    pub fn sampled(&self, operator: &FamilyOperator, omega_rad_s: f64) -> Complex64 {
+        operator.response(omega_rad_s) * self.intersample.response(omega_rad_s, self.sample_time)
+    }
+
     /// chi^2 at these coordinates, without the prior.
     pub fn chi_squared(&self, x: &[f64]) -> Option<f64> {
         let operator = FamilyOperator::new(self.form, self.neuromuscular, x).ok()?;
         let of = |point: &MeasuredResponse| {
-            let model = operator.response(point.omega_rad_s) * hold(point.omega_rad_s, self.sample_time);
+            let model = self.sampled(&operator, point.omega_rad_s);
             2.0 * (point.response - model).norm_sqr() / point.variance
         };
         Some(self.points.iter().map(of).sum())
@@ -195,7 +196,7 @@ impl<'p> ResponseCriterion<'p> {
         let operator = FamilyOperator::new(self.form, self.neuromuscular, x).ok()?;
         let (mut cross, mut power) = (0.0, 0.0);
         for point in self.points {
-            let model = operator.response(point.omega_rad_s) * hold(point.omega_rad_s, self.sample_time);
+            let model = self.sampled(&operator, point.omega_rad_s);
             cross += (model.conj() * point.response).re / point.variance;
             power += model.norm_sqr() / point.variance;
         }
@@ -217,7 +218,7 @@ impl Objective for ResponseCriterion<'_> {
             return total;
         };
         for point in self.points {
-            let hold = hold(point.omega_rad_s, self.sample_time);
+            let hold = self.intersample.response(point.omega_rad_s, self.sample_time);
             let model = operator.response_and_gradient(point.omega_rad_s);
             let weight = 2.0 / point.variance;
             let off = point.response - model.value * hold;
@@ -252,7 +253,7 @@ mod tests {
         OMEGA
             .iter()
             .map(|&omega| {
-                let response = truth.response(omega) * hold(omega, ts);
+                let response = truth.response(omega) * Intersample::Auto.response(omega, ts);
                 MeasuredResponse {
                     omega_rad_s: omega,
                     response,
@@ -282,7 +283,7 @@ mod tests {
             let truth = truth(form);
             let points = points(&truth, ts);
             let none = OperatorPrior::none();
-            let criterion = ResponseCriterion::new(form, true, &points, &none, (0.0, 0.6), ts);
+            let criterion = ResponseCriterion::new(form, true, &points, &none, (0.0, 0.6), (ts, Intersample::Auto));
             let found = criterion.fit(&SearchOptions::default()).unwrap();
             for (a, b) in found.coordinates.iter().zip(truth.coordinates()) {
                 assert!((a - b).abs() < 1e-6 * (1.0 + b.abs()), "{form}: {a} {b}");
@@ -296,7 +297,14 @@ mod tests {
         let ts = SampleTime::new(1.0 / 60.0).unwrap();
         let points = points(&truth(Form::LeadLag), ts);
         let prior = OperatorPrior::population();
-        let criterion = ResponseCriterion::new(Form::LeadLag, true, &points, &prior, (0.0, 0.6), ts);
+        let criterion = ResponseCriterion::new(
+            Form::LeadLag,
+            true,
+            &points,
+            &prior,
+            (0.0, 0.6),
+            (ts, Intersample::Auto),
+        );
         let x = [3.0, 0.8, 0.3, 2.2, -1.0, 0.25];
         let at = criterion.linearise(&x, &mut Workspace::default());
         for i in 0..x.len() {
@@ -345,7 +353,8 @@ mod tests {
                     ..*p
                 })
                 .collect();
-            let criterion = ResponseCriterion::new(Form::LeadLag, true, &noisy, &none, (0.0, 0.6), ts);
+            let criterion =
+                ResponseCriterion::new(Form::LeadLag, true, &noisy, &none, (0.0, 0.6), (ts, Intersample::Auto));
             let found = criterion
                 .fit_from(truth.coordinates(), &SearchOptions::default())
                 .unwrap();

@@ -12,13 +12,13 @@ use super::{
     choice::FormFigures,
     clusters::ClusterKind,
     instrumental::InstrumentalFit,
+    intersample::Intersample,
     line_fit::LineFit,
     loop_shape::{KnownResponse, LoopShape},
     mixture::{Component, Mixture},
     open_loop::{LoopMeasures, loop_measures},
     parameter::Parameter,
     prior::OperatorPrior,
-    response_fit::hold,
 };
 use crate::{Fit, ResponsePoint, Termination};
 
@@ -126,6 +126,16 @@ pub struct FamilyFit {
     pub coherent_share: Option<f64>,
     /// How the search ended.
     pub termination: Termination,
+    /// What the error does between its samples, as it was fitted.
+    #[serde(default)]
+    pub intersample: Intersample,
+    /// Whether the data show that, or it was said; else the delay may be half a sample longer
+    /// ([`FamilyFit::delay_if_straight_s`]).
+    #[serde(default)]
+    pub course_is_known: bool,
+    /// Share of the power of u that the operator leaves, where that is no noise.
+    #[serde(default)]
+    pub noise_free: Option<f64>,
     /// Time between two samples.
     pub sample_time: SampleTime,
     /// What the result is worth.
@@ -172,6 +182,13 @@ impl FamilyFit {
         self.measured(&of.operator, of.covariance.as_deref(), element)
     }
 
+    /// Delay tau_e in s of a record if its error runs straight from sample to sample, logged from what is faster or
+    /// continuous: half a sample longer, where nothing shows or says what it does.
+    pub fn delay_if_straight_s(&self, record: usize) -> Option<f64> {
+        let tau = self.operator(record).operator.tau_e_s();
+        (!self.course_is_known).then(|| tau + 0.5 * self.sample_time.s())
+    }
+
     /// Gain and phase of the operator of a record from e to u at frequencies in rad/s, held over a sample,
     /// averaged over the forms: of `ln H` the mean, and its error with what the forms differ by.
     pub fn frequency_response(&self, record: usize, omega_rad_s: &[f64]) -> Vec<ResponsePoint> {
@@ -199,7 +216,7 @@ impl FamilyFit {
                 let mixture = Mixture::of(&all.iter().map(component).collect::<Vec<_>>(), self.clusters);
                 mixture.map_or(Estimate::fixed(0.0), |mixture| mixture.estimate)
             };
-            let held = middle * hold(omega, self.sample_time);
+            let held = middle * self.intersample.response(omega, self.sample_time);
             let scaled = |from: f64, unit: f64, e: Estimate| Estimate {
                 value: from + unit * e.value,
                 standard_error: e.standard_error.map(|s| unit * s),
@@ -230,7 +247,7 @@ impl FamilyFit {
         let known = |omega: f64| {
             let found = of.operator.response_and_gradient(omega);
             KnownResponse {
-                value: found.value * hold(omega, self.sample_time),
+                value: found.value * self.intersample.response(omega, self.sample_time),
                 relative: of.covariance.as_deref().map(|c| found.relative_covariance(c)),
             }
         };
@@ -255,7 +272,7 @@ impl FamilyFit {
         covariance: Option<&[f64]>,
         element: &ContinuousTransferFunction,
     ) -> Option<LoopMeasures> {
-        let measures = loop_measures(operator, covariance, element, self.sample_time)?;
+        let measures = loop_measures(operator, covariance, element, (self.sample_time, self.intersample))?;
         Some(measures.of_few(self.clusters).with_run_to_run(self.run_to_run))
     }
 

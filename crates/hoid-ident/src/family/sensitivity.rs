@@ -40,13 +40,16 @@ pub(super) const UNSEEN_WITHOUT_LINES: [(Coordinate, f64); 2] =
 /// Iterations in which a rival need not converge: it stands for a size.
 const SEARCH: (usize, f64) = (25, 1e-6);
 
-/// Coordinates of the operators of the same form with other noise models.
+/// Coordinates of the operators of the same form with other noise models; none where there is no noise.
 pub(super) fn rivals(
     prediction: &Prediction<'_>,
     fit: &PredictionFit<'_>,
     highest: usize,
     workspace: &mut Workspace,
 ) -> Vec<Vec<f64>> {
+    if prediction.noise_free().is_some() {
+        return Vec::new();
+    }
     let layout = fit.layout();
     let own: NoiseOrders = (layout.nc, layout.nd);
     let mut orders: Vec<NoiseOrders> = vec![(0, highest / 4), (0, highest / 2), (0, highest), MIXED];

@@ -321,7 +321,7 @@ mod tests {
                     &super::super::layout::orders(order, layout.longest_nk().unwrap()),
                     initial,
                 );
-                let data = signals.iter().map(|(e, u)| Data { e, u }).collect();
+                let data = signals.iter().map(|(e, u)| Data::new(e, u)).collect();
                 let criterion = PhysicalCriterion::new(layout, data, initial, first);
                 let mut eta = criterion.layout.spread(&[0.3, 0.05, 12.0, 0.4, 0.2837, 0.05]);
                 // Individual parameters apart from each other.
@@ -356,7 +356,7 @@ mod tests {
         let signals = signals(600);
         let layout = Layout::new(2, 2, (0.05, 0.6), &BTreeMap::new(), &[], SampleTime::HUNDREDTH).unwrap();
         let first = first_residual(&super::super::layout::orders(2, 61), InitialState::Estimate);
-        let data = signals.iter().map(|(e, u)| Data { e, u }).collect();
+        let data = signals.iter().map(|(e, u)| Data::new(e, u)).collect();
         let criterion = PhysicalCriterion::new(layout, data, InitialState::Estimate, first);
         let mut ws = Workspace::of_thread();
         let mut loss = |tau: f64| {

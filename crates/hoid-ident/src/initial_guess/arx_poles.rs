@@ -69,7 +69,7 @@ pub(crate) fn reduced_arx(criterion: &Criterion<'_>, workspace: &mut Workspace) 
             .data
             .iter()
             .zip(&responses)
-            .map(|(d, w)| Data { e: d.e, u: w })
+            .map(|(d, w)| Data::new(d.e, w))
             .collect(),
         ..criterion.clone()
     };
@@ -93,7 +93,7 @@ pub(crate) fn steiglitz_mcbride(
             divide_in_place(&f, e);
             divide_in_place(&f, u);
         }
-        let data: Vec<Data<'_>> = filtered.iter().map(|(e, u)| Data { e, u }).collect();
+        let data: Vec<Data<'_>> = filtered.iter().map(|(e, u)| Data::new(e, u)).collect();
         f = arx_poles(criterion, &data, workspace)?;
     }
     Some(f)

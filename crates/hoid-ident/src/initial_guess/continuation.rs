@@ -106,7 +106,7 @@ impl AveragedRecords {
     pub fn criterion(&self) -> Criterion<'_> {
         Criterion {
             orders: self.orders,
-            data: self.records.iter().map(|[e, u]| Data { e, u }).collect(),
+            data: self.records.iter().map(|[e, u]| Data::new(e, u)).collect(),
             initial: InitialState::Estimate,
             first: first_residual(&self.orders, InitialState::Estimate),
             weights: None,

@@ -252,7 +252,7 @@ mod tests {
         };
         let criterion = Criterion {
             orders,
-            data: vec![Data { e: &e, u: &u }],
+            data: vec![Data::new(&e, &u)],
             initial: InitialState::Estimate,
             first: first_residual(&orders, InitialState::Estimate),
             weights: None,
@@ -283,7 +283,7 @@ mod tests {
         };
         let criterion = Criterion {
             orders,
-            data: vec![Data { e: &e, u: &u }],
+            data: vec![Data::new(&e, &u)],
             initial: InitialState::Zero,
             first: 0,
             weights: None,

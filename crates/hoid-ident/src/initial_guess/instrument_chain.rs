@@ -114,7 +114,7 @@ mod tests {
             (Orders { na: 2, ..base }, armax, [&f[..], &b, &c].concat()),
         ];
         for (orders, u, truth) in cases {
-            let theta = chain(orders, Data { e: &e, u: &u }).unwrap();
+            let theta = chain(orders, Data::new(&e, &u)).unwrap();
             for (found, truth) in theta.iter().zip(truth) {
                 // 20 000 samples leave 2 % on these coefficients by instruments that are not the
                 // best.
@@ -133,15 +133,15 @@ mod tests {
             nk: 1,
             ..Orders::default()
         };
-        assert!(chain(base, Data { e: &e, u: &u }).is_some());
-        assert!(chain(Orders { na: 1, ..base }, Data { e: &e, u: &u }).is_none());
-        assert!(chain(Orders { nk: 60, ..base }, Data { e: &e, u: &u }).is_none());
+        assert!(chain(base, Data::new(&e, &u)).is_some());
+        assert!(chain(Orders { na: 1, ..base }, Data::new(&e, &u)).is_none());
+        assert!(chain(Orders { nk: 60, ..base }, Data::new(&e, &u)).is_none());
         let still = vec![0.0; 50];
-        assert!(chain(base, Data { e: &still, u: &u }).is_none());
+        assert!(chain(base, Data::new(&still, &u)).is_none());
         let output_alone = Orders {
             na: 2,
             ..Orders::default()
         };
-        assert!(chain(output_alone, Data { e: &[], u: &u }).is_none());
+        assert!(chain(output_alone, Data::new(&[], &u)).is_none());
     }
 }

@@ -227,6 +227,7 @@ impl<'a> IvProblem<'a> {
             lead: 0,
             noise: None,
             weights: None,
+            level: false,
         };
         let rows = self.rows(filter.d.len());
         rows.into_iter()

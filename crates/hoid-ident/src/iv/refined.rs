@@ -164,7 +164,7 @@ fn of_noise_free_parts(problem: &IvProblem<'_>) -> Result<Vec<f64>, IdentError> 
     let driving: Vec<&[f64]> = delayed.iter().map(Vec::as_slice).collect();
     let outputs: Vec<&[f64]> = problem.data.iter().map(|d| d.u).collect();
     let clean = following(&driving, &outputs);
-    let data = clean.iter().zip(&source.inputs).map(|(u, e)| Data { e, u }).collect();
+    let data = clean.iter().zip(&source.inputs).map(|(u, e)| Data::new(e, u)).collect();
     let parts = problem.of(data, Vec::new());
     let mut system = parts.least_squares(Prefilter::default())?;
     for _ in 0..START_ROUNDS {

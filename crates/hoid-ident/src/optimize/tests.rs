@@ -39,7 +39,7 @@ fn run(e: &[f64], u: &[f64], start: &[f64]) -> Option<Minimum> {
 fn run_with(e: &[f64], u: &[f64], start: &[f64], options: &SearchOptions) -> Option<Minimum> {
     let criterion = Criterion {
         orders: orders(),
-        data: vec![Data { e, u }],
+        data: vec![Data::new(e, u)],
         initial: InitialState::Estimate,
         first: first_residual(&orders(), InitialState::Estimate),
         weights: None,
@@ -169,7 +169,7 @@ fn unstable_starts_are_refused_and_limits_are_told() {
     assert!(run(&e, &u, &[f64::NAN, 0.1, 0.0, -1.0, 0.3]).is_none());
     let criterion = Criterion {
         orders: orders(),
-        data: vec![Data { e: &e, u: &u }],
+        data: vec![Data::new(&e, &u)],
         initial: InitialState::Zero,
         first: 0,
         weights: None,
@@ -208,7 +208,7 @@ fn the_secant_saves_steps_where_the_model_is_wrong_and_ends_in_the_same_place() 
     };
     let criterion = Criterion {
         orders,
-        data: vec![Data { e: &e, u: &u }],
+        data: vec![Data::new(&e, &u)],
         initial: InitialState::Estimate,
         first: first_residual(&orders, InitialState::Estimate),
         weights: None,

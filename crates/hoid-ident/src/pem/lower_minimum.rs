@@ -98,7 +98,7 @@ fn first_span<'a>(criterion: &Criterion<'a>) -> Criterion<'a> {
         let n = d.u.len().min(criterion.first + left);
         left -= n.saturating_sub(criterion.first).min(left);
         let e = &d.e[..n.min(d.e.len())];
-        data.push(Data { e, u: &d.u[..n] });
+        data.push(Data { e, u: &d.u[..n], ..*d });
     }
     Criterion {
         data,

@@ -35,13 +35,7 @@ fn record() -> (Vec<f64>, Vec<f64>) {
 #[test]
 fn without_noise_any_filter_and_any_instruments_give_the_system() {
     let (e, u) = record();
-    let data = vec![
-        Data { e: &e, u: &u },
-        Data {
-            e: &e[40..],
-            u: &u[40..],
-        },
-    ];
+    let data = vec![Data::new(&e, &u), Data::new(&e[40..], &u[40..])];
     let problem = IvProblem::new(&ORDERS, data.clone(), Source::measured(&data));
     let (c, d, f) = ([0.4], [-0.8, 0.1], [-1.2, 0.5]);
     let filters = [
@@ -66,13 +60,7 @@ fn without_noise_any_filter_and_any_instruments_give_the_system() {
 #[test]
 fn instruments_change_with_the_source_at_its_rows_alone() {
     let (e, u) = record();
-    let data = vec![
-        Data { e: &e, u: &u },
-        Data {
-            e: &e[40..],
-            u: &u[40..],
-        },
-    ];
+    let data = vec![Data::new(&e, &u), Data::new(&e[40..], &u[40..])];
     let doubled = |x: &[f64]| Cow::Owned(x.iter().map(|v| 2.0 * v).collect::<Vec<f64>>());
     let sources = vec![
         Source {

@@ -86,7 +86,7 @@ fn noise_of(
     };
     let arma = Criterion {
         orders,
-        data: left.iter().map(|u| Data { e: &[], u }).collect(),
+        data: left.iter().map(|u| Data::new(&[], u)).collect(),
         initial: InitialState::Estimate,
         first: first_residual(&orders, InitialState::Estimate),
         weights: None,

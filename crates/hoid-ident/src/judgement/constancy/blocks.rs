@@ -57,6 +57,7 @@ pub(crate) fn score_blocks(
             let piece = Data {
                 e: &whole.e[from..first + to],
                 u: &whole.u[from..first + to],
+                ..*whole
             };
             let (eps, columns) = scores(record, piece)?;
             for k in several {
@@ -134,7 +135,7 @@ mod tests {
         // One column, psi = 1: g is the sum of the residuals, G their number.
         for n in [1000_usize, 100_000] {
             let u: Vec<f64> = (0..n).map(|t| (0.1 * t as f64).sin()).collect();
-            let data = [Data { e: &u, u: &u }];
+            let data = [Data::new(&u, &u)];
             let mut scores = |_: usize, piece: Data<'_>| {
                 let eps = piece.u[30..].to_vec();
                 let ones = vec![1.0; eps.len()];
@@ -149,6 +150,6 @@ mod tests {
         }
         let nothing = &mut |_: usize, _: Data<'_>| None;
         let u = [0.0; 50];
-        assert!(score_blocks(&[Data { e: &u, u: &u }], 10, 1, 0.01, nothing).is_none());
+        assert!(score_blocks(&[Data::new(&u, &u)], 10, 1, 0.01, nothing).is_none());
     }
 }

@@ -145,10 +145,7 @@ impl Regression {
             .map(|t| self.y[t] - theta[0] * self.x[0][t] - theta[1] * self.x[1][t])
             .collect();
         let variance = dot(&eps, &eps) / eps.len() as f64;
-        let data = [Data {
-            e: &self.x[0],
-            u: &self.y,
-        }];
+        let data = [Data::new(&self.x[0], &self.y)];
         let mut scores = |_: usize, _: Data<'_>| Some((eps.clone(), self.x.iter().cloned().enumerate().collect()));
         let blocks = score_blocks(&data, 0, 2, 0.01, &mut scores).unwrap();
         let direction = Direction {

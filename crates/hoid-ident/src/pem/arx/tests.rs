@@ -85,7 +85,7 @@ fn what_normal_equations_cannot_decide_is_left_to_qr() {
     let u: Vec<f64> = (0..n)
         .map(|t| (0.07 * f64::from(t)).sin() + 0.3 * (2.3 * f64::from(t)).cos())
         .collect();
-    let decide = |o: &Orders, e: &[f64], u: &[f64], first| by_normal_equations(o, &[Data { e, u }], first).is_some();
+    let decide = |o: &Orders, e: &[f64], u: &[f64], first| by_normal_equations(o, &[Data::new(e, u)], first).is_some();
     let two = orders(1, 1, 1);
     assert!(decide(&two, &e, &u, 2));
     // Zeros before the record, a silent input, dependent columns, an exact fit.
@@ -99,7 +99,7 @@ fn what_normal_equations_cannot_decide_is_left_to_qr() {
     ));
     let exact: Vec<f64> = (0..e.len()).map(|t| if t > 0 { 0.5 * e[t - 1] } else { 0.0 }).collect();
     assert!(!decide(&orders(0, 1, 1), &e, &exact, 2));
-    let solved = regress(&orders(0, 1, 1), &[Data { e: &e, u: &exact }], 2).unwrap();
+    let solved = regress(&orders(0, 1, 1), &[Data::new(&e, &exact)], 2).unwrap();
     assert!((solved.theta[0] - 0.5).abs() < 1e-15 && solved.sum_of_squares < 1e-25);
     // Not finite: nothing is decided here either.
     let mut broken = u.clone();

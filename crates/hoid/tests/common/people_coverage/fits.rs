@@ -141,7 +141,7 @@ fn found(fit: &FamilyFit, person: &Person, cell: Cell) -> Found {
         })
         .collect();
     let element = &person.state.controlled_element;
-    let true_loop = loop_measures(truth, None, element, fit.sample_time);
+    let true_loop = loop_measures(truth, None, element, (fit.sample_time, fit.intersample));
     let own_loop = fit.loop_measures(0, element);
     let own_loop = own_loop.map(|own| if of_person { own.as_of_person() } else { own });
     if let (Some(true_loop), Some(own)) = (true_loop, own_loop) {

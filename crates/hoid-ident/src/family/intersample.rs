@@ -1,0 +1,167 @@
+//! What the error does between its samples, which no sample says and the delay depends on.
+//!
+//! | name | the error | response of the samples to the operator's | tau_e |
+//! |---|---|---|---|
+//! | `zoh` | is held: a simulation or a display of the same rate | `sin(x)/x e^{-jx}` | as simulated |
+//! | `foh` | runs straight: logged from what is faster or continuous | `(sin(x)/x)^2` | Ts/2 longer |
+//! | `auto` | is smooth, and the delay is that of a held one | `(sin(x)/x)^2 e^{-jx}` | as behind a hold |
+//!
+//! with `x = omega Ts/2` (K. J. Astrom and B. Wittenmark, *Computer-Controlled Systems*, 1997, sections 3.2 and 3.4).
+//! `foh` and `auto` are one model with two names of its delay, so that no data decide between them. `zoh` differs from
+//! both by the factor `sin(x)/x`, 0.5 % at 20 rad/s and 60 Hz, which a recording without noise alone can show
+//! ([`super::low_noise`]).
+
+use hoid_model::{Complex64, FamilyOperator, ModelError, SampleTime, named_choice, operator_family::HeldFamily};
+
+/// What the error does between its samples.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Intersample {
+    /// Smooth, with the delay of a held one; held or straight where data without noise show it.
+    #[default]
+    Auto,
+    /// Held until the next sample.
+    Zoh,
+    /// Straight from sample to sample.
+    Foh,
+}
+
+named_choice!(Intersample, "course between samples", 3, {
+    Auto => "auto",
+    Zoh => "zoh",
+    Foh => "foh",
+});
+
+impl Intersample {
+    /// What the course of the error does to a sinusoid.
+    pub(super) fn response(self, omega_rad_s: f64, sample_time: SampleTime) -> Complex64 {
+        let half = 0.5 * omega_rad_s * sample_time.s();
+        let sinc = if half.abs() < 1e-8 { 1.0 } else { half.sin() / half };
+        match self {
+            Self::Auto => Complex64::from_polar(sinc * sinc, -half),
+            Self::Zoh => Complex64::from_polar(sinc, -half),
+            Self::Foh => Complex64::new(sinc * sinc, 0.0),
+        }
+    }
+
+    /// The shortest delay in s that has a model: a straight line needs the sample after it.
+    pub(super) fn shortest_delay_s(self, sample_time: SampleTime) -> f64 {
+        match self {
+            Self::Auto | Self::Zoh => 0.0,
+            Self::Foh => 0.5 * sample_time.s(),
+        }
+    }
+
+    /// Number of coefficients of B for a form of this order and degree of its numerator.
+    pub(super) fn gains(self, order: usize, degree: usize) -> usize {
+        match self {
+            Self::Auto | Self::Foh => order + 2,
+            Self::Zoh if degree == order => order + 3,
+            Self::Zoh => order + 1,
+        }
+    }
+
+    /// The discrete model; `sample` is that in which the delay lies (of a smooth error, the delay and half a sample), where
+    /// the caller has chosen one.
+    pub(super) fn discrete(
+        self,
+        operator: &FamilyOperator,
+        sample: Option<usize>,
+        sample_time: SampleTime,
+    ) -> Result<HeldFamily, ModelError> {
+        match (self, sample) {
+            (Self::Auto, Some(sample)) => operator.interpolate_within(sample, sample_time),
+            (Self::Auto, None) => operator.interpolate(sample_time),
+            (Self::Zoh, Some(sample)) => operator.hold_within(sample, sample_time),
+            (Self::Zoh, None) => operator.hold(sample_time),
+            (Self::Foh, _) => {
+                let mut earlier = operator.coordinates().to_vec();
+                if let Some(delay) = earlier.last_mut() {
+                    *delay -= 0.5 * sample_time.s();
+                }
+                let earlier = FamilyOperator::new(operator.form(), operator.has_neuromuscular(), &earlier)?;
+                Self::Auto.discrete(&earlier, sample, sample_time)
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use hoid_model::{Form, polynomial};
+
+    use super::*;
+
+    #[test]
+    fn the_model_has_the_response_of_its_course() {
+        let ts = SampleTime::new(0.02).unwrap();
+        let forms: [(Form, bool, &[f64]); 3] = [
+            (Form::Lead, true, &[1.5, 0.5, 2.4, -1.2, 0.193]),
+            (Form::Lead2, true, &[1.5, 0.5, 2.4, -1.2, 0.193]),
+            (Form::Gain, false, &[1.5, 0.193]),
+        ];
+        for course in Intersample::ALL {
+            for (form, muscles, x) in forms {
+                let operator = FamilyOperator::new(form, muscles, x).unwrap();
+                let model = course.discrete(&operator, None, ts).unwrap();
+                assert_eq!(
+                    model.b.len(),
+                    course.gains(model.f.len(), form.degree()),
+                    "{course} {form}"
+                );
+                for omega in [0.5, 3.0, 9.0] {
+                    let backward = Complex64::from_polar(1.0, -omega * ts.s());
+                    let f = [&[1.0][..], &model.f].concat();
+                    let found = polynomial::value(&model.b, backward) / polynomial::value(&f, backward)
+                        * backward.powi(model.nk as i32);
+                    let expected = operator.response(omega) * course.response(omega, ts);
+                    // A hold leaves aliases as omega Ts, straight lines as its square.
+                    let aliases = match course {
+                        Intersample::Zoh => 0.2 * omega * ts.s(),
+                        Intersample::Auto | Intersample::Foh => 2.0 * (omega * ts.s()).powi(2),
+                    };
+                    assert!(
+                        (found / expected - 1.0).norm() < aliases + 1e-6,
+                        "{course} {form} {omega} {found} {expected}"
+                    );
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn derivatives_agree_with_finite_differences() {
+        let ts = SampleTime::new(0.02).unwrap();
+        let x = [1.5, 0.5, 2.4, -1.2, 0.193];
+        for course in Intersample::ALL {
+            let of = |x: &[f64]| {
+                let operator = FamilyOperator::new(Form::Lead, true, x).unwrap();
+                course.discrete(&operator, None, ts).unwrap()
+            };
+            let exact = of(&x);
+            for i in 0..x.len() {
+                let at = |by: f64| {
+                    let mut moved = x;
+                    moved[i] += by;
+                    let model = of(&moved);
+                    [model.b, model.f].concat()
+                };
+                for ((row, up), down) in exact.jacobian.iter().zip(at(1e-6)).zip(at(-1e-6)) {
+                    let error = (row[i] - (up - down) / 2e-6).abs();
+                    assert!(error < 1e-6 * (1.0 + row[i].abs()), "{course} {i} {error}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_straight_line_needs_the_sample_after_it() {
+        let ts = SampleTime::new(0.02).unwrap();
+        let operator = |tau: f64| FamilyOperator::new(Form::Gain, true, &[1.5, 2.4, -1.2, tau]).unwrap();
+        assert!(Intersample::Foh.discrete(&operator(0.009), None, ts).is_err());
+        let shortest = Intersample::Foh.shortest_delay_s(ts);
+        assert!(Intersample::Foh.discrete(&operator(shortest), None, ts).is_ok());
+        assert!(Intersample::Zoh.discrete(&operator(0.0), None, ts).is_ok());
+        assert!("cubic".parse::<Intersample>().is_err());
+    }
+}

@@ -1,0 +1,361 @@
+//! Recordings with little noise, or none: simulations, and what anybody tries first.
+//!
+//! The frequency response from which searches begin is off by more than such noise, so that an autoregression of what it
+//! leaves of u would model the operator in place of the noise. Where a form leaves little, all of them are searched by
+//! output error first, `u = c + Y e + v` with v taken for white and without a prior (L. Ljung, *System Identification*,
+//! 1999, section 8.4: it is consistent in a closed loop where v vanishes): its end is near the truth, and from there the
+//! noise is modelled. Without any noise it is the truth, to the digits of the data, also of what the error does between
+//! its samples ([`Intersample`]).
+//!
+//! **Level.** The means that were taken out of e and u are those of a steady state, and a record is none: what a response
+//! owes to the time before its first sample stays in u as a constant. Where a mean was taken out, c is an unknown of each
+//! record, eliminated with the initial states ([`crate::criterion::Data::level`]).
+
+use hoid_model::Form;
+
+use super::{
+    coordinates,
+    intersample::Intersample,
+    prediction::{EQUAL, NONE, Prediction},
+};
+use crate::{SearchOptions, criterion::Workspace, optimize::Objective};
+
+/// Share of the power of u that a start may leave where an output error is searched.
+const LARGEST_AT_START: f64 = 0.05;
+/// Share that the best of them may leave where the noise is little: of a person's u no operator explains so much.
+const LITTLE: f64 = 5e-3;
+/// Share below which what is left is rounding, which no search is to go on for.
+const ROUNDING: f64 = 1e-25;
+/// Points of a grid from which a form is searched that has not been found without noise, and how often: the second time
+/// beside the best that the first has found.
+const MORE_STARTS: usize = 4;
+const ROUNDS: usize = 2;
+/// Share that one course of the error leaves over that of another which decides. Of an error that is continuous the
+/// model of a hold misses `x^2/6` and that of straight lines `x^2/3`: a quarter of the squares, and neither is right.
+const DECIDES: f64 = 0.02;
+/// Share over the least one from which on a form may not have been found.
+const WORSE: f64 = 1.1;
+/// Steps of a search.
+const MOST_STEPS: usize = 200;
+
+/// A form with the coordinates that its searches start from.
+pub(super) type Starts = (Form, Vec<Vec<f64>>);
+
+/// Where the search of a form ended.
+#[derive(Debug, Clone)]
+pub(super) struct End {
+    pub coordinates: Vec<f64>,
+    /// Share of the power of u that is left.
+    share: f64,
+}
+
+/// What was found of all forms where there is little noise.
+#[derive(Debug, Clone)]
+pub(super) struct LittleNoise {
+    /// The end of each form; `None` where its search came to none.
+    pub ends: Vec<Option<End>>,
+    /// The least share of the power of u that is left.
+    pub share: f64,
+    /// The least Schwarz's criterion.
+    criterion: f64,
+}
+
+impl LittleNoise {
+    /// The search of all forms; `None` where there is more noise. Where an ARX model of high order finds hardly any, `clean`,
+    /// the starts may be far off.
+    pub fn of(
+        prediction: &Prediction<'_>,
+        neuromuscular: bool,
+        starts: &[Starts],
+        clean: bool,
+        workspace: &mut Workspace,
+    ) -> Option<Self> {
+        let search = Search {
+            prediction,
+            neuromuscular,
+            power: prediction.power(),
+        };
+        let near = |workspace: &mut Workspace| {
+            let mut all = starts
+                .iter()
+                .flat_map(|(form, all)| all.iter().map(move |x| (*form, x)));
+            all.any(|(form, x)| {
+                search
+                    .left(form, x, workspace)
+                    .is_some_and(|share| share < LARGEST_AT_START)
+            })
+        };
+        if !clean && !near(workspace) {
+            return None;
+        }
+        let ends = starts
+            .iter()
+            .map(|(form, starts)| search.least(*form, starts, workspace));
+        let mut ends: Vec<Option<End>> = ends.collect();
+        for _ in 0..ROUNDS {
+            let Some((best, share)) = least_of(&ends).filter(|(_, share)| clean || *share < LITTLE) else {
+                break;
+            };
+            // Of a rest that is noise nothing is left to be found.
+            let beside = (starts[best].0, ends[best].clone()?.coordinates);
+            for ((form, _), end) in starts.iter().zip(&mut ends) {
+                let known = end.as_ref().map_or(f64::INFINITY, |end| end.share);
+                if known < NONE || known < WORSE * share {
+                    continue;
+                }
+                let more = search.more_starts(*form, &beside, workspace);
+                *end = search
+                    .least(*form, &more, workspace)
+                    .filter(|end| end.share < known)
+                    .or(end.take());
+            }
+        }
+        let (_, share) = least_of(&ends).filter(|(_, share)| *share < LITTLE)?;
+        let n = prediction.samples() as f64;
+        let criterion = (ends.iter().zip(starts)).filter_map(|(end, (form, _))| {
+            let size = form.coordinates(neuromuscular).len() as f64;
+            Some(n * end.as_ref()?.share.max(EQUAL).ln() + n.ln() * size)
+        });
+        let criterion = criterion.fold(f64::INFINITY, f64::min);
+        Some(Self { ends, share, criterion })
+    }
+
+    /// Moves starts to the ends, with delays that are later by this.
+    pub fn move_to_ends(&self, starts: &mut [Starts], later_s: f64) {
+        for ((_, coordinates), end) in starts.iter_mut().zip(&self.ends) {
+            if let Some(end) = end {
+                let mut end = end.coordinates.clone();
+                if let Some(delay) = end.last_mut() {
+                    *delay += later_s;
+                }
+                *coordinates = vec![end];
+            }
+        }
+    }
+
+    /// The course of the error that fits better, of a smooth one and a held one that were both searched, and whether that
+    /// settles what the error does.
+    pub fn course(smooth: &Self, held: &Self) -> (Intersample, bool) {
+        match held.share.max(ROUNDING) / smooth.share.max(ROUNDING) {
+            ratio if ratio < DECIDES => (Intersample::Zoh, true),
+            ratio if ratio > 1.0 / DECIDES => (Intersample::Foh, true),
+            _ if held.criterion < smooth.criterion => (Intersample::Zoh, false),
+            _ => (Intersample::Auto, false),
+        }
+    }
+}
+
+/// Which form leaves least, and how much.
+fn least_of(ends: &[Option<End>]) -> Option<(usize, f64)> {
+    let shares = ends
+        .iter()
+        .enumerate()
+        .filter_map(|(i, end)| Some((i, end.as_ref()?.share)));
+    shares.min_by(|a, b| a.1.total_cmp(&b.1))
+}
+
+/// Output error searches over one course of the error.
+struct Search<'p, 'a> {
+    prediction: &'p Prediction<'a>,
+    neuromuscular: bool,
+    power: f64,
+}
+
+impl Search<'_, '_> {
+    /// The end of the best search from these coordinates.
+    fn least(&self, form: Form, starts: &[Vec<f64>], workspace: &mut Workspace) -> Option<End> {
+        let criterion = self.prediction.criterion((form, self.neuromuscular), (0, 0));
+        let search = SearchOptions {
+            max_iterations: MOST_STEPS,
+            ..self.prediction.search
+        };
+        let mut best: Option<End> = None;
+        for start in starts {
+            let eta = criterion.layout.spread(start, &[]);
+            let Some(end) = criterion.search(eta, &search, None, workspace) else {
+                continue;
+            };
+            let share = end.at.sum_of_squares / self.power;
+            if best.as_ref().is_none_or(|known| share < known.share) {
+                let coordinates = criterion.layout.coordinates_of(&end.theta, 0);
+                best = Some(End { coordinates, share });
+            }
+            if share < ROUNDING {
+                break;
+            }
+        }
+        best
+    }
+
+    /// The points of the grid of a form that leave least, each with its best gain, by themselves and with the
+    /// neuromuscular system and the delay of another operator. u is linear in the gain, so that one step from a gain of
+    /// zero is the best.
+    fn more_starts(&self, form: Form, beside: &(Form, Vec<f64>), workspace: &mut Workspace) -> Vec<Vec<f64>> {
+        let (prediction, neuromuscular) = (self.prediction, self.neuromuscular);
+        let criterion = prediction.criterion((form, neuromuscular), (0, 0));
+        let limits = coordinates::limits(form, neuromuscular, prediction.delay_range_s, prediction.sample_time);
+        let mut grid = coordinates::start_grid(form, neuromuscular, &limits);
+        // The last coordinates of all forms are these.
+        let tail = 1 + if neuromuscular { 2 } else { 0 };
+        let of_other = &beside.1[beside.1.len() - tail..];
+        let mut moved: Vec<Vec<f64>> = (grid.iter())
+            .map(|point| [&point[..point.len() - tail], of_other].concat())
+            .collect();
+        moved.dedup();
+        grid.append(&mut moved);
+        let mut all: Vec<(f64, Vec<f64>)> = Vec::new();
+        for mut point in grid {
+            point[0] = 0.0;
+            let at = criterion.linearise(&criterion.layout.spread(&point, &[]), workspace);
+            let gain = at.descent[0] / at.gram[0];
+            let left = at.sum_of_squares - gain * at.descent[0];
+            if gain.is_finite() && gain != 0.0 && left.is_finite() {
+                point[0] = gain;
+                all.push((left, point));
+            }
+        }
+        all.sort_by(|a, b| a.0.total_cmp(&b.0));
+        all.into_iter().take(MORE_STARTS).map(|(_, point)| point).collect()
+    }
+
+    /// Share of the power of u that an operator leaves.
+    fn left(&self, form: Form, coordinates: &[f64], workspace: &mut Workspace) -> Option<f64> {
+        let left = self
+            .prediction
+            .unexplained((form, self.neuromuscular), coordinates, workspace);
+        let squares: f64 = left.ok()?.iter().flatten().map(|v| v * v).sum();
+        Some(squares / self.power)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use hoid_model::scenario::{Condition, Scenario};
+    use hoid_model::{Channel, Detrend, FamilyOperator, Record, SampleTime, operator_family::HeldFamily};
+    use hoid_sim::{RunSeed, Simulator};
+
+    use crate::family::{FamilyEstimator, FamilyFit};
+
+    use super::*;
+
+    const X: [f64; 5] = [0.85, 0.3, 2.35, -1.14, 0.243];
+
+    fn truth() -> FamilyOperator {
+        FamilyOperator::new(Form::Lead, true, &X).unwrap()
+    }
+
+    /// 25 s at 40 Hz of an error that is not zero in the mean, with this much white noise, begun away from rest and with a
+    /// level of u.
+    fn record(model: &HeldFamily, noise: f64) -> Record {
+        let mut state = 7_u64;
+        let mut uniform = move || {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
+            (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
+        };
+        let (before, n) = (200, 1000);
+        let e: Vec<f64> = (0..before + n)
+            .map(|t| 0.2 + (0.012 * f64::from(t)).sin() + 0.6 * (0.07 * f64::from(t)).cos() + 0.2 * uniform())
+            .collect();
+        let mut w = vec![0.0; e.len()];
+        for k in model.nk + model.b.len()..e.len() {
+            let input: f64 = (model.b.iter().enumerate()).map(|(i, b)| b * e[k - model.nk - i]).sum();
+            let past: f64 = (model.f.iter().enumerate()).map(|(i, f)| f * w[k - 1 - i]).sum();
+            w[k] = input - past;
+        }
+        let u = w[200..].iter().map(|w| w + 0.7 + noise * uniform()).collect();
+        Record::new(
+            SampleTime::new(0.025).unwrap(),
+            Channel::new("e", "", e[200..].to_vec()),
+            Channel::new("u", "", u),
+        )
+        .unwrap()
+    }
+
+    fn fitted(record: Record) -> FamilyFit {
+        let estimator = FamilyEstimator {
+            forms: vec![Form::Gain, Form::Lead, Form::Lag, Form::LeadLag],
+            ..FamilyEstimator::default()
+        };
+        estimator.fit(&[record]).unwrap()
+    }
+
+    fn worst(fit: &FamilyFit, delay_s: f64) -> f64 {
+        let x = fit.operator(0).operator.coordinates();
+        let expected = [&X[..4], &[delay_s]].concat();
+        assert_eq!(fit.form, Form::Lead);
+        x.iter().zip(expected).map(|(x, t)| (x - t).abs()).fold(0.0, f64::max)
+    }
+
+    #[test]
+    fn an_operator_without_noise_is_found_with_its_level_and_its_course() {
+        let ts = SampleTime::new(0.025).unwrap();
+        let held = fitted(record(&truth().hold(ts).unwrap(), 0.0));
+        assert!(worst(&held, 0.243) < 1e-10);
+        assert_eq!(
+            (held.intersample, held.delay_if_straight_s(0)),
+            (Intersample::Zoh, None)
+        );
+        // Straight lines, of a delay that is half a sample longer than this model says.
+        let straight = fitted(record(&truth().interpolate(ts).unwrap(), 0.0));
+        assert!(worst(&straight, 0.243 + 0.0125) < 1e-10);
+        assert_eq!(
+            (straight.intersample, straight.delay_if_straight_s(0)),
+            (Intersample::Foh, None)
+        );
+        for fit in [held, straight] {
+            let kinds: Vec<&str> = fit.verdict.findings().iter().map(|f| f.kind).collect();
+            assert_eq!(kinds, ["no-noise"]);
+            assert_eq!((fit.weighed.len(), fit.run_to_run), (1, 0.0));
+            assert!(fit.noise_free.is_some_and(|share| share < 1e-20) && fit.agreement.is_none());
+        }
+    }
+
+    #[test]
+    fn a_little_noise_is_modelled_and_says_no_more_than_it_can() {
+        let ts = SampleTime::new(0.025).unwrap();
+        let fit = fitted(record(&truth().hold(ts).unwrap(), 1e-3));
+        let c = fit.operator(0).covariance.clone().unwrap();
+        for (i, (x, t)) in fit.operator(0).operator.coordinates().iter().zip(X).enumerate() {
+            let error = c[i * 6].sqrt();
+            assert!((x - t).abs() < 4.0 * error && error < 0.01, "{i}: {x} {t} {error}");
+        }
+        assert!(fit.noise_free.is_none() && fit.run_to_run > 0.0);
+    }
+
+    #[test]
+    fn the_noise_of_a_person_is_not_little() {
+        let simulator = Simulator::new(&Scenario::condition(Condition::C1)).unwrap();
+        let record = simulator.run(RunSeed::default(), false).unwrap();
+        let fit = fitted(record.detrended(Detrend::Mean));
+        assert_eq!((fit.intersample, fit.noise_free), (Intersample::Auto, None));
+        assert_eq!(
+            fit.delay_if_straight_s(0),
+            Some(fit.operator(0).operator.tau_e_s() + 0.005)
+        );
+    }
+
+    #[test]
+    fn a_quarter_of_the_squares_settles_nothing() {
+        let of = |share: f64, criterion: f64| LittleNoise {
+            ends: Vec::new(),
+            share,
+            criterion,
+        };
+        let smooth = of(1e-6, 0.0);
+        assert_eq!(
+            LittleNoise::course(&smooth, &of(2.5e-7, -9.0)),
+            (Intersample::Zoh, false)
+        );
+        assert_eq!(
+            LittleNoise::course(&smooth, &of(2.5e-7, 9.0)),
+            (Intersample::Auto, false)
+        );
+        assert_eq!(LittleNoise::course(&smooth, &of(0.0, -9.0)), (Intersample::Zoh, true));
+        assert_eq!(
+            LittleNoise::course(&of(0.0, 0.0), &of(1e-9, 9.0)),
+            (Intersample::Foh, true)
+        );
+    }
+}
