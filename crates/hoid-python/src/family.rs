@@ -1,12 +1,15 @@
 //! `pyhoid.identify` by default: the operator of a person, of the family of operators.
 
-use hoid_analysis::Identified;
+use std::{borrow::Cow, path::PathBuf};
+
+use hoid_analysis::{Identified, Recordings};
 use hoid_ident::family::{AgreementMethod, ClusterKind, FormFigures, LoopMeasures, LoopShape, Parameter};
+use hoid_report::{Report, write_report};
 use numpy::{PyArray1, PyArray2, PyReadonlyArray1};
 use pyo3::{prelude::*, types::PyDict};
 
 use crate::{
-    arrays::{array, matrix},
+    arrays::{self, Wanted, array, matrix},
     controlled_element::ControlledElement,
     errors::Outcome,
     faults::{UsedRecord, faults_of, used_records},
@@ -354,6 +357,27 @@ impl PyOperatorFit {
     #[getter]
     fn faults<'py>(&self, py: Python<'py>) -> PyResult<Vec<(usize, Bound<'py, PyDict>)>> {
         faults_of(py, &self.0.data)
+    }
+
+    /// Writes the page about the operator into a directory; what comes out of a pickle has its records beside it.
+    #[pyo3(signature = (records, directory, *, title))]
+    fn report(
+        &self,
+        py: Python<'_>,
+        records: Vec<Bound<'_, PyAny>>,
+        directory: PathBuf,
+        title: Option<String>,
+    ) -> Outcome<PathBuf> {
+        let mut found = Cow::Borrowed(&self.0);
+        if found.data.is_empty() {
+            found.to_mut().data = Recordings::of_records(arrays::records(&records, Wanted::All)?);
+        }
+        let page = py.detach(|| {
+            let mut report = Report::of_operator(&found);
+            report.title = title.unwrap_or(report.title);
+            write_report(&directory, &report.to_html()?)
+        })?;
+        Ok(page)
     }
 
     /// The model of a record as polynomials.

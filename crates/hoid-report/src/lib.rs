@@ -38,9 +38,11 @@
 //! | module | what it holds |
 //! |---|---|
 //! | [`Answer`], [`sentence`] | the head of a page: verdict, the answer in words, parameters with errors |
-//! | [`Report`], [`ModelSection`] | one self-contained HTML page about one or several fitted models |
+//! | [`Report`], [`ModelSection`], [`model_figure`] | one self-contained HTML page about one or several fitted models |
+//! | [`Report::of_operator`], [`operator_figure`], [`sentence_of_operator`] | the page of the operator of a person |
 //! | [`TrackReport`], [`TraceSection`], [`BatchLine`], [`batch_fit`], [`default_batch_fits`] | one such page about recursive estimates over a record |
 //! | [`GroupReport`], [`GroupTables`], [`write_group_pages`], [`group_figures`] | one such page about a group of recorded runs |
+//! | [`facts`] | the settings on all of these pages |
 //! | [`figures`] | the figures of these pages, each as an SVG text of its own |
 //! | [`numbers`] | numbers with as many digits as their standard error allows |
 //! | [`render_with`], [`write_page`], [`write_report`] | templates of one's own in the same style, and pages into files |
@@ -50,9 +52,12 @@
 mod answer;
 mod cells;
 mod error;
+mod facts;
 pub mod figures;
 mod group;
+mod model_figure;
 mod model_section;
+mod operator;
 mod page;
 mod report;
 mod tables;
@@ -60,11 +65,14 @@ mod track;
 
 pub use answer::{Answer, AnswerRow, sentence};
 pub use error::ReportError;
+pub use facts::facts;
 pub use group::{
     FrequencyTables, GroupReport, GroupTables, PeopleTable, group_figures, people_table, write_group_pages,
 };
 pub use hoid_model::numbers;
+pub use model_figure::{model_figure, model_picture};
 pub use model_section::{ModelSection, known_operator};
+pub use operator::{operator_figure, sentence_of_operator, undetermined};
 pub use page::{render_with, write_page, write_report};
 pub use report::{Picture, Report};
 pub use track::{BatchFit, BatchLine, TraceSection, TrackReport, batch_fit, default_batch_fits};

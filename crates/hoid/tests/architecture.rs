@@ -49,7 +49,14 @@ const ALLOWED: [(&str, &[&str]); 19] = [
     ),
     (
         "hoid-report",
-        &["hoid-model", "hoid-ident", "hoid-io", "hoid-study", "hoid-track"],
+        &[
+            "hoid-analysis",
+            "hoid-model",
+            "hoid-ident",
+            "hoid-io",
+            "hoid-study",
+            "hoid-track",
+        ],
     ),
     (
         "hoid-lab",

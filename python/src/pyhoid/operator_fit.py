@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
+from os import PathLike
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from . import _options, _pyhoid, _text
@@ -11,6 +13,7 @@ from ._arrays import FloatArray
 from ._decimation import said
 from ._model import QUALITY, Model
 from ._results import Result
+from .errors import DataError
 from .estimates import Estimate, estimates, unit_of
 from .fit import Fit
 from .operator_parameters import OperatorParameter, OperatorParameters
@@ -271,6 +274,38 @@ class OperatorFit(Model, Result):
         >>> axes = person.plot(person.records[0].span(20, 40))
         """
         return self.fit.plot(record, ax)
+
+    def report(self, directory: str | PathLike[str], *, title: str | None = None) -> Path:
+        """Write the page about the operator, ``report.html``, into a directory.
+
+        It is the page that ``hoid identify --report`` writes.
+
+        Parameters
+        ----------
+        directory : path
+            Created if it does not exist.
+        title : str, optional
+            Heading of the page.
+
+        Returns
+        -------
+        Path
+            The page.
+
+        Raises
+        ------
+        FileError
+            When the page cannot be written.
+        DataError
+            For a result that was read from JSON: it has no records for the page to show.
+
+        >>> page = person.report("out")
+        """
+        if not self.records:
+            raise DataError(
+                "the result has no records for the page to show; a result of identify has them"
+            )
+        return Path(self._native.report(list(self.records), Path(directory), title=title))
 
     @property
     def converged(self) -> bool:

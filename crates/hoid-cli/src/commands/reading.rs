@@ -2,9 +2,8 @@
 
 use std::{collections::BTreeMap, path::Path};
 
-use hoid::analysis::{Account, Reading, Setting};
-use hoid::io::{NewRate, Preparation, QualityIssue, ReadOptions, ReadRecord, Repair, Step};
-use hoid::model::Fault;
+use hoid::analysis::Reading;
+use hoid::io::{NewRate, Preparation, ReadOptions, ReadRecord, Repair};
 
 use crate::{
     args::{MaskArgs, ReadArgs},
@@ -82,35 +81,4 @@ pub fn by_channel<T: Clone>(option: &str, typed: &[(String, T)]) -> Result<BTree
         }
     }
     Ok(all)
-}
-
-/// Settings as the rows of a table.
-pub fn rows(settings: &[Setting]) -> Vec<(String, String)> {
-    settings
-        .iter()
-        .map(|one| (one.name.clone(), one.value.clone()))
-        .collect()
-}
-
-/// What was done to the records and what is wrong with their files, as rows of a table of settings.
-pub fn accounts(files: &[String], accounts: &[Account]) -> Vec<(String, String)> {
-    let name = |what: &str, file: &str| {
-        if files.len() == 1 {
-            what.to_owned()
-        } else {
-            format!("{what} of {file}")
-        }
-    };
-    let mut rows = Vec::new();
-    for (file, account) in files.iter().zip(accounts) {
-        let steps: Vec<String> = account.steps.iter().map(Step::to_string).collect();
-        let issues: Vec<String> = account.quality_issues.iter().map(QualityIssue::to_string).collect();
-        let faults: Vec<String> = account.faults.iter().map(Fault::to_string).collect();
-        for (what, parts) in [("preparation", steps), ("sampling trouble", issues), ("faults", faults)] {
-            if !parts.is_empty() {
-                rows.push((name(what, file), parts.join("; ")));
-            }
-        }
-    }
-    rows
 }

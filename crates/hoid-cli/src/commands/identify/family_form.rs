@@ -2,12 +2,11 @@
 
 use hoid::analysis::{Account, Identified, Setting};
 use hoid::ident::{
-    MarginEstimates,
     family::{ClusterKind, FamilyFit, FormFigures, LoopMeasures, OperatorOfRecord, Parameter},
     validation::GoodnessOfFit,
 };
 use hoid::model::{ContinuousTransferFunction, GainUnit, Record, uncertainty::Estimate};
-use hoid::report::{Answer, AnswerRow, numbers, sentence};
+use hoid::report::{numbers, sentence_of_operator, undetermined};
 
 use crate::{error::CliError, text};
 
@@ -25,50 +24,6 @@ pub struct Found<'a> {
 }
 
 impl Found<'_> {
-    /// The answer in words.
-    fn sentence(&self) -> Option<String> {
-        let of = self.fit.operator(0);
-        let known = of.parameters.iter().filter(|p| p.determined);
-        let here = self.element.and_then(|element| self.fit.loop_measures(0, element));
-        sentence(
-            known.map(|p| (p.name.as_str(), p.value)),
-            here.as_ref().map(|m| m.crossover_rad_s),
-            here.as_ref().map(|m| m.phase_margin_deg),
-        )
-    }
-
-    /// The head of a page.
-    pub fn answer_of_page(&self) -> Answer {
-        let gain = self.records.first().map(GainUnit::of).unwrap_or_default();
-        let row = |p: &Parameter| AnswerRow {
-            name: p.name.clone(),
-            unit: gain.unit(&p.name, p.unit),
-            estimate: p.determined.then_some(Estimate {
-                value: p.value,
-                standard_error: p.standard_error,
-            }),
-            interval: p.interval,
-            remark: remark(p),
-        };
-        Answer {
-            verdict: self.fit.verdict.clone(),
-            sentence: self.sentence(),
-            parameters: self.fit.operator(0).parameters.iter().map(row).collect(),
-        }
-    }
-
-    /// Crossover and margin in the form of all reports.
-    pub fn margins(&self) -> Option<MarginEstimates> {
-        let found = self.fit.loop_measures(0, self.element?)?;
-        let gain_margin = self.fit.loop_shape(0, self.element?).gain_margin;
-        Some(MarginEstimates {
-            crossover_rad_s: Some(found.crossover_rad_s),
-            phase_margin_deg: Some(found.phase_margin_deg),
-            phase_crossover_rad_s: gain_margin.map(|(omega, _)| omega),
-            gain_margin_db: gain_margin.map(|(_, db)| db),
-        })
-    }
-
     /// The answer, and with `verbose` what is behind it.
     pub fn page(&self, verbose: bool) -> Result<String, CliError> {
         let mut page = self.answer(verbose)?;
@@ -93,7 +48,7 @@ impl Found<'_> {
         let mut page = text::verdict(&fit.verdict);
         page.push_str(&self.fit.title());
         page.push('\n');
-        if let Some(words) = self.sentence() {
+        if let Some(words) = sentence_of_operator(self.identified) {
             page.push_str(&format!("{words}\n"));
         }
         for (k, of) in fit.operators.iter().enumerate() {
@@ -310,25 +265,6 @@ fn with_error(value: f64, error: Option<f64>) -> String {
             format!("{value} ± {error}")
         }
         None => numbers::plain(value),
-    }
-}
-
-/// What a parameter is that the data do not determine.
-fn undetermined(p: &Parameter) -> &'static str {
-    match (p.determined, p.prior_share > 0.5) {
-        (true, _) => "",
-        (false, true) => "the prior alone",
-        (false, false) => "not determined",
-    }
-}
-
-/// The same with the share of the prior.
-fn remark(p: &Parameter) -> String {
-    let words = undetermined(p);
-    match (words, p.prior_share > 0.01) {
-        (_, false) => words.to_owned(),
-        ("", true) => format!("{:.0} % of it prior", 100.0 * p.prior_share),
-        (_, true) => format!("{words}, {:.0} % of it prior", 100.0 * p.prior_share),
     }
 }
 

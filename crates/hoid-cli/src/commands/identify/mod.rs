@@ -2,7 +2,6 @@
 
 mod family;
 mod family_form;
-mod picture;
 mod request;
 mod run;
 mod sigmoid;

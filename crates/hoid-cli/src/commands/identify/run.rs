@@ -3,22 +3,19 @@
 use std::path::{Path, PathBuf};
 
 use hoid::analysis::{
-    Asked, Identified, PolynomialFit, Recordings,
+    Asked, Excitation, Identified, PolynomialFit, Recordings,
     json::{BatchAnswer, PolynomialAnswer},
 };
 use hoid::ident::{
     Choice, Fit, GreyBoxFit,
+    frequency::Description,
     validation::{nrmse_fit, vaf},
 };
 use hoid::model::{GainUnit, Record};
-use hoid::report::{Answer, ModelSection, Report, known_operator, write_report};
+use hoid::report::{Answer, ModelSection, Report, known_operator, model_figure, model_picture, write_report};
 use serde_json::Value;
 
-use super::{
-    family,
-    picture::{description, for_page, of_polynomials},
-    request, sigmoid,
-};
+use super::{family, request, sigmoid};
 use crate::{
     args::IdentifyArgs,
     commands::{figure, places, reading},
@@ -70,7 +67,6 @@ fn show<F: BatchAnswer>(
 ) -> Result<(), CliError> {
     let (data, verdict) = (&found.data, &found.verdict);
     let validation = other.map(|other| found.validated(fit, other)).transpose()?;
-    let settings = reading::rows(&found.settings);
     let (records, with_input) = (&data.records, fit.model().structure().has_input());
     let mut answer = PolynomialAnswer::of(found, fit)?;
     (answer.choice, answer.grey_box) = (choice, grey_box);
@@ -84,24 +80,12 @@ fn show<F: BatchAnswer>(
     if let Some(path) = &args.picture.figure {
         figure::write(
             path,
-            &of_polynomials(fit, records, described.as_ref()),
+            &model_figure(fit, records, described.as_ref()),
             args.picture.width,
         )?;
     }
     if let Some(directory) = &args.report {
-        let title = match records.as_slice() {
-            [only] => format!("Identification of {}", only.label()),
-            all => format!("Identification of {} records", all.len()),
-        };
-        let mut facts = vec![
-            ("hoid".to_owned(), env!("CARGO_PKG_VERSION").to_owned()),
-            ("records".to_owned(), data.names.join(", ")),
-        ];
-        facts.extend(settings.iter().cloned());
-        facts.extend(reading::accounts(&data.names, &data.accounts));
         let report = Report {
-            title,
-            settings: facts,
             models: vec![ModelSection {
                 name: fit.title(),
                 fit,
@@ -110,13 +94,13 @@ fn show<F: BatchAnswer>(
                 truth: known_operator(records),
                 margins: answer.margins,
             }],
-            notes: Vec::new(),
             answer: Some(Answer {
                 verdict: verdict.clone(),
                 sentence: sentence(&answer),
                 parameters: Vec::new(),
             }),
-            pictures: for_page(fit, records, described.as_ref()).into_iter().collect(),
+            pictures: model_picture(fit, records, described.as_ref()).into_iter().collect(),
+            ..Report::of_identified(found)
         };
         let page = write_report(directory, &report.to_html()?)?;
         output::notice("", format!("report: {}", page.display()));
@@ -127,6 +111,13 @@ fn show<F: BatchAnswer>(
         output::show(&page(&answer, args.show.verbose))?;
     }
     CliError::of_verdict(verdict)
+}
+
+/// The describing function of the records, where they have a recorded excitation.
+fn description(args: &IdentifyArgs, data: &Recordings) -> Option<Description> {
+    data.described(&Excitation::default(), None, args.faults.faults)
+        .ok()
+        .flatten()
 }
 
 /// What is written takes the place of nothing that is read; `--prior` may name a file.

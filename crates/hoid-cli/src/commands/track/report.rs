@@ -1,21 +1,14 @@
 //! The page about a trace.
 
-use std::path::PathBuf;
+use std::{path::PathBuf, slice};
 
 use hoid::report::{
-    BatchFit, BatchLine, TraceSection, TrackReport, batch_fit, default_batch_fits, figures::trace_panels, write_report,
+    BatchFit, BatchLine, TraceSection, TrackReport, batch_fit, default_batch_fits, facts, figures::trace_panels,
+    write_report,
 };
 
 use super::result::Tracked;
-use crate::{
-    args::TrackArgs,
-    commands::{
-        figure,
-        reading::{accounts, rows},
-    },
-    error::CliError,
-    output,
-};
+use crate::{args::TrackArgs, commands::figure, error::CliError, output};
 
 /// Writes the page into the directory of `--report` and the parameters over time into the file of
 /// `--figure`; nothing without them.
@@ -25,19 +18,14 @@ pub fn write(args: &TrackArgs, tracked: &Tracked<'_>, batch: &[BatchFit]) -> Res
     }
     let line = |((from_s, to_s), fit)| BatchLine { from_s, to_s, fit };
     let batch: Vec<BatchLine<'_>> = batch.iter().map(|(span, fit)| line((*span, fit))).collect();
-    let mut settings = vec![
-        ("hoid".to_owned(), env!("CARGO_PKG_VERSION").to_owned()),
-        ("record".to_owned(), tracked.file.clone()),
-    ];
-    settings.extend(rows(tracked.settings));
-    settings.extend(accounts(
-        std::slice::from_ref(&tracked.file),
-        std::slice::from_ref(tracked.account),
-    ));
     let options = tracked.trace.options();
     let report = TrackReport {
         title: format!("{} tracked by {}", tracked.record.label(), options.method.name()),
-        settings,
+        settings: facts(
+            slice::from_ref(&tracked.file),
+            tracked.settings,
+            slice::from_ref(tracked.account),
+        ),
         record: tracked.record,
         traces: vec![TraceSection {
             name: format!("{}, {}", options.method.name(), options.structure.label()),

@@ -1,0 +1,30 @@
+//! What stands in the table of settings of every page.
+
+use hoid_analysis::{Account, Setting};
+use hoid_io::{QualityIssue, Step};
+use hoid_model::Fault;
+
+/// What was done and with what: version, records, settings, what was done to the records and what is wrong with them.
+pub fn facts(names: &[String], settings: &[Setting], accounts: &[Account]) -> Vec<(String, String)> {
+    let records = if names.len() == 1 { "record" } else { "records" };
+    let mut rows = vec![
+        ("hoid".to_owned(), env!("CARGO_PKG_VERSION").to_owned()),
+        (records.to_owned(), names.join(", ")),
+    ];
+    rows.extend(settings.iter().map(|one| (one.name.clone(), one.value.clone())));
+    let name = |what: &str, file: &str| match names.len() {
+        1 => what.to_owned(),
+        _ => format!("{what} of {file}"),
+    };
+    for (file, account) in names.iter().zip(accounts) {
+        let steps: Vec<String> = account.steps.iter().map(Step::to_string).collect();
+        let issues: Vec<String> = account.quality_issues.iter().map(QualityIssue::to_string).collect();
+        let faults: Vec<String> = account.faults.iter().map(Fault::to_string).collect();
+        for (what, parts) in [("preparation", steps), ("sampling trouble", issues), ("faults", faults)] {
+            if !parts.is_empty() {
+                rows.push((name(what, file), parts.join("; ")));
+            }
+        }
+    }
+    rows
+}

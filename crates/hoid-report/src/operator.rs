@@ -1,0 +1,162 @@
+//! The page and the figure of the operator of a person, as `hoid identify` and Python write them.
+
+use hoid_analysis::Identified;
+use hoid_ident::{
+    MarginEstimates,
+    family::{FamilyFit, Parameter},
+    frequency::Description,
+};
+use hoid_model::{Complex64, ContinuousTransferFunction, FamilyOperator, GainUnit, uncertainty::Estimate};
+
+use crate::{
+    Answer, AnswerRow, ModelSection, Picture, Report, facts,
+    figures::{ModelCurve, describing},
+    model_figure, sentence,
+};
+
+impl<'a> Report<'a> {
+    /// The page about the operator of a person.
+    pub fn of_operator(found: &'a Identified) -> Self {
+        let fit = &found.fit;
+        let element = found.controlled_element.as_ref();
+        Self {
+            models: vec![ModelSection {
+                name: fit.title(),
+                fit: &fit.operator(0).polynomial_fit,
+                records: &found.data.records,
+                candidates: None,
+                truth: None,
+                margins: element.and_then(|element| margins(fit, element)),
+            }],
+            answer: Some(answer(found)),
+            pictures: (found.described.as_ref())
+                .map(|described| through_describing_function(fit, described))
+                .into_iter()
+                .collect(),
+            ..Self::of_identified(found)
+        }
+    }
+
+    /// Heading and settings of the page of any result, without its models.
+    pub fn of_identified<F>(found: &Identified<F>) -> Self {
+        let data = &found.data;
+        Self {
+            title: match data.records.as_slice() {
+                [only] => format!("Identification of {}", only.label()),
+                all => format!("Identification of {} records", all.len()),
+            },
+            settings: facts(&data.names, &found.settings, &data.accounts),
+            models: Vec::new(),
+            notes: Vec::new(),
+            answer: None,
+            pictures: Vec::new(),
+        }
+    }
+}
+
+/// The figure of an operator: through the describing function of its records, where they have a periodic excitation;
+/// else its frequency response with its bands.
+pub fn operator_figure(found: &Identified) -> String {
+    match &found.described {
+        Some(described) => picture(&found.fit, described),
+        None => model_figure(&found.fit.operator(0).polynomial_fit, &found.data.records, None),
+    }
+}
+
+/// The answer of an operator in words.
+pub fn sentence_of_operator(found: &Identified) -> Option<String> {
+    let known = found.fit.operator(0).parameters.iter().filter(|p| p.determined);
+    let element = found.controlled_element.as_ref();
+    let here = element.and_then(|element| found.fit.loop_measures(0, element));
+    sentence(
+        known.map(|p| (p.name.as_str(), p.value)),
+        here.as_ref().map(|m| m.crossover_rad_s),
+        here.as_ref().map(|m| m.phase_margin_deg),
+    )
+}
+
+/// What a parameter is that the data do not determine; nothing for one that they do.
+pub fn undetermined(p: &Parameter) -> &'static str {
+    match (p.determined, p.prior_share > 0.5) {
+        (true, _) => "",
+        (false, true) => "the prior alone",
+        (false, false) => "not determined",
+    }
+}
+
+/// The same with the share of the prior.
+fn remark(p: &Parameter) -> String {
+    let words = undetermined(p);
+    match (words, p.prior_share > 0.01) {
+        (_, false) => words.to_owned(),
+        ("", true) => format!("{:.0} % of it prior", 100.0 * p.prior_share),
+        (_, true) => format!("{words}, {:.0} % of it prior", 100.0 * p.prior_share),
+    }
+}
+
+/// The head of a page.
+fn answer(found: &Identified) -> Answer {
+    let gain = found.data.records.first().map(GainUnit::of).unwrap_or_default();
+    let row = |p: &Parameter| AnswerRow {
+        name: p.name.clone(),
+        unit: gain.unit(&p.name, p.unit),
+        estimate: p.determined.then_some(Estimate {
+            value: p.value,
+            standard_error: p.standard_error,
+        }),
+        interval: p.interval,
+        remark: remark(p),
+    };
+    Answer {
+        verdict: found.fit.verdict.clone(),
+        sentence: sentence_of_operator(found),
+        parameters: found.fit.operator(0).parameters.iter().map(row).collect(),
+    }
+}
+
+/// Crossover and margin in the form of all reports.
+fn margins(fit: &FamilyFit, element: &ContinuousTransferFunction) -> Option<MarginEstimates> {
+    let found = fit.loop_measures(0, element)?;
+    let gain_margin = fit.loop_shape(0, element).gain_margin;
+    Some(MarginEstimates {
+        crossover_rad_s: Some(found.crossover_rad_s),
+        phase_margin_deg: Some(found.phase_margin_deg),
+        phase_crossover_rad_s: gain_margin.map(|(omega, _)| omega),
+        gain_margin_db: gain_margin.map(|(_, db)| db),
+    })
+}
+
+/// The fitted operator, by prediction error, at the lines, by instrumental variables.
+fn curves(fit: &FamilyFit, described: &Description) -> Vec<ModelCurve> {
+    let half = 0.5 * fit.sample_time.s();
+    let curve = |name: &str, operator: &FamilyOperator| {
+        let turn = |omega: f64| Complex64::from_polar(1.0, -omega * half);
+        ModelCurve::over(described, name, operator.tau_e_s() + half, |omega| {
+            operator.response(omega) * turn(omega)
+        })
+    };
+    let mut all = vec![curve("prediction error", &fit.operator(0).operator)];
+    if let Some(lines) = &fit.lines {
+        all.push(curve("fit at the lines", &lines.operator));
+    }
+    if let Some(instrumental) = fit.instrumental.as_ref().filter(|i| i.termination.converged()) {
+        all.push(curve("RIV-BJ", &instrumental.operator));
+    }
+    all
+}
+
+fn through_describing_function(fit: &FamilyFit, described: &Description) -> Picture {
+    Picture {
+        svg: picture(fit, described),
+        caption:
+            "The describing function at the lines of the excitation, with 95 % by its scatter, and the operator of the \
+                  chosen form: by prediction error, fitted at the lines, and by instrumental variables (RIV-BJ) where these converge."
+                .to_owned(),
+    }
+}
+
+/// The operator through the describing function.
+fn picture(fit: &FamilyFit, described: &Description) -> String {
+    let title = format!("{} through the describing function", fit.form);
+    describing("describing", &title, described, &curves(fit, described))
+}
