@@ -21,6 +21,7 @@
 //! | what the recordings say | `identified`, `recordings` |
 //! | what each answer is worth, and the verdict on those that were asked for | `answers` |
 //! | a describing function, from recordings to its verdict | `describing` |
+//! | a recursion over a recording, from it to the verdict | `tracking` |
 //! | the level of u, the settings that all share | `level`, `settings` |
 //!
 //! Options come as fields, or by their names from texts: `options`.
@@ -60,6 +61,7 @@ mod recordings;
 mod repair;
 mod request;
 mod settings;
+mod tracking;
 
 pub use answers::{Answered, Answers};
 pub use describing::{Described, Describing};
@@ -72,9 +74,10 @@ pub use look::{Advice, Known, Lag, Look, OtherColumns, Periods, Role, Roles, See
 pub use offset::{late_samples, without_offsets};
 pub use options::Options;
 pub use prior::prior_of_text;
-pub use quality::{Of, findings_of_channels, findings_of_quality};
+pub use quality::Of;
 pub use rate::kept_rate;
 pub use reading::Reading;
 pub use recordings::{Account, Recordings};
 pub use request::{Asked, Request};
 pub use settings::Setting;
+pub use tracking::{Tracked, Tracking, plan_of, relative_errors, settings_of_recursion};

@@ -8,7 +8,7 @@
 //!
 //! No error bar knows of these.
 
-use hoid_io::{QualityIssueKind, Step, quality_of_record};
+use hoid_io::{QualityIssueKind, Step};
 use hoid_model::{Finding, Record};
 
 use crate::recordings::Account;
@@ -29,17 +29,8 @@ pub enum Of {
     System,
 }
 
-/// What the channels of a record that was not read from a file say of any result.
-pub fn findings_of_channels(record: &Record) -> Vec<Finding> {
-    let account = Account {
-        quality_issues: quality_of_record(record),
-        ..Account::default()
-    };
-    findings_of_quality(&account, record, Of::Person)
-}
-
 /// What the quality of the channels says of any result.
-pub fn findings_of_quality(account: &Account, record: &Record, of: Of) -> Vec<Finding> {
+pub(crate) fn findings_of_quality(account: &Account, record: &Record, of: Of) -> Vec<Finding> {
     let mut all = Vec::new();
     let issues = |kind: QualityIssueKind| account.quality_issues.iter().filter(move |issue| issue.kind == kind);
     let output = record.output_channel().name.as_str();

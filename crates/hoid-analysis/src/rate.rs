@@ -13,11 +13,7 @@ impl Recordings {
     /// # Errors
     /// Those of the decimation.
     pub fn at_rate(mut self, decimation: Decimation, counts_samples: bool) -> Result<Self, AnalysisError> {
-        if self
-            .source
-            .as_ref()
-            .is_some_and(|source| source.reading.settles_the_rate())
-        {
+        if self.settles_the_rate() {
             return Ok(self);
         }
         let decimation = if counts_samples {
@@ -33,12 +29,15 @@ impl Recordings {
         Ok(self)
     }
 
+    /// Whether the rate was named in reading, and is not to be lowered again.
+    pub(crate) fn settles_the_rate(&self) -> bool {
+        let source = self.source.as_ref();
+        source.is_some_and(|source| source.reading.settles_the_rate())
+    }
+
     /// What to say where a high rate was kept because samples are counted.
     pub fn kept_rate(&self, decimation: Decimation, counts_samples: bool) -> Option<String> {
-        let settled = self
-            .source
-            .as_ref()
-            .is_some_and(|source| source.reading.settles_the_rate());
+        let settled = self.settles_the_rate();
         let record = self.records.first().filter(|_| !settled)?;
         kept_rate(record.sample_time(), decimation, counts_samples)
     }

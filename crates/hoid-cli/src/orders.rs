@@ -10,10 +10,10 @@ use hoid::ident::{
 
 use crate::error::CliError;
 
-/// The orders that were typed; a delay in seconds is none of them yet.
+/// The orders that were typed; the delay stands beside them.
 pub fn named_orders(orders: Option<&str>, nk: Option<&DelayRange>) -> Result<NamedOrders, CliError> {
     let read = orders.filter(|text| !text.trim().is_empty()).map(NamedOrders::read);
-    let mut all = match read {
+    let all = match read {
         None => NamedOrders::new(),
         Some(read) => read.map_err(|expected| CliError::Usage(format!("--orders: expected {expected}")))?,
     };
@@ -23,7 +23,7 @@ pub fn named_orders(orders: Option<&str>, nk: Option<&DelayRange>) -> Result<Nam
         ));
     }
     if let Some(DelayRange::Samples(nk)) = nk {
-        all.insert("nk".to_owned(), nk.clone());
+        check_order("nk", nk).map_err(|error| CliError::Usage(format!("--{error}")))?;
     }
     for (name, range) in &all {
         check_order(name, range).map_err(|error| CliError::Usage(format!("--{error}")))?;
@@ -56,10 +56,8 @@ mod tests {
     #[test]
     fn orders_as_typed() {
         let some = named_orders(Some("nd=2, nc=1..3"), Some(&DelayRange::Samples(29..=29))).unwrap();
-        assert_eq!(
-            (&some["nd"], &some["nc"], &some["nk"]),
-            (&(2..=2), &(1..=3), &(29..=29))
-        );
+        assert_eq!((&some["nd"], &some["nc"]), (&(2..=2), &(1..=3)));
+        assert!(named_orders(None, Some(&DelayRange::Samples(9..=usize::MAX))).is_err());
         assert!(named_orders(None, None).unwrap().is_empty());
         assert!(named_orders(Some("nx=2"), None).is_err());
         for twice in [DelayRange::Samples(3..=3), DelayRange::Seconds(0.2, 0.3)] {

@@ -507,8 +507,8 @@ fn what_does_not_fit_together_ends_with_two() {
         (&["--method", "rpem", "--bound", "omega_nm=5..30"], "--method physical"),
         (&["--bound", "K_x=5..30"], "K_e_dot"),
         (&["--method", "rls", "--track-delay", ".1...3"], "--method rpem"),
-        (&["--start", "b0=1"], "--nk"),
-        (&["--start", "b0=1", "--nk", "29"], "--start lacks b1"),
+        (&["--start", "b0=1"], "--start: it belongs to one model"),
+        (&["--start", "b0=1", "--nk", "29"], "--start: it lacks b1"),
         (
             &[
                 "--start",

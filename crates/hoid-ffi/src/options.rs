@@ -7,14 +7,14 @@
 //! number, a text, true, a pair, values by name. `prior` may be a fit itself, as `hoid identify
 //! --json` prints it, or the name of its file.
 
-use std::{collections::BTreeMap, ops::RangeInclusive, path::Path};
+use std::{ops::RangeInclusive, path::Path};
 
 use hoid_ident::{NamedOrders, order_selection::Criterion};
 use hoid_io::{FitFile, is_fit_file, parse_fit, read_fit};
 use hoid_model::{
-    ContinuousTransferFunction, FittedOperator, MAX_DELAY, MAX_ORDER, NamedChoice, SampleTime, Structure, theta_of,
+    ContinuousTransferFunction, FittedOperator, MAX_DELAY, MAX_ORDER, NamedChoice, SampleTime, Structure,
 };
-use hoid_track::{Method, StartAt, TrackOptions, TrackPlan, ranges_of};
+use hoid_track::{Method, RequestedStart, TrackOptions, TrackPlan, TrackRequest};
 use serde_json::{Map, Value};
 
 use crate::status::Failure;
@@ -53,7 +53,7 @@ impl Asked {
             None => Method::default(),
         };
         let structure: Option<Structure> = taken(&mut options, "structure", choice)?;
-        let criterion = taken(&mut options, "criterion", choice)?.unwrap_or(Criterion::Bic);
+        let criterion: Option<Criterion> = taken(&mut options, "criterion", choice)?;
         let largest = taken(&mut options, "largest", number)?;
         let at_rad_s = taken(&mut options, "at", numbers)?;
         let controlled_element = taken(&mut options, "controlled_element", element)?;
@@ -72,29 +72,15 @@ impl Asked {
             ));
         }
 
-        let structure = structure.unwrap_or_else(|| method.usual_structure());
-        let start_names: Vec<String> = match &start {
-            Some(Start::Coefficients(named)) => named.keys().cloned().collect(),
-            _ => Vec::new(),
-        };
-        let ranges = ranges_of(&method, structure, &orders, &start_names, sample_time)?;
-        let combinations = ranges.combinations()?;
-        let most = combinations[combinations.len() - 1];
-        let start = match start {
-            None => StartAt::Span(None),
-            Some(Start::Nothing) => StartAt::Nothing,
-            Some(Start::Coefficients(named)) => StartAt::Theta(
-                theta_of(&most.parameter_names(), &named)
-                    .map_err(|reason| Failure::option(format!("start {reason}")))?,
-            ),
-        };
-        let usual = TrackOptions::new(method, structure, most);
-        let track_options = TrackOptions {
-            start,
-            largest: largest.unwrap_or(usual.largest),
+        let asked = TrackRequest {
+            structure,
+            orders,
+            start: start.unwrap_or_default(),
+            criterion: criterion.unwrap_or(Criterion::Bic),
+            largest: largest.unwrap_or(TrackOptions::LARGEST),
             at_rad_s: at_rad_s.unwrap_or_default(),
             controlled_element,
-            ..usual
+            ..TrackRequest::of(method)
         };
         let warm_up = (warm_up_s / sample_time.s()).round();
         if !(1.0..=LONGEST_WARM_UP).contains(&warm_up) {
@@ -103,7 +89,7 @@ impl Asked {
             )));
         }
         Ok(Understood {
-            plan: TrackPlan::new(track_options, ranges, criterion, sample_time)?,
+            plan: asked.plan(sample_time)?,
             sample_time,
             warm_up: warm_up as usize,
         })
@@ -205,18 +191,12 @@ fn element(value: &Value) -> Result<ContinuousTransferFunction, String> {
     }
 }
 
-/// Where the recursion starts.
-enum Start {
-    Nothing,
-    Coefficients(BTreeMap<String, f64>),
-}
-
-fn start(value: &Value) -> Result<Start, String> {
+fn start(value: &Value) -> Result<RequestedStart, String> {
     match value {
-        Value::String(text) if text == "nothing" => Ok(Start::Nothing),
+        Value::String(text) if text == "nothing" => Ok(RequestedStart::Nothing),
         Value::Object(named) => {
             let each = named.iter().map(|(name, value)| Ok((name.clone(), number(value)?)));
-            each.collect::<Result<_, String>>().map(Start::Coefficients)
+            each.collect::<Result<_, String>>().map(RequestedStart::Coefficients)
         }
         _ => Err("\"nothing\", or all coefficients by name".to_owned()),
     }
@@ -309,7 +289,7 @@ mod tests {
             ("rpem", "{\"at\": 1}", "list of numbers"),
             ("rpem", "{\"structure\": \"curve\"}", "curve"),
             ("rpem", "{\"prior\": \"none\"}", "adaptive"),
-            ("rpem", "{\"start\": {\"b0\": 1}, \"nk\": 29, \"nd\": 1}", "start lacks"),
+            ("rpem", "{\"start\": {\"b0\": 1}, \"nk\": 29, \"nd\": 1}", "it lacks"),
             ("rpem", "{\"warm_up\": 0}", "one sample"),
             ("rpem", "{\"controlled_element\": \"9/\"}", "coefficients"),
             ("multiple-model", "{\"smooth\": true}", "still to come"),

@@ -149,19 +149,13 @@ pub fn detrended<'py>(py: Python<'py>, record: &Bound<'py, PyAny>, how: &str) ->
 
 /// The record at a lower rate, and what was done; None where nothing was.
 #[pyfunction]
-#[pyo3(signature = (record, decimate, counts_samples))]
+#[pyo3(signature = (record, decimate))]
 pub fn decimated<'py>(
     py: Python<'py>,
     record: &Bound<'py, PyAny>,
     decimate: &str,
-    counts_samples: bool,
 ) -> Outcome<Option<(Bound<'py, PyDict>, String)>> {
     let decimation = decimation(decimate)?;
-    let decimation = if counts_samples {
-        decimation.when_named()
-    } else {
-        decimation
-    };
     let sample_time = SampleTime::new(record.getattr("sample_time")?.extract()?)?;
     if decimation.factor(sample_time) == 1 {
         return Ok(None);
@@ -172,13 +166,6 @@ pub fn decimated<'py>(
     let parts = parts(py, record)?;
     parts.set_item("input_lead", done.lead_s)?;
     Ok(Some((parts, Step::from(done).to_string())))
-}
-
-/// Whether nothing was said of the rate.
-#[pyfunction]
-#[pyo3(signature = (decimate))]
-pub fn decimation_is_auto(decimate: &str) -> Outcome<bool> {
-    Ok(decimation(decimate)? == Decimation::Auto)
 }
 
 /// A decimation as it is typed.

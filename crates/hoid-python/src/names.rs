@@ -5,8 +5,8 @@ use std::{collections::BTreeMap, ops::RangeInclusive};
 use hoid_ident::{NamedOrders, order_selection::Criterion};
 use hoid_io::QualityIssueKind;
 use hoid_model::{
-    Detrend, NamedChoice, SampleTime, Structure, discretise, remnant::RemnantDiscretisation,
-    remnant_gain::NoiseDefinition, scenario::Realisation, theta_of,
+    Detrend, NamedChoice, Structure, discretise, remnant::RemnantDiscretisation, remnant_gain::NoiseDefinition,
+    scenario::Realisation,
 };
 
 use crate::errors::{Outcome, bad_option};
@@ -107,34 +107,8 @@ pub fn range(option: &str, ends: (usize, usize)) -> Outcome<RangeInclusive<usize
     Ok(ends.0..=ends.1)
 }
 
-/// Orders by name, with a delay in s in the place of nk.
-pub fn with_delay(
-    orders: &BTreeMap<String, (usize, usize)>,
-    delay_s: Option<(f64, f64)>,
-    sample_time: SampleTime,
-) -> Outcome<NamedOrders> {
-    let mut all = named_orders(orders)?;
-    if let Some((low, high)) = delay_s {
-        if all.contains_key("nk") {
-            return Err(bad_option(
-                "nk and delay are one thing in samples and in s; give one of them",
-            ));
-        }
-        if low < 0.0 {
-            return Err(bad_option(format!("delay is {low} to {high} s, expected 0 s or more")));
-        }
-        all.insert("nk".to_owned(), sample_time.nk(low)..=sample_time.nk(high));
-    }
-    Ok(all)
-}
-
 /// Orders by name, each a range.
 pub fn named_orders(orders: &BTreeMap<String, (usize, usize)>) -> Outcome<NamedOrders> {
     let one = |(name, ends): (&String, &(usize, usize))| Ok((name.clone(), range(name, *ends)?));
     orders.iter().map(one).collect()
-}
-
-/// Theta of a model with these names: every coefficient, each once.
-pub fn theta(names: &[String], start: &BTreeMap<String, f64>) -> Outcome<Vec<f64>> {
-    theta_of(names, start).map_err(|reason| bad_option(format!("start {reason}")))
 }

@@ -2,15 +2,17 @@
 
 use std::collections::BTreeMap;
 
-use hoid_ident::{IdentError, settings::MethodSpec};
+use hoid_ident::{
+    IdentError,
+    settings::{DelayRange, MethodSpec},
+};
 use hoid_io::{FitFile, parse_fit};
-use hoid_model::SampleTime;
-use hoid_track::{Method, StartAt, TrackOptions, TrackPlan, ranges_of};
+use hoid_track::{Method, RequestedStart, TrackRequest};
 use pyo3::{prelude::*, types::PyDict};
 
 use crate::{
     controlled_element::ControlledElement,
-    errors::{Failure, Outcome, bad_option},
+    errors::{Outcome, bad_option},
     names,
 };
 
@@ -33,52 +35,30 @@ where
 }
 
 /// A recursion from its keywords.
-pub fn plan(options: &Bound<'_, PyDict>, sample_time: SampleTime) -> Outcome<TrackPlan> {
+pub fn request(options: &Bound<'_, PyDict>) -> Outcome<TrackRequest> {
     let text = |name: &str| get::<String>(options, name);
-    let method = method(options)?;
-    let structure = match text("structure")? {
-        Some(name) => names::structure(&name)?,
-        None => method.usual_structure(),
-    };
+    let delay: Option<(f64, f64)> = get(options, "delay")?;
     let orders: BTreeMap<String, (usize, usize)> = get(options, "orders")?.unwrap_or_default();
     let start: Option<BTreeMap<String, f64>> = get(options, "start")?;
     let from_nothing = get(options, "from_nothing")?.unwrap_or(false);
-    let start_names: Vec<String> = start.iter().flat_map(BTreeMap::keys).cloned().collect();
-    let ranges = ranges_of(
-        &method,
-        structure,
-        &names::with_delay(&orders, get(options, "delay")?, sample_time)?,
-        &start_names,
-        sample_time,
-    )?;
-    let combinations = ranges.combinations()?;
-    let largest = combinations[combinations.len() - 1];
-    let start = match start {
-        Some(start) => StartAt::Theta(names::theta(&largest.parameter_names(), &start)?),
-        None if from_nothing => StartAt::Nothing,
-        None => StartAt::Span(None),
-    };
-    let defaults = TrackOptions::new(method, structure, largest);
-    let track_options = TrackOptions {
-        start,
-        largest: get(options, "largest")?.unwrap_or(defaults.largest),
+    let usual = TrackRequest::of(method(options)?);
+    Ok(TrackRequest {
+        structure: text("structure")?.map(|name| names::structure(&name)).transpose()?,
+        orders: names::named_orders(&orders)?,
+        delay: delay.map(|(low, high)| DelayRange::Seconds(low, high)),
+        start: match start {
+            Some(start) => RequestedStart::Coefficients(start),
+            None if from_nothing => RequestedStart::Nothing,
+            None => RequestedStart::Usual,
+        },
+        criterion: text("criterion")?.map_or(Ok(usual.criterion), |name| names::criterion(&name))?,
+        largest: get(options, "largest")?.unwrap_or(usual.largest),
         at_rad_s: get(options, "at")?.unwrap_or_default(),
         controlled_element: get::<ControlledElement>(options, "controlled_element")?
             .map(|element| element.transfer_function())
             .transpose()?,
-        ..defaults
-    };
-    let criterion = names::criterion(&text("criterion")?.unwrap_or_else(|| "bic".to_owned()))?;
-    TrackPlan::new(track_options, ranges, criterion, sample_time).map_err(Failure::from)
-}
-
-/// Whether the recursion is of polynomials, or its delay is given in samples: such takes the samples as
-/// they are.
-#[pyfunction]
-#[pyo3(signature = (options))]
-pub fn counts_samples(options: &Bound<'_, PyDict>) -> Outcome<bool> {
-    let orders: BTreeMap<String, (usize, usize)> = get(options, "orders")?.unwrap_or_default();
-    Ok(orders.contains_key("nk") || method(options)?.counts_samples())
+        ..usual
+    })
 }
 
 /// The method with its options, which come as texts by name.

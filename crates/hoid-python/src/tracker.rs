@@ -106,7 +106,8 @@ impl PyTracker {
             Some(text) => files::decimation(&text.extract::<String>()?)?,
             None => Decimation::Off,
         };
-        let decimation = if recursion::counts_samples(options)? {
+        let asked = recursion::request(options)?;
+        let decimation = if asked.counts_samples() {
             decimation.when_named()
         } else {
             decimation
@@ -118,7 +119,7 @@ impl PyTracker {
         };
         let tracked = decimator.as_ref().map_or(sample_time, Decimator::sample_time);
         let warm_up = if factor > 1 { (warm_up / factor).max(1) } else { warm_up };
-        let plan = recursion::plan(options, tracked)?;
+        let plan = asked.plan(tracked)?;
         if plan.options().method.smooths() {
             return Err(bad_option(
                 "smooth belongs to pyhoid.track: what is still to come cannot say anything of a stream",

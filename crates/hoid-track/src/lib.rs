@@ -29,7 +29,7 @@
 //! | `methods`, `method` | [`Method`]: the recursive methods, a file or folder each; what each says of itself |
 //! | `options`, `shared_options`, `memory`, `forgetting` | [`TrackOptions`]: what is to be tracked, and how |
 //! | `person_prior` | [`PersonPrior`]: what is known of a person before the first sample |
-//! | `plan` | [`TrackPlan`]: orders that are still open, searched on the start span |
+//! | `request`, `plan` | [`TrackRequest`]: what is asked for; [`TrackPlan`]: orders that are still open, searched on the start span |
 //! | `setup`, `start`, `start_noise`, `gain` | what a recursion is built of: structure, start, way of forgetting |
 //! | `kernel`, `recursion` | RLS, RPEM and the physical recursion of the real-time kernel; what every recursion does |
 //! | `predictor`, `past`, `reported` | signals and reports for methods that are not of the kernel |
@@ -84,6 +84,7 @@ mod plan;
 mod predictor;
 mod recursion;
 mod reported;
+mod request;
 mod response;
 mod saved;
 mod seal;
@@ -114,6 +115,7 @@ pub use over_record::{track, track_from};
 pub use person_prior::PersonPrior;
 pub use plan::{TrackPlan, ranges_of};
 pub use recursion::Sample;
+pub use request::{RequestedStart, TrackRequest};
 pub use response::Response;
 pub use seal::{opened, sealed};
 pub use setup::StartAt;

@@ -23,6 +23,7 @@ pub struct TrackPlan {
     options: TrackOptions,
     ranges: OrderRanges,
     criterion: Criterion,
+    sample_time: SampleTime,
 }
 
 impl TrackPlan {
@@ -44,10 +45,7 @@ impl TrackPlan {
         };
         let combinations = ranges.combinations()?;
         if matches!(options.start, StartAt::Theta(_)) && combinations.len() > 1 {
-            return Err(IdentError::BadStart {
-                reason: "it belongs to one model, but a range of orders or delays is searched; give nk and the orders as single numbers"
-                    .to_owned(),
-            });
+            return Err(of_one_model());
         }
         let options = TrackOptions {
             // What is not known there is not known at all.
@@ -59,6 +57,7 @@ impl TrackPlan {
             options,
             ranges,
             criterion,
+            sample_time,
         })
     }
 
@@ -70,6 +69,11 @@ impl TrackPlan {
     /// The options; until [`TrackPlan::choose`] with the largest orders of the ranges.
     pub fn options(&self) -> &TrackOptions {
         &self.options
+    }
+
+    /// Time between the samples that it is for.
+    pub fn sample_time(&self) -> SampleTime {
+        self.sample_time
     }
 
     /// The ranges that are searched.
@@ -106,6 +110,14 @@ impl TrackPlan {
         let names = options.parameter_names();
         options.method.inner_mut().retain(&|key| is_known(&names, key));
         options
+    }
+}
+
+/// A start that is given while orders are searched.
+pub fn of_one_model() -> IdentError {
+    IdentError::BadStart {
+        reason: "it belongs to one model, but a range of orders or delays is searched; give nk and the orders as single numbers"
+            .to_owned(),
     }
 }
 

@@ -15,7 +15,7 @@ const ALLOWED: [(&str, &[&str]); 19] = [
     ("hoid-track", &["hoid-core", "hoid-ident", "hoid-model"]),
     ("hoid-sim", &["hoid-core", "hoid-lanes", "hoid-model"]),
     ("hoid-io", &["hoid-model"]),
-    ("hoid-analysis", &["hoid-model", "hoid-ident", "hoid-io"]),
+    ("hoid-analysis", &["hoid-model", "hoid-ident", "hoid-io", "hoid-track"]),
     (
         "hoid-ffi",
         &["hoid-ident", "hoid-io", "hoid-model", "hoid-sim", "hoid-track"],

@@ -368,7 +368,7 @@ class Record:
 
         >>> record.decimated(10)
         """
-        found = _pyhoid.decimated(self, str(decimate), False)
+        found = _pyhoid.decimated(self, str(decimate))
         if found is None:
             return self
         parts, step = found

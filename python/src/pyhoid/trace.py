@@ -13,6 +13,7 @@ import numpy.typing as npt
 from . import _options, _pyhoid, _text
 from ._arrays import FloatArray
 from ._decimation import said
+from ._faults import used
 from .estimates import Estimate, Operator, channel_units, unit_of
 from ._pickling import Call, recalled, state_of
 from .fit import Fit
@@ -78,7 +79,8 @@ class Trace:
     ) -> None:
         self._native = native
         self._call = call
-        self.record = record
+        # A record that is tracked as it was given stays the object that was given.
+        (self.record,) = used(native, [record])
         self.settings: dict[str, Any] = dict(settings or {})
         self._columns: dict[str, npt.NDArray[Any]] | None = None
         self._verdict: Verdict | None = None
@@ -184,7 +186,7 @@ class Trace:
     def verdict(self) -> Verdict:
         """What the trace is worth: `level`, `reasons` and `notes`."""
         if self._verdict is None:
-            self._verdict = Verdict(*self._native.verdict(self.record))
+            self._verdict = Verdict(*self._native.verdict)
         return self._verdict
 
     @property
@@ -259,6 +261,14 @@ class Trace:
             variables, coords={"t": ("t", self.time, {"units": "s"})}, attrs=attributes
         )
 
+    def to_json(self) -> str:
+        """The result as text: the object of ``hoid track --json``.
+
+        >>> from pathlib import Path
+        >>> Path("trace.json").write_text(trace.to_json())
+        """
+        return self._native.to_json()
+
     def write(self, path: str | PathLike[str], comments: Sequence[str] = ()) -> None:
         """Write the columns as CSV, Parquet, NPZ or .mat, as ``hoid track`` does.
 
@@ -302,14 +312,7 @@ class Trace:
 
         >>> page = trace.report("out")
         """
-        label = self.record.label or "(unnamed)"
-        facts = [
-            ("hoid", _pyhoid.__version__),
-            ("record", label),
-            *_options.settings(self.settings),
-        ]
-        title = title or f"{label} tracked by {self.method}"
-        return Path(self._native.report(self.record, Path(directory), title=title, settings=facts))
+        return Path(self._native.report(Path(directory), title=title))
 
     def _rows(self) -> list[list[str]]:
         moved = np.flatnonzero(self.time >= self.updated_from)

@@ -5,10 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from . import _options, _pyhoid, _recursion
-from ._decimation import decimated
 from ._options import Order, Progress
 from ._settings import METHODS, SETTINGS
 from ._pickling import Call
@@ -139,47 +136,23 @@ def track(
     if update_covariance and validate is None:
         raise OptionError("update_covariance belongs to validate, a second run; give it too")
     options = _recursion.plain(shared, settings)
-    if start_span is not None and isinstance(start, Mapping):
-        raise OptionError(
-            "start_span is the span of the start fit, but start gives the start itself; drop one"
-        )
-    end = record.start_time + len(record) * record.sample_time
-    if update_from is not None and not update_from < end:
-        raise OptionError(
-            f"update_from is {update_from}: the record ends at {end:.4f} s; give an earlier time"
-        )
     if every < 1:
         raise OptionError(f"every is {every}, expected 1 or more")
-    read = record
-    counts_samples = _pyhoid.counts_samples(options)
-    (record,) = decimated((read,), decimate, counts_samples=counts_samples)
-    if validate is not None:
-        (validate,) = decimated((validate,), decimate, counts_samples=counts_samples)
-    # Rows as far apart as samples of the record were to be.
-    every = max(int(np.floor(every * read.sample_time / record.sample_time + 0.5)), 1)
-    rows = None
-    if moving_average is not None:
-        if not 0 <= moving_average <= len(record) * record.sample_time:
-            raise OptionError(
-                f"moving_average is {moving_average},"
-                " expected a length in s up to that of the record"
-            )
-        # Halves are rounded away from zero, as the command line does.
-        rows = max(int(np.floor(moving_average / (every * record.sample_time) + 0.5)), 1)
     native = _pyhoid.track(
         record,
         options,
         start_span=_options.span("start_span", start_span),
         update_from=update_from,
-        moving_average=rows,
+        moving_average=None if moving_average is None else float(moving_average),
         every=int(every),
+        decimate=str(decimate),
         validate=validate,
         update_covariance=bool(update_covariance),
         progress=_options.reporter(progress, "candidates"),
     )
     by_run = {"validate": validate, "update_covariance": update_covariance}
-    again = shared | settings | by_run | {"every": every, "decimate": "off"}
-    return Trace(native, record, shared | settings, Call("track", (record,), again))
+    call = Call("track", (record,), shared | settings | by_run)
+    return Trace(native, record, shared | settings, call)
 
 
 track.__doc__ = (track.__doc__ or "").format(methods=METHODS, settings=SETTINGS)

@@ -11,6 +11,7 @@
 //! | `change` | `operator` whose gains change once |
 //! | `description` | `description`: the describing function |
 //! | `polynomials` | `polynomial`; `operator` with its remnant of order m, which is written by its polynomials |
+//! | `trace` | `trace`: a recursion over a recording |
 //! | `result` | what they share, to text and back |
 
 mod change;
@@ -19,6 +20,7 @@ mod operator;
 mod polynomials;
 mod result;
 pub mod state;
+mod trace;
 
 use hoid_ident::{
     MarginEstimates, Termination,
@@ -35,6 +37,7 @@ use serde_json::{Map, Value, json};
 
 pub use polynomials::{PolynomialAnswer, of_family};
 pub use result::{Answer, BatchAnswer};
+pub use trace::{change, open_loop, responses, track_fault, tracked_operator};
 
 use crate::{recordings::Account, settings::Setting};
 

@@ -3,6 +3,7 @@
 
 use std::path::PathBuf;
 
+use hoid::analysis::relative_errors;
 use hoid::ident::{Choice, Estimator, Fit, choose_orders, order_selection};
 use hoid::io::{make_directory, write_record};
 use hoid::model::{
@@ -14,12 +15,7 @@ use hoid::report::{BatchLine, ModelSection, Report, TraceSection, TrackReport, k
 use hoid::sim::{RunSeed, Simulator};
 use hoid::track::{Method, OPERATOR_COLUMNS, StartAt, Trace, TrackOptions, track};
 
-use crate::{
-    args::DemoArgs,
-    commands::{places, track::relative_errors},
-    error::CliError,
-    output, text,
-};
+use crate::{args::DemoArgs, commands::places, error::CliError, output, text};
 
 /// The spans of the reference text (V.B) that lie wholly before and wholly after the change, s.
 const SPANS: [(&str, f64, f64); 2] = [("before", 0.0, 30.72), ("after", 51.2, 81.92)];

@@ -1,11 +1,18 @@
 //! The page of recursive estimates, from its sections.
 
+use hoid_analysis::Tracked;
 use hoid_model::{GainUnit, Record, Verdict};
 use minijinja::{Value, context};
 
-use super::{evaluated::Evaluated, panels, section::TraceSection, tables};
+use super::{
+    batch_fits::BatchFit,
+    evaluated::Evaluated,
+    panels,
+    section::{BatchLine, TraceSection},
+    tables,
+};
 use crate::{
-    ReportError, answer,
+    ReportError, answer, facts,
     figures::{self, TraceGrid},
     page, tables as of_fits,
 };
@@ -29,6 +36,30 @@ pub struct TrackReport<'a> {
     pub verdict: Option<Verdict>,
     /// Remarks for the reader, such as warnings of the command.
     pub notes: Vec<String>,
+}
+
+impl<'a> TrackReport<'a> {
+    /// The page about a recording that was tracked, with batch fits to compare.
+    pub fn of_tracked(tracked: &'a Tracked, batch: &'a [BatchFit]) -> Self {
+        let options = tracked.trace.options();
+        let line = |((from_s, to_s), fit): &'a BatchFit| BatchLine {
+            from_s: *from_s,
+            to_s: *to_s,
+            fit,
+        };
+        Self {
+            title: format!("{} tracked by {}", tracked.record().label(), options.method.name()),
+            settings: facts(&tracked.data.names, &tracked.settings, &tracked.data.accounts),
+            record: tracked.record(),
+            traces: vec![TraceSection {
+                name: format!("{}, {}", options.method.name(), options.structure.label()),
+                trace: &tracked.trace,
+                batch: batch.iter().map(line).collect(),
+            }],
+            verdict: Some(tracked.verdict.clone()),
+            notes: Vec::new(),
+        }
+    }
 }
 
 impl TrackReport<'_> {

@@ -2,8 +2,7 @@
 
 use std::path::Path;
 
-use hoid_analysis::{Account, AnalysisError};
-use hoid_ident::faults::{Mended, mend};
+use hoid_analysis::{Account, AnalysisError, Of, Recordings};
 use hoid_io::{
     ColumnKind, ColumnSchema, OutputTable, Preparation, ReadOptions, ReadRecord, Repair, Step, TableSchema,
     read_aligned,
@@ -66,9 +65,17 @@ fn read_file(manifest: &Manifest, condition: &str, path: &Path, pairing: Pairing
             ..Account::default()
         },
     };
-    let handling = reading.faults.handling();
-    let Mended { segments, faults, .. } = mend(&read.record, handling).map_err(|error| error.to_string())?;
-    let longest = segments.into_iter().max_by_key(Record::len);
+    let mut as_recorded = Recordings::default();
+    as_recorded.push(
+        path.display().to_string(),
+        recorded.record.clone(),
+        recorded.account.clone(),
+    );
+    let mended = as_recorded
+        .repaired(reading.faults.handling(), Of::Person)
+        .map_err(|error| error.to_string())?;
+    let faults = mended.accounts.into_iter().flat_map(|account| account.faults).collect();
+    let longest = mended.records.into_iter().max_by_key(Record::len);
     let mut read = ReadRecord {
         record: longest.unwrap_or_else(|| read.record.clone()),
         ..read

@@ -24,14 +24,10 @@ use std::{
     time::{Duration, Instant},
 };
 
+use hoid::analysis::plan_of;
 use hoid::model::{Decimator, SampleTime};
 
-use crate::{
-    args::StreamArgs,
-    error::CliError,
-    interrupt, output,
-    recursion::{self, Plan},
-};
+use crate::{args::StreamArgs, error::CliError, interrupt, output, recursion};
 use lines::Lines;
 use session::Session;
 use udp::Udp;
@@ -48,14 +44,15 @@ pub fn run(args: &StreamArgs) -> Result<(), CliError> {
         ));
     }
     let sample_time = SampleTime::new(1.0 / args.fs)?;
-    let decimation = args.rate.of(recursion::counts_samples(&args.recursion)?);
+    let asked = recursion::request(&args.recursion)?;
+    let decimation = args.rate.of(asked.counts_samples());
     let decimator = match decimation.factor(sample_time) {
         1 => None,
         // Of the output alone nothing is held.
         factor => Some(Decimator::new(factor, sample_time, [true, false, false])?),
     };
     let tracked = decimator.as_ref().map_or(sample_time, Decimator::sample_time);
-    let plan = Plan::new(&args.recursion, tracked)?;
+    let plan = plan_of(&asked, tracked)?;
     if plan.options().method.smooths() {
         return Err(CliError::Usage(
             "--smooth belongs to hoid track: what is still to come cannot say anything of a stream".to_owned(),
@@ -75,7 +72,7 @@ pub fn run(args: &StreamArgs) -> Result<(), CliError> {
         ));
     }
     let udp = args.udp.as_ref().map(Udp::bind).transpose()?;
-    let session = Arc::new(Mutex::new(Session::new(args, plan, sample_time, decimator)?));
+    let session = Arc::new(Mutex::new(Session::new(args, (asked, plan), sample_time, decimator)?));
     end_on_interrupt(&session);
     match udp {
         Some(udp) => over_udp(&udp, &session),

@@ -2,10 +2,10 @@
 
 use std::collections::VecDeque;
 
-use hoid::analysis::Setting;
+use hoid::analysis::{Setting, settings_of_recursion};
 use hoid::ident::Choice;
 use hoid::model::{Decimator, Finding, SampleTime};
-use hoid::track::{Change, Live, LiveOutcome, Sample, TrackFault, TrackOptions};
+use hoid::track::{Change, Live, LiveOutcome, Sample, TrackFault, TrackOptions, TrackPlan, TrackRequest};
 
 use super::{
     clock::{Arrival, Clock, LONGEST_GAP_S},
@@ -13,14 +13,7 @@ use super::{
     line::{Counts, Standing},
     lines::{Columns, Meaning, Read, is_object},
 };
-use crate::{
-    args::StreamArgs,
-    commands::reading,
-    error::CliError,
-    output,
-    recursion::{self, Plan},
-    text,
-};
+use crate::{args::StreamArgs, commands::reading, error::CliError, output, recursion, text};
 
 /// Length of the warm-up when none is typed, s.
 const USUAL_WARM_UP_S: f64 = 20.0;
@@ -29,7 +22,8 @@ const FAULTS_TOLD: usize = 4;
 
 /// Everything that a line changes.
 pub struct Session {
-    plan: Plan,
+    asked: TrackRequest,
+    plan: TrackPlan,
     columns: Columns,
     clock: Clock,
     live: Live,
@@ -63,7 +57,7 @@ pub struct Session {
 impl Session {
     pub fn new(
         args: &StreamArgs,
-        plan: Plan,
+        (asked, plan): (TrackRequest, TrackPlan),
         sample_time: SampleTime,
         decimator: Option<Decimator<3>>,
     ) -> Result<Self, CliError> {
@@ -75,10 +69,11 @@ impl Session {
                 "--warm-up {length_s}: expected a time in s of one sample to 10 million"
             )));
         }
-        let with_input = recursion::structure(&args.recursion)?.has_input();
+        let with_input = asked.structure().has_input();
         let largest = plan.options().largest;
         let mut session = Self {
             live: Live::new(plan.options(), samples as usize, tracked)?,
+            asked,
             plan,
             columns: Columns::new(&args.input, &args.output, with_input, largest),
             clock: Clock::new(sample_time.s()),
@@ -110,7 +105,7 @@ impl Session {
         if let Live::Tracking(tracker) = &self.live {
             self.names = tracker.parameter_names();
         }
-        let mut settings = self.plan.settings(options, choice);
+        let mut settings = settings_of_recursion(&self.asked, &self.plan, options, choice);
         if let Some(decimator) = &self.decimator {
             let done = decimator.done();
             settings.push(Setting::new("rate", format!("{done}, {:.3} s behind", done.lag_s)));
@@ -287,7 +282,7 @@ impl Session {
         // The time that the recursion has come to.
         let t = self.t.map(|t| t - behind_s);
         let plan = &self.plan;
-        let LiveOutcome { outcome, started } = self.live.update(sample, &|record| plan.choose(record));
+        let LiveOutcome { outcome, started } = self.live.update(sample, &|record| recursion::choose(plan, record));
         if let Some(outcome) = outcome {
             self.innovation = outcome.innovation;
             self.counts.shortened += u64::from(outcome.shortened);

@@ -1,10 +1,10 @@
 //! A summary of a trace for people.
 
+use hoid::analysis::Tracked;
 use hoid::model::{GainUnit, uncertainty::Estimate};
 use hoid::report::numbers;
 use hoid::track::value_of;
 
-use super::result::Tracked;
 use crate::{error::CliError, text};
 
 /// Rows of the trace that are printed.
@@ -13,225 +13,227 @@ const ROWS_SHOWN: usize = 8;
 /// Coefficients that are printed where there is no operator.
 const COEFFICIENTS_SHOWN: usize = 6;
 
-impl Tracked<'_> {
-    /// A summary for people, and with `verbose` what is behind it.
-    ///
-    /// # Errors
-    /// Those of the quality of the start fit.
-    pub fn page(&self, verbose: bool) -> Result<String, CliError> {
-        let mut page = text::verdict(self.verdict);
-        page.push_str(&self.rows_shown());
-        let errors = self.relative_errors();
-        if !errors.is_empty() {
-            let each: Vec<String> = errors
-                .iter()
-                .map(|(name, e)| format!("{name} {:.1} %", 100.0 * e))
-                .collect();
-            page.push_str(&format!(
-                "RMS relative error against the truth in the record, from {:.2} s on: {}.\n",
-                self.trace.times_s()[self.first_moved_row()],
-                each.join(", ")
-            ));
-        }
-        page.push_str(&self.open_loop());
-        page.push_str(&self.changes());
-        page.push_str(&self.counts());
-        if let Some(choice) = self.choice {
-            page.push_str(&text::delay(choice));
-        }
-        page.push_str(&self.covariance());
-        page.push_str(&text::records(
-            std::slice::from_ref(&self.file),
-            std::slice::from_ref(self.record),
-            std::slice::from_ref(self.account),
-            verbose,
-        ));
-        page.push_str(&format!("Trace: {}\n", self.out));
-        if verbose {
-            page.push_str(&self.details()?);
-        } else {
-            page.push_str(text::MORE);
-        }
-        Ok(page)
-    }
-
-    /// What was tried, the start fit, settings.
-    fn details(&self) -> Result<String, CliError> {
-        let mut page = String::new();
-        if let Some(choice) = self.choice {
-            page.push('\n');
-            page.push_str(&text::candidates(choice));
-        }
-        if let (Some(fit), Some(span)) = (self.trace.start(), &self.span) {
-            let q = fit.quality(std::slice::from_ref(span))?;
-            page.push_str(&format!(
-                "\nStart: batch fit of {:.2} to {:.2} s, {}; VAF simulation {:.2} %, prediction {:.2} %.\n",
-                span.time_s(0),
-                span.time_s(span.len()),
-                fit.title(),
-                q.vaf_simulation,
-                q.vaf_prediction
-            ));
-        }
-        page.push_str(&text::settings(self.settings));
-        Ok(page)
-    }
-
-    /// The start covariances that were tried on a second run, where one was given.
-    fn covariance(&self) -> String {
-        let Some((file, choice)) = self.covariance else {
-            return String::new();
-        };
-        let mut rows = text::table(&["P0", "VAF in %", ""]);
-        for (p, vaf) in &choice.candidates {
-            let taken = if *p == choice.covariance { "taken" } else { "" };
-            rows.add_row(vec![format!("{p} I"), format!("{vaf:.2}"), taken.to_owned()]);
-        }
-        format!(
-            "\nStart covariance by what the trace explains of {file} ({:.2} to {:.2} s):\n{rows}\n",
-            choice.span_s.0, choice.span_s.1
-        )
-    }
-
-    /// The estimate at a handful of times.
-    fn rows_shown(&self) -> String {
-        let trace = self.trace;
-        if trace.is_empty() {
-            return String::new();
-        }
-        let (first, last) = (self.first_moved_row(), trace.len() - 1);
-        let shown = ROWS_SHOWN.min(last - first + 1);
-        let mut picked: Vec<usize> = (0..shown)
-            .map(|i| first + (last - first) * i / (shown - 1).max(1))
+/// A summary for people, and with `verbose` what is behind it.
+///
+/// # Errors
+/// Those of the quality of the start fit.
+pub fn page(tracked: &Tracked, out: &str, verbose: bool) -> Result<String, CliError> {
+    let mut page = text::verdict(&tracked.verdict);
+    page.push_str(&rows_shown(tracked));
+    let errors = tracked.relative_errors();
+    if !errors.is_empty() {
+        let each: Vec<String> = errors
+            .iter()
+            .map(|(name, e)| format!("{name} {:.1} %", 100.0 * e))
             .collect();
-        picked.dedup();
-        let with_operator = self.has_operator();
-        let gain = GainUnit::of(self.record);
-        let units = ["", "s", "s", "rad/s", "", "s"];
-        let suppose = self.trace.options().method.starts_itself();
-        let mut bracketed = false;
-        let mut header = vec!["t in s".to_owned()];
+        page.push_str(&format!(
+            "RMS relative error against the truth in the record, from {:.2} s on: {}.\n",
+            tracked.trace.times_s()[tracked.first_moved_row()],
+            each.join(", ")
+        ));
+    }
+    page.push_str(&open_loop(tracked));
+    page.push_str(&changes(tracked));
+    page.push_str(&counts(tracked));
+    if let Some(choice) = &tracked.choice {
+        page.push_str(&text::delay(choice));
+    }
+    page.push_str(&covariance(tracked));
+    page.push_str(&text::records(
+        &tracked.data.names,
+        &tracked.data.records,
+        &tracked.data.accounts,
+        verbose,
+    ));
+    page.push_str(&format!("Trace: {}\n", out));
+    if verbose {
+        page.push_str(&details(tracked)?);
+    } else {
+        page.push_str(text::MORE);
+    }
+    Ok(page)
+}
+
+/// What was tried, the start fit, settings.
+fn details(tracked: &Tracked) -> Result<String, CliError> {
+    let mut page = String::new();
+    if let Some(choice) = &tracked.choice {
+        page.push('\n');
+        page.push_str(&text::candidates(choice));
+    }
+    if let (Some(fit), Some(span)) = (tracked.trace.start(), &tracked.span) {
+        let q = fit.quality(std::slice::from_ref(span))?;
+        page.push_str(&format!(
+            "\nStart: batch fit of {:.2} to {:.2} s, {}; VAF simulation {:.2} %, prediction {:.2} %.\n",
+            span.time_s(0),
+            span.time_s(span.len()),
+            fit.title(),
+            q.vaf_simulation,
+            q.vaf_prediction
+        ));
+    }
+    page.push_str(&text::settings(&tracked.settings));
+    Ok(page)
+}
+
+/// The start covariances that were tried on a second run, where one was given.
+fn covariance(tracked: &Tracked) -> String {
+    let Some((file, choice)) = tracked.chosen_covariance() else {
+        return String::new();
+    };
+    let mut rows = text::table(&["P0", "VAF in %", ""]);
+    for (p, vaf) in &choice.candidates {
+        let taken = if *p == choice.covariance { "taken" } else { "" };
+        rows.add_row(vec![format!("{p} I"), format!("{vaf:.2}"), taken.to_owned()]);
+    }
+    format!(
+        "\nStart covariance by what the trace explains of {file} ({:.2} to {:.2} s):\n{rows}\n",
+        choice.span_s.0, choice.span_s.1
+    )
+}
+
+/// The estimate at a handful of times.
+fn rows_shown(tracked: &Tracked) -> String {
+    let trace = &tracked.trace;
+    if trace.is_empty() {
+        return String::new();
+    }
+    let (first, last) = (tracked.first_moved_row(), trace.len() - 1);
+    let shown = ROWS_SHOWN.min(last - first + 1);
+    let mut picked: Vec<usize> = (0..shown)
+        .map(|i| first + (last - first) * i / (shown - 1).max(1))
+        .collect();
+    picked.dedup();
+    let with_operator = tracked.has_operator();
+    let gain = GainUnit::of(tracked.record());
+    let units = ["", "s", "s", "rad/s", "", "s"];
+    let suppose = tracked.trace.options().method.starts_itself();
+    let mut bracketed = false;
+    let mut header = vec!["t in s".to_owned()];
+    if with_operator {
+        let named = tracked.trace.operator_columns().into_iter().zip(units);
+        header.extend(named.map(|(n, u)| match gain.unit(n, u) {
+            unit if unit.is_empty() => n.to_owned(),
+            unit => format!("{n} ({unit})"),
+        }));
+    } else {
+        header.extend(trace.parameter_names().into_iter().take(COEFFICIENTS_SHOWN));
+    }
+    let mut rows = text::table(&header.iter().map(String::as_str).collect::<Vec<_>>()).in_course();
+    for row in picked {
+        let mut cells = vec![format!("{:.2}", trace.times_s()[row])];
         if with_operator {
-            let named = self.trace.operator_columns().into_iter().zip(units);
-            header.extend(named.map(|(n, u)| match gain.unit(n, u) {
-                unit if unit.is_empty() => n.to_owned(),
-                unit => format!("{n} ({unit})"),
+            let of = |name| value_of(&tracked.operators[row], name);
+            let determined = tracked.operators[row].as_ref().map(|o| trace.determined(o));
+            let determined = determined.unwrap_or_default();
+            cells.extend(tracked.trace.operator_columns().into_iter().map(|n| {
+                let open = suppose && determined.iter().any(|(name, yes)| *name == n && !yes);
+                bracketed |= open;
+                match open {
+                    true => format!("({})", plus_minus(of(n))),
+                    false => plus_minus(of(n)),
+                }
             }));
         } else {
-            header.extend(trace.parameter_names().into_iter().take(COEFFICIENTS_SHOWN));
+            let all = trace.parameters(row);
+            cells.extend(all.into_iter().take(COEFFICIENTS_SHOWN).map(|e| plus_minus(Some(e))));
         }
-        let mut rows = text::table(&header.iter().map(String::as_str).collect::<Vec<_>>()).in_course();
-        for row in picked {
-            let mut cells = vec![format!("{:.2}", trace.times_s()[row])];
-            if with_operator {
-                let of = |name| value_of(&self.operators[row], name);
-                let determined = self.operators[row].as_ref().map(|o| trace.determined(o));
-                let determined = determined.unwrap_or_default();
-                cells.extend(self.trace.operator_columns().into_iter().map(|n| {
-                    let open = suppose && determined.iter().any(|(name, yes)| *name == n && !yes);
-                    bracketed |= open;
-                    match open {
-                        true => format!("({})", plus_minus(of(n))),
-                        false => plus_minus(of(n)),
-                    }
-                }));
+        rows.add_row(cells);
+    }
+    let open = match bracketed {
+        true => "In brackets: not determined by the data so far.\n",
+        false => "",
+    };
+    format!(
+        "Estimate by {} with one standard error; the trace has all {} rows.\n{rows}\n{open}",
+        trace.options().method.name(),
+        trace.len()
+    )
+}
+
+/// Crossover and phase margin at the end, with a controlled element.
+fn open_loop(tracked: &Tracked) -> String {
+    let (Some(row), Some((rows, reason))) = (tracked.trace.len().checked_sub(1), tracked.without_crossover()) else {
+        return String::new();
+    };
+    let mut words = match tracked.trace.open_loop(row) {
+        Some(Ok(found)) => {
+            format!(
+                "Open loop at {:.2} s: crossover {} rad/s, phase margin {} deg.\n",
+                tracked.trace.times_s()[row],
+                text::plus_minus(&found.crossover_rad_s),
+                text::plus_minus(&found.phase_margin_deg)
+            ) + &tracked
+                .trace
+                .loop_shape()
+                .map_or_else(String::new, |shape| text::loop_shape(shape, false))
+        }
+        _ => String::new(),
+    };
+    if let Some(reason) = reason {
+        words.push_str(&format!(
+            "{rows} of {} rows have no crossover; most often {}.\n",
+            tracked.trace.len(),
+            reason.words()
+        ));
+    }
+    words
+}
+
+/// The changes that were declared.
+fn changes(tracked: &Tracked) -> String {
+    let trace = &tracked.trace;
+    if trace.change_odds().is_empty() {
+        return String::new();
+    }
+    if trace.changes().is_empty() {
+        return "No change was declared.\n".to_owned();
+    }
+    let mut lines = String::new();
+    for (t, c) in trace.changes() {
+        let changed = c.changed();
+        lines.push_str(&format!(
+            "Change declared at {t:.2} s, of {:.2} s before: {}; log odds {:.1}.\n",
+            c.seconds_ago,
+            if changed.is_empty() {
+                "no single quantity by two standard errors".to_owned()
             } else {
-                let all = trace.parameters(row);
-                cells.extend(all.into_iter().take(COEFFICIENTS_SHOWN).map(|e| plus_minus(Some(e))));
-            }
-            rows.add_row(cells);
-        }
-        let open = match bracketed {
-            true => "In brackets: not determined by the data so far.\n",
-            false => "",
-        };
-        format!(
-            "Estimate by {} with one standard error; the trace has all {} rows.\n{rows}\n{open}",
-            trace.options().method.name(),
-            trace.len()
-        )
+                changed.join(", ")
+            },
+            c.odds
+        ));
     }
+    lines
+}
 
-    /// Crossover and phase margin at the end, with a controlled element.
-    fn open_loop(&self) -> String {
-        let (Some(row), Some((rows, reason))) = (self.trace.len().checked_sub(1), self.without_crossover()) else {
-            return String::new();
-        };
-        let mut words = match self.trace.open_loop(row) {
-            Some(Ok(found)) => {
-                format!(
-                    "Open loop at {:.2} s: crossover {} rad/s, phase margin {} deg.\n",
-                    self.trace.times_s()[row],
-                    text::plus_minus(&found.crossover_rad_s),
-                    text::plus_minus(&found.phase_margin_deg)
-                ) + &self
-                    .trace
-                    .loop_shape()
-                    .map_or_else(String::new, |shape| text::loop_shape(shape, false))
-            }
-            _ => String::new(),
-        };
-        if let Some(reason) = reason {
-            words.push_str(&format!(
-                "{rows} of {} rows have no crossover; most often {}.\n",
-                self.trace.len(),
-                reason.words()
-            ));
-        }
-        words
+fn counts(tracked: &Tracked) -> String {
+    let c = tracked.trace.counts();
+    let mut text = format!(
+        "{} samples; {} skipped for a fault in e or u; {} made shorter to stay stable or within bounds.\n",
+        c.samples,
+        c.skipped,
+        text::counted(c.shortened, "step")
+    );
+    if c.held > 0 || c.restarts > 0 {
+        text.push_str(&format!(
+            "{} held back by the guard; the estimate was begun again {}.\n",
+            text::counted(c.held, "sample"),
+            text::counted(c.restarts, "time")
+        ));
     }
-
-    /// The changes that were declared.
-    fn changes(&self) -> String {
-        let trace = self.trace;
-        if trace.change_odds().is_empty() {
-            return String::new();
-        }
-        if trace.changes().is_empty() {
-            return "No change was declared.\n".to_owned();
-        }
-        let mut lines = String::new();
-        for (t, c) in trace.changes() {
-            let changed = c.changed();
-            lines.push_str(&format!(
-                "Change declared at {t:.2} s, of {:.2} s before: {}; log odds {:.1}.\n",
-                c.seconds_ago,
-                if changed.is_empty() {
-                    "no single quantity by two standard errors".to_owned()
-                } else {
-                    changed.join(", ")
-                },
-                c.odds
-            ));
-        }
-        lines
+    if tracked.has_operator() {
+        let none = tracked.not_converted();
+        text.push_str(&format!(
+            "{} of {} rows have no operator",
+            none.rows,
+            tracked.trace.len()
+        ));
+        text.push_str(&match none.reason {
+            Some(reason) => format!("; most often {reason}.\n"),
+            None => ".\n".to_owned(),
+        });
     }
-
-    fn counts(&self) -> String {
-        let c = self.trace.counts();
-        let mut text = format!(
-            "{} samples; {} skipped for a fault in e or u; {} made shorter to stay stable or within bounds.\n",
-            c.samples,
-            c.skipped,
-            text::counted(c.shortened, "step")
-        );
-        if c.held > 0 || c.restarts > 0 {
-            text.push_str(&format!(
-                "{} held back by the guard; the estimate was begun again {}.\n",
-                text::counted(c.held, "sample"),
-                text::counted(c.restarts, "time")
-            ));
-        }
-        if self.has_operator() {
-            let none = self.not_converted();
-            text.push_str(&format!("{} of {} rows have no operator", none.rows, self.trace.len()));
-            text.push_str(&match none.reason {
-                Some(reason) => format!("; most often {reason}.\n"),
-                None => ".\n".to_owned(),
-            });
-        }
-        text
-    }
+    text
 }
 
 fn plus_minus(e: Option<Estimate>) -> String {

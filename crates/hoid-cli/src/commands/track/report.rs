@@ -1,40 +1,19 @@
 //! The page about a trace.
 
-use std::{path::PathBuf, slice};
+use std::path::PathBuf;
 
-use hoid::report::{
-    BatchFit, BatchLine, TraceSection, TrackReport, batch_fit, default_batch_fits, facts, figures::trace_panels,
-    write_report,
-};
+use hoid::analysis::Tracked;
+use hoid::report::{BatchFit, TrackReport, batch_fit, default_batch_fits, figures::trace_panels, write_report};
 
-use super::result::Tracked;
 use crate::{args::TrackArgs, commands::figure, error::CliError, output};
 
 /// Writes the page into the directory of `--report` and the parameters over time into the file of
 /// `--figure`; nothing without them.
-pub fn write(args: &TrackArgs, tracked: &Tracked<'_>, batch: &[BatchFit]) -> Result<Option<PathBuf>, CliError> {
+pub fn write(args: &TrackArgs, tracked: &Tracked, batch: &[BatchFit]) -> Result<Option<PathBuf>, CliError> {
     if args.report.is_none() && args.picture.figure.is_none() {
         return Ok(None);
     }
-    let line = |((from_s, to_s), fit)| BatchLine { from_s, to_s, fit };
-    let batch: Vec<BatchLine<'_>> = batch.iter().map(|(span, fit)| line((*span, fit))).collect();
-    let options = tracked.trace.options();
-    let report = TrackReport {
-        title: format!("{} tracked by {}", tracked.record.label(), options.method.name()),
-        settings: facts(
-            slice::from_ref(&tracked.file),
-            tracked.settings,
-            slice::from_ref(tracked.account),
-        ),
-        record: tracked.record,
-        traces: vec![TraceSection {
-            name: format!("{}, {}", options.method.name(), options.structure.label()),
-            trace: tracked.trace,
-            batch,
-        }],
-        verdict: Some(tracked.verdict.clone()),
-        notes: Vec::new(),
-    };
+    let report = TrackReport::of_tracked(tracked, batch);
     if let Some(path) = &args.picture.figure {
         let grid = match report.response_grid()? {
             Some(grid) => grid,
@@ -52,11 +31,11 @@ pub fn write(args: &TrackArgs, tracked: &Tracked<'_>, batch: &[BatchFit]) -> Res
 /// The batch fits that the page compares with: of the spans as typed, else the start fit and that
 /// of the last third. A span of the program's own choice that cannot be fitted is left out with a
 /// note.
-pub fn batch_fits(args: &TrackArgs, tracked: &Tracked<'_>) -> Result<Vec<BatchFit>, CliError> {
+pub fn batch_fits(args: &TrackArgs, tracked: &Tracked) -> Result<Vec<BatchFit>, CliError> {
     if args.report.is_none() {
         return Ok(Vec::new());
     }
-    let (record, trace) = (tracked.record, tracked.trace);
+    let (record, trace) = (tracked.record(), &tracked.trace);
     if !args.batch.is_empty() {
         return Ok(args
             .batch

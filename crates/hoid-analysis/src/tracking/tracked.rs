@@ -2,43 +2,83 @@
 
 use std::collections::BTreeMap;
 
-use hoid::analysis::{Account, Setting};
-use hoid::ident::{Choice, Fit};
-use hoid::io::{ColumnValues, OutputColumn, OutputTable};
-use hoid::model::{NotConvertible, Record, Verdict, uncertainty::OperatorEstimate};
-use hoid::track::{CovarianceChoice, NoCrossover, Trace};
+use hoid_ident::{Choice, Fit};
+use hoid_io::{ColumnValues, OutputColumn, OutputTable};
+use hoid_model::{NotConvertible, Record, Verdict, uncertainty::OperatorEstimate};
+use hoid_track::{CovarianceChoice, NoCrossover, Trace};
 
 use super::errors::relative_errors;
+use crate::{
+    recordings::{Account, Recordings},
+    settings::Setting,
+};
+
+/// What a second run said of the covariance, and the name of that run.
+#[derive(Debug, Clone)]
+pub enum Covariance {
+    /// The one at the start.
+    Chosen(String, CovarianceChoice),
+    /// That in course.
+    Updated(String),
+}
 
 /// Everything that was found.
-pub struct Tracked<'a> {
-    pub verdict: &'a Verdict,
-    pub file: String,
-    pub record: &'a Record,
-    pub account: &'a Account,
+#[derive(Debug, Clone)]
+pub struct Tracked {
+    /// The estimate over the record.
+    pub trace: Trace,
+    /// What it is worth, of all that is known.
+    pub verdict: Verdict,
+    /// The one recording as it was tracked, and what was done to it.
+    pub data: Recordings,
     /// The span of the start fit, where there was one.
     pub span: Option<Record>,
-    pub trace: &'a Trace,
     /// The operator in each row.
     pub operators: Vec<Result<OperatorEstimate, NotConvertible>>,
-    pub choice: Option<&'a Choice>,
-    /// The start covariance that a second run chose, and the file of that run.
-    pub covariance: Option<&'a (String, CovarianceChoice)>,
-    /// The file of the trace.
-    pub out: String,
-    pub settings: &'a [Setting],
+    /// The search for the orders, where there was one.
+    pub choice: Option<Choice>,
+    /// What a second run said.
+    pub covariance: Option<Covariance>,
+    /// The settings that were used.
+    pub settings: Vec<Setting>,
 }
 
 /// Rows without an operator and their most frequent reason.
-pub(super) struct NotConverted {
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct NotConverted {
+    /// How many.
     pub rows: usize,
+    /// Why most of them.
     pub reason: Option<String>,
 }
 
-impl Tracked<'_> {
+impl Tracked {
+    /// The record as it was tracked.
+    pub fn record(&self) -> &Record {
+        &self.data.records[0]
+    }
+
+    /// What was done to it.
+    pub fn account(&self) -> &Account {
+        &self.data.accounts[0]
+    }
+
+    /// Its name.
+    pub fn name(&self) -> &str {
+        &self.data.names[0]
+    }
+
+    /// The start covariance that a second run chose, and the name of that run.
+    pub fn chosen_covariance(&self) -> Option<(&str, &CovarianceChoice)> {
+        match &self.covariance {
+            Some(Covariance::Chosen(file, choice)) => Some((file, choice)),
+            _ => None,
+        }
+    }
+
     /// The columns of the trace.
     pub fn table(&self) -> OutputTable {
-        let trace = self.trace;
+        let trace = &self.trace;
         let mut columns = Vec::new();
         let mut add = |name: String, values: ColumnValues| columns.push(OutputColumn { name, values });
         for (name, values) in trace.estimate_columns(&self.operators) {
@@ -64,18 +104,18 @@ impl Tracked<'_> {
             ColumnValues::Whole(trace.steps_shortened().to_vec()),
         );
         let mut comments = vec![
-            format!("hoid {} track {}", env!("CARGO_PKG_VERSION"), self.file),
+            format!("hoid {} track {}", env!("CARGO_PKG_VERSION"), self.name()),
             "units: t s, T_L s, omega_nm rad/s; gains are u by e; gain_db@W dB and phase_deg@W deg at W rad/s; _se are standard errors"
                 .to_owned(),
         ];
         comments.extend(self.settings.iter().map(|one| format!("{}: {}", one.name, one.value)));
         comments.extend(
-            self.account
+            self.account()
                 .quality_issues
                 .iter()
                 .map(|one| format!("sampling trouble: {one}")),
         );
-        comments.extend(self.account.steps.iter().map(|step| format!("preparation: {step}")));
+        comments.extend(self.account().steps.iter().map(|step| format!("preparation: {step}")));
         comments.extend(trace.faults().iter().map(|fault| {
             format!(
                 "fault: {} in {}, {} to {} s, {}",
@@ -89,7 +129,7 @@ impl Tracked<'_> {
     }
 
     /// True where the coefficients stand for an operator at all.
-    pub(super) fn has_operator(&self) -> bool {
+    pub fn has_operator(&self) -> bool {
         self.operators.iter().any(|o| {
             !matches!(
                 o,
@@ -98,9 +138,10 @@ impl Tracked<'_> {
         })
     }
 
-    pub(super) fn first_moved_row(&self) -> usize {
+    /// The first row in which the estimate has moved.
+    pub fn first_moved_row(&self) -> usize {
         // Half a sample, so that rounding of the times does not decide.
-        let from = self.trace.updated_from_s() - self.record.sample_time().s() / 2.0;
+        let from = self.trace.updated_from_s() - self.record().sample_time().s() / 2.0;
         let first = self.trace.times_s().partition_point(|t| *t < from);
         let first = first
             + (first..self.trace.len())
@@ -109,7 +150,8 @@ impl Tracked<'_> {
         first.min(self.trace.len().saturating_sub(1))
     }
 
-    pub(super) fn not_converted(&self) -> NotConverted {
+    /// Rows that have no operator.
+    pub fn not_converted(&self) -> NotConverted {
         let mut kinds: BTreeMap<&'static str, (usize, String)> = BTreeMap::new();
         let rows = self.operators.iter().enumerate();
         for (row, reason) in rows.filter_map(|(row, o)| Some((row, o.as_ref().err()?))) {
@@ -134,7 +176,7 @@ impl Tracked<'_> {
     }
 
     /// Rows without a crossover and their most frequent reason; `None` without a controlled element.
-    pub(super) fn without_crossover(&self) -> Option<(usize, Option<NoCrossover>)> {
+    pub fn without_crossover(&self) -> Option<(usize, Option<NoCrossover>)> {
         self.trace.options().controlled_element.as_ref()?;
         let mut kinds: BTreeMap<NoCrossover, usize> = BTreeMap::new();
         for reason in (0..self.trace.len()).filter_map(|row| self.trace.open_loop(row)?.err()) {
@@ -144,10 +186,11 @@ impl Tracked<'_> {
         Some((kinds.values().sum(), most))
     }
 
-    pub(super) fn relative_errors(&self) -> Vec<(&'static str, f64)> {
+    /// Errors against the truth in the record; see [`relative_errors`].
+    pub fn relative_errors(&self) -> Vec<(&'static str, f64)> {
         relative_errors(
-            self.record,
-            self.trace,
+            self.record(),
+            &self.trace,
             &self.operators,
             self.first_moved_row(),
             &self.trace.operator_columns(),

@@ -1,7 +1,7 @@
 //! Errors of a trace against the truth in its record.
 
-use hoid::model::{NotConvertible, Record, uncertainty::OperatorEstimate};
-use hoid::track::{Trace, value_of};
+use hoid_model::{NotConvertible, Record, uncertainty::OperatorEstimate};
+use hoid_track::{Trace, value_of};
 
 /// Root of the mean square of the relative error, of the rows from `first` on that converted, for
 /// each parameter whose truth the record holds.

@@ -1,0 +1,222 @@
+//! The run: from a recording to a trace and what it is worth.
+
+use hoid_ident::IdentError;
+use hoid_model::{Decimation, Record, SampleTime};
+use hoid_track::{
+    CovarianceUpdates, RequestedStart, StartAt, Trace, TrackOptions, TrackPlan, TrackRequest, choose_covariance, track,
+    track_validated, usual_start_span,
+};
+
+use super::{
+    settings::{OwnSettings, settings_of_recursion},
+    tracked::{Covariance, Tracked},
+};
+use crate::{
+    AnalysisError,
+    quality::{Of, findings_of_quality},
+    recordings::Recordings,
+};
+
+/// A recursion over a recording, as it is asked for.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Tracking {
+    /// The recursion.
+    pub recursion: TrackRequest,
+    /// Span of the start fit, s; none for the first third.
+    pub start_span_s: Option<(f64, f64)>,
+    /// Time from which the estimate moves, s.
+    pub update_from_s: Option<f64>,
+    /// The trace is the mean over so many seconds.
+    pub moving_average_s: Option<f64>,
+    /// Every so many samples of the recording give a row.
+    pub every: usize,
+    /// The rate at which it is tracked.
+    pub rate: Decimation,
+    /// The second run makes P smaller in course, in place of choosing it at the start.
+    pub update_covariance: bool,
+}
+
+impl Default for Tracking {
+    fn default() -> Self {
+        Self::of(TrackRequest::default())
+    }
+}
+
+impl Tracking {
+    /// A recursion, and all else by default.
+    pub fn of(recursion: TrackRequest) -> Self {
+        Self {
+            recursion,
+            start_span_s: None,
+            update_from_s: None,
+            moving_average_s: None,
+            every: 1,
+            rate: Decimation::Auto,
+            update_covariance: false,
+        }
+    }
+
+    /// The plan for a recording, at the rate at which it is tracked.
+    ///
+    /// # Errors
+    /// [`AnalysisError::Options`] for what contradicts itself.
+    pub fn plan(&self, recordings: &Recordings) -> Result<TrackPlan, AnalysisError> {
+        let read = recordings
+            .records
+            .first()
+            .ok_or(AnalysisError::NoRecordings)?
+            .sample_time();
+        let rate = match self.recursion.counts_samples() {
+            _ if recordings.settles_the_rate() => Decimation::Off,
+            true => self.rate.when_named(),
+            false => self.rate,
+        };
+        self.plan_at(SampleTime::new(rate.factor(read) as f64 * read.s())?)
+    }
+
+    fn plan_at(&self, sample_time: SampleTime) -> Result<TrackPlan, AnalysisError> {
+        self.recursion
+            .plan(sample_time)
+            .map_err(|error| options(error.to_string()))
+    }
+
+    /// Tracks the one recording; `validation` is a second run of the same person, `each` is called after every
+    /// candidate of a search.
+    ///
+    /// # Errors
+    /// [`AnalysisError`] where there is no trace. One that is doubtful is none: see [`Tracked::verdict`].
+    pub fn run(
+        &self,
+        recordings: Recordings,
+        validation: Option<Recordings>,
+        each: &(dyn Fn() + Sync),
+    ) -> Result<Tracked, AnalysisError> {
+        let counts_samples = self.recursion.counts_samples();
+        let read_ts = recordings
+            .records
+            .first()
+            .ok_or(AnalysisError::NoRecordings)?
+            .sample_time();
+        let named_rate = recordings.settles_the_rate();
+        let data = recordings.at_rate(self.rate, counts_samples)?;
+        let (record, account) = (&data.records[0], &data.accounts[0]);
+        let every = match named_rate {
+            true => self.every,
+            // Rows as far apart as samples of the file were to be.
+            false => (self.every as f64 * read_ts.s() / record.sample_time().s()).round() as usize,
+        }
+        .max(1);
+        let plan = self.plan_at(record.sample_time())?;
+        self.check(&plan, record)?;
+        let span_s = self.start_span_s.unwrap_or_else(|| usual_start_span(record));
+        let span = record.span(span_s.0, span_s.1);
+        let (planned, choice) = if plan.is_settled() {
+            (plan.options().clone(), None)
+        } else {
+            plan.choose(span.as_ref().map_err(|error| error.clone())?, each)?
+        };
+        let mut used = TrackOptions {
+            start: match planned.start {
+                StartAt::Span(_) => StartAt::Span(Some(span_s)),
+                other => other,
+            },
+            update_from_s: self.update_from_s,
+            ..planned
+        };
+        let other = validation
+            .map(|other| other.at_rate(self.rate, counts_samples))
+            .transpose()?;
+        let covariance = match &other {
+            None => None,
+            Some(other) if self.update_covariance => Some(Covariance::Updated(other.names[0].clone())),
+            Some(other) => {
+                let (options, chosen) = choose_covariance(record, &other.records[0], &used)?;
+                used = options;
+                Some(Covariance::Chosen(other.names[0].clone(), chosen))
+            }
+        };
+        let trace = match (&other, self.update_covariance) {
+            (Some(other), true) => {
+                track_validated(record, &other.records[0], &used, &CovarianceUpdates::default(), every)?
+            }
+            _ => track(record, &used, every)?,
+        };
+        let rows = self.averaged_rows(every, record)?;
+        let trace: Trace = trace.moving_average(rows);
+        let verdict = trace.verdict(record, choice.as_ref())?;
+        let verdict = verdict.behind(findings_of_quality(account, record, Of::Person));
+        let mut settings = settings_of_recursion(&self.recursion, &plan, &used, choice.as_ref());
+        let own = OwnSettings {
+            trace: &trace,
+            options: &used,
+            covariance: covariance.as_ref(),
+            start_given: self.start_span_s.is_some() || self.recursion.start != RequestedStart::Usual,
+            update_given: self.update_from_s.is_some(),
+            rows,
+            every: (every, self.every != 1),
+            rate: self.rate,
+        };
+        settings.extend(own.list(&data));
+        Ok(Tracked {
+            verdict,
+            span: span.ok().filter(|_| trace.start().is_some()),
+            operators: trace.operators(),
+            trace,
+            choice,
+            covariance,
+            settings,
+            data,
+        })
+    }
+
+    /// What contradicts itself or the record.
+    fn check(&self, plan: &TrackPlan, record: &Record) -> Result<(), AnalysisError> {
+        let method = &plan.options().method;
+        if self.start_span_s.is_some() && matches!(self.recursion.start, RequestedStart::Coefficients(_)) {
+            return Err(options(
+                "--start-span is the span of the start fit, and --start gives the start itself; drop one".to_owned(),
+            ));
+        }
+        if self.start_span_s.is_some() && method.starts_itself() {
+            return Err(options(format!(
+                "--start-span is the span of a start fit, and {method} has none; drop it, or name --method physical"
+            )));
+        }
+        let end = record.time_s(record.len());
+        match self.update_from_s {
+            Some(t) if t.is_nan() || t >= end => Err(options(format!(
+                "--update-from {t}: the record ends at {end:.4} s; give a time before"
+            ))),
+            _ => Ok(()),
+        }
+    }
+
+    /// Rows of the moving average.
+    fn averaged_rows(&self, every: usize, record: &Record) -> Result<usize, AnalysisError> {
+        let Some(length) = self.moving_average_s else {
+            return Ok(1);
+        };
+        let row = every as f64 * record.sample_time().s();
+        if !(length >= 0.0 && length <= record.len() as f64 * record.sample_time().s()) {
+            return Err(options(format!(
+                "--moving-average {length}: expected a length in s up to that of the record"
+            )));
+        }
+        Ok((length / row).round().max(1.0) as usize)
+    }
+}
+
+/// The plan of a recursion; what is wrong with it is wrong with its options.
+///
+/// # Errors
+/// [`AnalysisError::Options`].
+pub fn plan_of(asked: &TrackRequest, sample_time: SampleTime) -> Result<TrackPlan, AnalysisError> {
+    asked.plan(sample_time).map_err(|error| match error {
+        IdentError::BadStart { reason } => options(format!("--start: {reason}")),
+        other => options(other.to_string()),
+    })
+}
+
+fn options(reason: String) -> AnalysisError {
+    AnalysisError::Options { reason }
+}

@@ -1,0 +1,134 @@
+//! The settings of a recursion as they are printed.
+
+use hoid_ident::{Choice, settings::DelayRange};
+use hoid_model::Decimation;
+use hoid_track::{Method, StartAt, Trace, TrackOptions, TrackPlan, TrackRequest};
+
+use super::tracked::Covariance;
+use crate::{recordings::Recordings, settings::Setting};
+
+/// Every option that shapes a recursion, defaults included, with units.
+pub fn settings_of_recursion(
+    asked: &TrackRequest,
+    plan: &TrackPlan,
+    options: &TrackOptions,
+    choice: Option<&Choice>,
+) -> Vec<Setting> {
+    let mut orders = options.orders.to_string();
+    if let Some(choice) = choice {
+        orders.push_str(&format!(
+            " (chosen from {} by {})",
+            plan.ranges(),
+            choice.criterion.label()
+        ));
+    }
+    let own = options.method.settings();
+    let value = |name: &str| own.get(name).filter(|text| !text.is_empty());
+    let listed = own.list();
+    let mut memories = listed.iter().filter(|one| one.name.starts_with("memory"));
+    let memory_given = memories.any(|one| value(one.name).is_some_and(|text| text != one.default));
+    let mut list = vec![
+        Setting::new("method", options.method.name()).given(options.method.name() != Method::default().name()),
+        Setting::new("structure", options.structure.name()).given(asked.structure.is_some()),
+        Setting::new("orders", orders).given(!asked.orders.is_empty() || asked.delay.is_some()),
+    ];
+    if let Some(delay @ DelayRange::Seconds(..)) = &asked.delay {
+        list.push(Setting::new("delay", delay.to_string()).given(true));
+    }
+    list.push(Setting::new("memory", options.memory_in_words(plan.sample_time())).given(memory_given));
+    for one in &listed {
+        // The memory stands above with the defaults of all parameters.
+        if let Some(text) = value(one.name) {
+            let given = text != one.default;
+            list.push(Setting::new(one.name.replace('_', " "), text).given(given));
+        }
+    }
+    if options.method.limit().is_finite() {
+        list.push(Setting::new(
+            "limit of innovations",
+            format!("{} standard deviations", options.method.limit()),
+        ));
+    }
+    if !options.at_rad_s.is_empty() {
+        let each: Vec<String> = options.at_rad_s.iter().map(f64::to_string).collect();
+        list.push(Setting::new("response at", format!("{} rad/s", each.join(", "))).given(true));
+    }
+    if let Some(element) = &options.controlled_element {
+        list.push(Setting::new("controlled element", element.to_string()).given(true));
+    }
+    let fault = format!("not a finite number, or beyond {}", options.largest);
+    list.push(Setting::new("fault", fault).given(options.largest != TrackOptions::LARGEST));
+    list
+}
+
+/// What is not of the recursion: the second run, the start, the rows.
+pub(super) struct OwnSettings<'a> {
+    pub trace: &'a Trace,
+    pub options: &'a TrackOptions,
+    pub covariance: Option<&'a Covariance>,
+    pub start_given: bool,
+    pub update_given: bool,
+    /// Rows of the moving average.
+    pub rows: usize,
+    /// Samples from row to row, and whether they were given.
+    pub every: (usize, bool),
+    pub rate: Decimation,
+}
+
+impl OwnSettings<'_> {
+    /// These, and how the file was read.
+    pub fn list(&self, data: &Recordings) -> Vec<Setting> {
+        let Self {
+            trace,
+            options,
+            rows,
+            every: (every, every_given),
+            ..
+        } = *self;
+        let mut list = Vec::new();
+        match self.covariance {
+            Some(Covariance::Chosen(file, choice)) => {
+                let words = format!(
+                    "of {} values that whose trace explains most of {file} from {:.2} to {:.2} s, VAF {:.2} %",
+                    choice.candidates.len(),
+                    choice.span_s.0,
+                    choice.span_s.1,
+                    choice.vaf()
+                );
+                list.push(Setting::new("covariance chosen", words));
+            }
+            Some(Covariance::Updated(file)) => {
+                let words = format!("by what the estimate explains of {file}, VAF");
+                list.push(Setting::new("covariance updated", words).given(true));
+            }
+            None => {}
+        }
+        let words = match &options.start {
+            _ if options.method.starts_itself() => options.start_in_words(),
+            StartAt::Span(Some((from, to))) => format!("batch fit of {from:.2} to {to:.2} s"),
+            StartAt::Span(None) => "batch fit of the first third".to_owned(),
+            StartAt::Theta(_) => "given".to_owned(),
+            StartAt::Nothing => "nothing".to_owned(),
+        };
+        list.push(Setting::new("start", words).given(self.start_given));
+        if trace.idle_s() > 0.0 {
+            let words = format!("{:.2} s, in which neither e nor u moves", trace.idle_s());
+            list.push(Setting::new("idle head", words));
+        }
+        if options.method.smooths() {
+            list.push(Setting::new("estimate", "two-sided, of the whole record"));
+        } else {
+            let words = format!("{:.2} s", trace.updated_from_s());
+            list.push(Setting::new("estimate moves from", words).given(self.update_given));
+        }
+        if rows > 1 {
+            let lag = (rows - 1) as f64 / 2.0 * every as f64 * data.records[0].sample_time().s();
+            list.push(Setting::new("moving average", format!("{rows} rows, lags by {lag:.3} s")).given(true));
+        }
+        if let Some(source) = &data.source {
+            list.extend(source.reading.settings(self.rate));
+        }
+        list.push(Setting::new("rows of the trace", format!("every {every} samples")).given(every_given));
+        list
+    }
+}

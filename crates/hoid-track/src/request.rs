@@ -1,0 +1,184 @@
+//! A recursion as it is asked for, before the time between samples is known: a delay in seconds is none of the orders
+//! yet, and a start names its coefficients.
+
+use std::collections::BTreeMap;
+
+use hoid_ident::{IdentError, NamedOrders, order_selection::Criterion, settings::DelayRange};
+use hoid_model::{ContinuousTransferFunction, SampleTime, Structure, theta_of};
+
+use crate::{
+    methods::Method,
+    options::TrackOptions,
+    plan::{TrackPlan, of_one_model, ranges_of},
+    setup::StartAt,
+};
+
+/// Where the recursion is to start.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub enum RequestedStart {
+    /// As the method does: from a batch fit, or from what is known of people.
+    #[default]
+    Usual,
+    /// From nothing.
+    Nothing,
+    /// From all coefficients, by name.
+    Coefficients(BTreeMap<String, f64>),
+}
+
+/// A recursion as it is asked for.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TrackRequest {
+    /// The recursion, with its options.
+    pub method: Method,
+    /// The structure; none for that of the method.
+    pub structure: Option<Structure>,
+    /// Orders by name, each a range.
+    pub orders: NamedOrders,
+    /// The delay, in samples or in s.
+    pub delay: Option<DelayRange>,
+    /// Where it starts.
+    pub start: RequestedStart,
+    /// What decides between orders that are searched.
+    pub criterion: Criterion,
+    /// Magnitude of e or u beyond which a sample is a fault.
+    pub largest: f64,
+    /// Frequencies at which the response is told, rad/s.
+    pub at_rad_s: Vec<f64>,
+    /// What the person controls.
+    pub controlled_element: Option<ContinuousTransferFunction>,
+}
+
+impl Default for TrackRequest {
+    fn default() -> Self {
+        Self::of(Method::default())
+    }
+}
+
+impl TrackRequest {
+    /// A method, and all else by default.
+    pub fn of(method: Method) -> Self {
+        Self {
+            method,
+            structure: None,
+            orders: NamedOrders::new(),
+            delay: None,
+            start: RequestedStart::Usual,
+            criterion: Criterion::Bic,
+            largest: TrackOptions::LARGEST,
+            at_rad_s: Vec::new(),
+            controlled_element: None,
+        }
+    }
+
+    /// The structure that was asked for, else that of the method.
+    pub fn structure(&self) -> Structure {
+        self.structure.unwrap_or_else(|| self.method.usual_structure())
+    }
+
+    /// Whether the recursion is of polynomials, or its delay is given in samples: such takes the samples as they are.
+    pub fn counts_samples(&self) -> bool {
+        let in_samples = matches!(self.delay, Some(DelayRange::Samples(_))) || self.orders.contains_key("nk");
+        in_samples || self.method.counts_samples()
+    }
+
+    /// The plan for a time between samples; everything is checked that can be before there are data.
+    ///
+    /// # Errors
+    /// [`IdentError`] for options that contradict each other, or name what is not there.
+    pub fn plan(&self, sample_time: SampleTime) -> Result<TrackPlan, IdentError> {
+        let mut orders = self.orders.clone();
+        if let Some(delay) = &self.delay {
+            if orders.contains_key("nk") {
+                return Err(IdentError::BadOption {
+                    option: "nk".to_owned(),
+                    found: "it and the delay in s".to_owned(),
+                    expected: "one of them: they are one thing in samples and in s".to_owned(),
+                });
+            }
+            if let DelayRange::Seconds(low, _) = delay
+                && *low < 0.0
+            {
+                return Err(IdentError::BadOption {
+                    option: "delay".to_owned(),
+                    found: delay.to_string(),
+                    expected: "0 s or more".to_owned(),
+                });
+            }
+            orders.insert("nk".to_owned(), delay.samples(sample_time));
+        }
+        let names: Vec<String> = match &self.start {
+            RequestedStart::Coefficients(named) => named.keys().cloned().collect(),
+            _ => Vec::new(),
+        };
+        let structure = self.structure();
+        let ranges = ranges_of(&self.method, structure, &orders, &names, sample_time)?;
+        let combinations = ranges.combinations()?;
+        // The largest of each order: what is not known there is not known at all.
+        let largest = combinations[combinations.len() - 1];
+        let start = match &self.start {
+            RequestedStart::Usual => StartAt::Span(None),
+            RequestedStart::Nothing => StartAt::Nothing,
+            RequestedStart::Coefficients(_) if combinations.len() > 1 => return Err(of_one_model()),
+            RequestedStart::Coefficients(named) => StartAt::Theta(
+                theta_of(&largest.parameter_names(), named).map_err(|reason| IdentError::BadStart {
+                    reason: format!("it {reason}"),
+                })?,
+            ),
+        };
+        let options = TrackOptions {
+            start,
+            largest: self.largest,
+            at_rad_s: self.at_rad_s.clone(),
+            controlled_element: self.controlled_element.clone(),
+            ..TrackOptions::new(self.method.clone(), structure, largest)
+        };
+        TrackPlan::new(options, ranges, self.criterion, sample_time)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    #[test]
+    fn a_delay_in_seconds_becomes_samples_at_the_rate() {
+        let asked = TrackRequest {
+            delay: Some(DelayRange::Seconds(0.28, 0.28)),
+            ..TrackRequest::of(Method::rpem())
+        };
+        assert!(!asked.clone().counts_samples() || Method::rpem().counts_samples());
+        for (hz, nk) in [(100.0, 29), (50.0, 15)] {
+            let plan = asked.plan(SampleTime::new(1.0 / hz).unwrap()).unwrap();
+            assert_eq!(plan.options().orders.nk, nk);
+        }
+        let twice = TrackRequest {
+            orders: [("nk".to_owned(), 29..=29)].into(),
+            ..asked
+        };
+        let refused = twice.plan(SampleTime::HUNDREDTH).unwrap_err().to_string();
+        assert!(refused.contains("one of them"), "{refused}");
+    }
+
+    #[test]
+    fn a_start_of_names_is_a_start_of_numbers() {
+        let orders: NamedOrders = [("nk", 29), ("nd", 1)].map(|(name, n)| (name.to_owned(), n..=n)).into();
+        let named: BTreeMap<String, f64> = [("b0", 0.1), ("b1", 0.0), ("d1", -0.5), ("f1", -1.5), ("f2", 0.6)]
+            .map(|(name, value)| (name.to_owned(), value))
+            .into();
+        let of = |named: BTreeMap<String, f64>| TrackRequest {
+            orders: orders.clone(),
+            start: RequestedStart::Coefficients(named),
+            ..TrackRequest::of(Method::rpem())
+        };
+        let plan = of(named.clone()).plan(SampleTime::HUNDREDTH).unwrap();
+        let names = plan.options().parameter_names();
+        let StartAt::Theta(theta) = &plan.options().start else {
+            panic!("{:?}", plan.options().start)
+        };
+        assert!(names.iter().zip(theta).all(|(name, value)| named[name] == *value));
+        let lacking: BTreeMap<String, f64> = named.into_iter().filter(|(name, _)| name != "f2").collect();
+        let refused = of(lacking).plan(SampleTime::HUNDREDTH).unwrap_err().to_string();
+        assert!(refused.contains("lacks f2"), "{refused}");
+    }
+}
