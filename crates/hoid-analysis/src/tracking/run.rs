@@ -71,13 +71,7 @@ impl Tracking {
             true => self.rate.when_named(),
             false => self.rate,
         };
-        self.plan_at(SampleTime::new(rate.factor(read) as f64 * read.s())?)
-    }
-
-    fn plan_at(&self, sample_time: SampleTime) -> Result<TrackPlan, AnalysisError> {
-        self.recursion
-            .plan(sample_time)
-            .map_err(|error| options(error.to_string()))
+        plan_of(&self.recursion, SampleTime::new(rate.factor(read) as f64 * read.s())?)
     }
 
     /// Tracks the one recording; `validation` is a second run of the same person, `each` is called after every
@@ -106,7 +100,7 @@ impl Tracking {
             false => (self.every as f64 * read_ts.s() / record.sample_time().s()).round() as usize,
         }
         .max(1);
-        let plan = self.plan_at(record.sample_time())?;
+        let plan = plan_of(&self.recursion, record.sample_time())?;
         self.check(&plan, record)?;
         let span_s = self.start_span_s.unwrap_or_else(|| usual_start_span(record));
         let span = record.span(span_s.0, span_s.1);
