@@ -217,3 +217,17 @@ def test_a_simulation_without_noise_gives_its_operator_back() -> None:
     for name, value in truth.items():
         assert found.parameters[name].value == pytest.approx(value, rel=1e-9)
     assert [row["weight"] for row in found.forms if row["weight"] > 0] == [1.0]
+
+
+def test_the_delay_depends_on_what_the_error_does_between_its_samples(c1: pyhoid.Record) -> None:
+    found = pyhoid.identify(c1, form="lead", nd=1, excitation="none")
+    straight = pyhoid.identify(c1, form="lead", nd=1, excitation="none", intersample="foh")
+    tau = found.parameters["tau_e"].value
+    half = 0.5 * c1.sample_time
+    assert found.intersample["used"] == "auto"
+    assert found.intersample["tau_e_if_straight"] == pytest.approx(tau + half, rel=1e-9)
+    assert straight.intersample == {"used": "foh", "tau_e_if_straight": None}
+    # One model: what is left is the prior's centre.
+    assert straight.parameters["tau_e"].value == pytest.approx(tau + half, abs=1e-4)
+    with pytest.raises(pyhoid.OptionError):
+        pyhoid.identify(c1, intersample="cubic")

@@ -130,7 +130,7 @@ const fn slow_of(name: &'static str, package: &'static str, example: &'static st
     }
 }
 
-const SLOW: [Slow; 11] = [
+const SLOW: [Slow; 12] = [
     slow_of("people-coverage", "hoid", "people_coverage"),
     Slow {
         program: Some("hoid-cli"),
@@ -138,6 +138,7 @@ const SLOW: [Slow; 11] = [
     },
     slow_of("faults-clean", "hoid-ident", "faults_clean"),
     slow_of("little-noise", "hoid-ident", "little_noise"),
+    slow_of("intersample-coverage", "hoid-ident", "intersample_coverage"),
     slow_of("tracker-faults", "hoid", "tracker_faults"),
     Slow {
         profile: "dev",

@@ -9,7 +9,7 @@
 use std::collections::BTreeMap;
 
 use hoid_ident::frequency::{Description, DescriptionOptions, describe_runs};
-use hoid_io::{Offset, Step};
+use hoid_io::Offset;
 use hoid_model::{Decimation, FaultHandling};
 
 use crate::{
@@ -51,13 +51,8 @@ impl Describing {
         let late = self.options.offset_samples + late_samples(first, &self.offsets)?;
         let late_s = late * first.sample_time().s();
         let data = read.at_rate(self.rate, false)?;
-        let steps = data.accounts.iter().flat_map(|account| &account.steps);
-        let moved_s = steps.into_iter().find_map(|step| match step {
-            Step::Rate { input_lead_s, .. } => Some(*input_lead_s),
-            _ => None,
-        });
         let options = DescriptionOptions {
-            offset_samples: (late_s + moved_s.unwrap_or(0.0)) / data.records[0].sample_time().s(),
+            offset_samples: (late_s + data.input_lead_s()) / data.records[0].sample_time().s(),
             ..self.options.clone()
         };
         let mut found = describe_runs(&data.records, &options)?;

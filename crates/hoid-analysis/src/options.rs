@@ -52,6 +52,7 @@ impl Options for Identification<FamilyEstimator> {
             "neuromuscular" => how.neuromuscular = yes(option, text)?,
             "prior" => how.prior = prior_of_text(text)?,
             "delay" => how.delay_range_s = span(option, text)?,
+            "intersample" => how.intersample = word(option, text)?,
             "individual" => {
                 let coordinate = |name: &String| {
                     Coordinate::of_parameter(name)

@@ -35,6 +35,16 @@ impl Recordings {
         source.is_some_and(|source| source.reading.settles_the_rate())
     }
 
+    /// By how much e was moved with its rate, for a hold that is longer than the one it was recorded behind, s.
+    pub(crate) fn input_lead_s(&self) -> f64 {
+        let mut steps = self.accounts.iter().flat_map(|account| &account.steps);
+        let lead = steps.find_map(|step| match step {
+            Step::Rate { input_lead_s, .. } => Some(*input_lead_s),
+            _ => None,
+        });
+        lead.unwrap_or(0.0)
+    }
+
     /// What to say where a high rate was kept because samples are counted.
     pub fn kept_rate(&self, decimation: Decimation, counts_samples: bool) -> Option<String> {
         let settled = self.settles_the_rate();

@@ -526,3 +526,42 @@ fn a_simulation_with_little_noise_is_identified() {
         }
     }
 }
+
+/// The delay of a person whose error was logged at a tenth of its rate is right by one of the two values, and by the course
+/// that is asked for.
+#[test]
+fn the_course_between_samples_moves_the_delay_by_half_a_sample() {
+    let directory = simulated();
+    let d = directory.path();
+    let arguments = ["identify", "c1.csv", "--form", "lead", "--orders", "nd=1", "--json"];
+    let of = |course: &str| json(d, &[&arguments[..], &["--intersample", course]].concat());
+    let (auto, held, straight) = (of("auto"), of("zoh"), of("foh"));
+    let tau = |found: &Value| found["operator"]["tau_e"]["value"].as_f64().unwrap();
+    assert_eq!(auto["intersample"]["used"], "auto");
+    assert_eq!(
+        auto["intersample"]["tau_e_if_straight"].as_f64().unwrap(),
+        tau(&auto) + 0.005
+    );
+    assert_eq!(straight["intersample"]["tau_e_if_straight"], Value::Null);
+    // One model: what is left is the centre of the prior.
+    assert!((tau(&straight) - tau(&auto) - 0.005).abs() < 1e-4 && (tau(&held) - tau(&auto)).abs() < 1e-3);
+    let text = good(
+        d,
+        &[
+            "identify",
+            "c1.csv",
+            "--form",
+            "lead",
+            "--orders",
+            "nd=1",
+            "--intersample",
+            "foh",
+        ],
+    );
+    assert!(
+        text.contains("an error that runs straight between its samples"),
+        "{text}"
+    );
+    let (code, words) = bad(d, &[&arguments[..], &["--intersample", "cubic"]].concat());
+    assert!(code == 2 && words.contains("zoh"), "{words}");
+}

@@ -9,7 +9,7 @@ use hoid_model::{Form, Structure};
 use crate::{
     criterion::InitialState,
     estimator::Focus,
-    family::FamilyEstimator,
+    family::{FamilyEstimator, Intersample},
     grey_box::GreyBox,
     iv::IvMethod,
     optimize::{SearchMethod, SearchOptions},
@@ -61,6 +61,7 @@ pub fn estimators() -> Vec<MethodSpec> {
                 controlled_element(),
                 orders("nc=0,nd=0..24 of its noise"),
                 delay(FamilyEstimator::default().delay_range_s),
+                intersample(),
                 individual(),
                 run_to_run(),
                 answers(),
@@ -305,6 +306,12 @@ fn run_to_run() -> Setting {
 
 fn delay((low, high): (f64, f64)) -> Setting {
     delay_of(&format!("{low}..{high}"))
+}
+
+fn intersample() -> Setting {
+    let help = "What e does between its samples: zoh is held, foh runs straight (logged from what is faster or continuous; tau_e is \
+                half a sample longer); auto: smooth, with the delay of a held one, and what data without noise show";
+    setting("intersample", Kind::Choice(&Intersample::NAMES), "auto", help)
 }
 
 fn polynomial_delay() -> Setting {

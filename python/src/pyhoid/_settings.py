@@ -200,6 +200,11 @@ class BatchSettings(TypedDict, total=False):
     # 1.
     delay: float | tuple[float, float] | None
 
+    # What e does between its samples: zoh is held, foh runs straight (logged from what is
+    # faster or continuous; tau_e is half a sample longer); auto: smooth, with the delay of a
+    # held one, and what data without noise show. For operator.
+    intersample: Literal["auto", "zoh", "foh"] | None
+
     # Parameters that each record has for itself, as K,T_L. For operator, noise="remnant".
     individual: Sequence[str] | None
 
@@ -374,6 +379,10 @@ BATCH_SETTINGS = """noise : Literal['ar', 'arma', 'remnant']
         delay : float | tuple[float, float]
             Delay tau_e, or the shortest and the longest; of polynomials in place of nk =
             tau_e/Ts + 1.
+        intersample : Literal['auto', 'zoh', 'foh']
+            What e does between its samples: zoh is held, foh runs straight (logged from what is
+            faster or continuous; tau_e is half a sample longer); auto: smooth, with the delay
+            of a held one, and what data without noise show. For operator.
         individual : Sequence[str]
             Parameters that each record has for itself, as K,T_L. For operator, noise="remnant".
         run_to_run : float

@@ -88,6 +88,10 @@ class OperatorFit(Model, Result):
     errors : dict
         What the errors are made from: clusters, kind ("runs" or "blocks"), inflation (clustered
         over model-based variances), largest_ratio_to_model_based.
+    intersample : dict
+        What e does between its samples: ``used`` (``"auto"``, ``"zoh"`` or ``"foh"``), and
+        ``tau_e_if_straight``, the delay in s if e was logged from what is faster or continuous; None
+        where the data show or `intersample` says what e does.
     prior : dict of str to (float, float)
         Centre, and standard deviation of the logarithm.
     loss, innovation_variance : float
@@ -200,6 +204,10 @@ class OperatorFit(Model, Result):
         self.innovation_variance: float = figures["innovation_variance"]
         self.coherent_share: float | None = figures["coherent_share"]
         self.sample_time: float = figures["sample_time"]
+        self.intersample: dict[str, Any] = {
+            "used": figures["intersample"],
+            "tau_e_if_straight": figures["tau_e_if_straight"],
+        }
         self.errors: dict[str, Any] = {
             name: figures[name]
             for name in ("clusters", "kind", "inflation", "largest_ratio_to_model_based")

@@ -3,7 +3,7 @@
 
 use hoid_ident::{
     SearchOptions,
-    family::{FamilyEstimator, FamilyFit},
+    family::{FamilyEstimator, FamilyFit, Intersample},
     judgement::second_opinion,
 };
 use hoid_model::{Detrend, FaultHandling, Form, SampleTime, Verdict};
@@ -16,6 +16,11 @@ use crate::{
 
 impl BatchEstimator for FamilyEstimator {
     type Fit = FamilyFit;
+
+    /// Straight lines are those between the samples as they were recorded.
+    fn counts_samples(&self) -> bool {
+        self.intersample == Intersample::Foh
+    }
 
     fn search(&self) -> &SearchOptions {
         &self.search
@@ -45,6 +50,7 @@ impl BatchEstimator for FamilyEstimator {
                 format!("nc={}, nd={}, by AIC", range(&self.nc), range(&self.nd)),
             ),
             delay(self.delay_range_s),
+            Setting::new("e between samples", self.intersample.name()),
             Setting::new("taken out of e and u", self.detrend.to_string()),
             Setting::new("variation from run to run", self.run_to_run.to_string()),
         ];
@@ -73,7 +79,8 @@ impl BatchEstimator for FamilyEstimator {
             },
             ..with.estimator.clone()
         };
-        let fit = estimator.fit_beside(&data.records, of_lines(&described, &with.excitation))?;
+        let mut fit = estimator.fit_beside(&data.records, of_lines(&described, &with.excitation))?;
+        fit.lead_s = data.input_lead_s();
         let element = with.controlled_element.as_ref();
         let mut verdict = fit.verdict.clone();
         if with.faults != FaultHandling::Keep {

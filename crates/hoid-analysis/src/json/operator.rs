@@ -48,6 +48,10 @@ impl BatchAnswer for FamilyFit {
         set("innovation_variance", number(fit.innovation_variance));
         set("residuals", json!(fit.residuals));
         set("termination", termination(&fit.termination));
+        set(
+            "intersample",
+            json!({"used": fit.intersample.name(), "tau_e_if_straight": optional(fit.delay_if_straight_s(0))}),
+        );
         let mut quality = goodness(&found.quality()?);
         quality.insert("coherent_share".to_owned(), optional(fit.coherent_share));
         set("fit", Value::Object(quality));

@@ -171,6 +171,7 @@ impl Chosen<'_, '_> {
             termination: fit.minimum.termination,
             intersample: layout.intersample,
             course_is_known: self.prediction.course_is_known,
+            lead_s: 0.0,
             noise_free,
             sample_time: layout.sample_time,
             verdict,

@@ -133,6 +133,9 @@ pub struct FamilyFit {
     /// ([`FamilyFit::delay_if_straight_s`]).
     #[serde(default)]
     pub course_is_known: bool,
+    /// By how much e was moved when its rate was lowered, for a hold that is longer than the recorded one, s.
+    #[serde(default)]
+    pub lead_s: f64,
     /// Share of the power of u that the operator leaves, where that is no noise.
     #[serde(default)]
     pub noise_free: Option<f64>,
@@ -183,10 +186,10 @@ impl FamilyFit {
     }
 
     /// Delay tau_e in s of a record if its error runs straight from sample to sample, logged from what is faster or
-    /// continuous: half a sample longer, where nothing shows or says what it does.
+    /// continuous: half a sample longer, as it was recorded, where nothing shows or says what it does.
     pub fn delay_if_straight_s(&self, record: usize) -> Option<f64> {
         let tau = self.operator(record).operator.tau_e_s();
-        (!self.course_is_known).then(|| tau + 0.5 * self.sample_time.s())
+        (!self.course_is_known).then(|| tau + 0.5 * self.sample_time.s() - self.lead_s)
     }
 
     /// Gain and phase of the operator of a record from e to u at frequencies in rad/s, held over a sample,

@@ -2,13 +2,17 @@
 
 use hoid::analysis::{Account, Identified, Setting};
 use hoid::ident::{
-    family::{ClusterKind, FamilyFit, FormFigures, LoopMeasures, OperatorOfRecord, Parameter},
+    family::{ClusterKind, FamilyFit, FormFigures, Intersample, LoopMeasures, OperatorOfRecord, Parameter},
     validation::GoodnessOfFit,
 };
 use hoid::model::{ContinuousTransferFunction, GainUnit, Record, uncertainty::Estimate};
 use hoid::report::{numbers, sentence_of_operator, undetermined};
 
 use crate::{error::CliError, text};
+
+/// Standard errors of tau_e, and a time in s, that half a sample is more than where both delays are printed.
+const STRAIGHT_ERRORS: f64 = 2.0;
+const LEAST_HALF_S: f64 = 0.007;
 
 /// Everything that was found.
 pub struct Found<'a> {
@@ -58,6 +62,7 @@ impl Found<'_> {
             page.push_str(&parameters(of, &gain));
             page.push('\n');
         }
+        page.push_str(&self.between_samples());
         if let Some(element) = self.element {
             let here = fit.loop_measures(0, element);
             page.push_str(&format!("Open loop with {element}: {}\n", measures(here.as_ref())));
@@ -84,6 +89,28 @@ impl Found<'_> {
         }
         page.push_str(&text::records(self.files, self.records, self.accounts, false));
         Ok(page)
+    }
+
+    /// What tau_e owes to the course of the error between its samples: the other delay that the data may mean, where half
+    /// a sample is more than the error bar says.
+    fn between_samples(&self) -> String {
+        let fit = self.fit;
+        let named = fit.operator(0).parameters.iter().find(|p| p.name == "tau_e");
+        let Some((tau, straight)) = named.zip(fit.delay_if_straight_s(0)) else {
+            return match fit.intersample {
+                Intersample::Zoh => "tau_e is that of an error that is held between its samples.\n".to_owned(),
+                _ => "tau_e is that of an error that runs straight between its samples.\n".to_owned(),
+            };
+        };
+        let half = straight - fit.operator(0).operator.tau_e_s();
+        if half < LEAST_HALF_S || half < STRAIGHT_ERRORS * tau.standard_error.unwrap_or(f64::INFINITY) {
+            return String::new();
+        }
+        format!(
+            "tau_e is that of an error that is held for a sample; of one that was logged from what is faster or continuous it is {} s \
+             (--intersample foh).\n",
+            text::significant(straight)
+        )
     }
 
     /// The errors of the person, where they are larger than those of their runs.
