@@ -120,10 +120,8 @@ fn main() -> Result<(), Box<dyn Error>> {
                 let mut fit = estimator.fit(&[record])?;
                 fit.lead_s = lead_s;
                 let of = fit.operator(0);
-                let later = fit
-                    .delay_if_straight_s(0)
-                    .map_or(0.0, |straight| straight - of.operator.tau_e_s());
                 let tau = of.parameters.iter().find(|p| p.name == "tau_e").ok_or("no delay")?;
+                let later = fit.delay_if_straight_s(0).map_or(0.0, |straight| straight - tau.value);
                 let (low, high) = tau.interval.ok_or("no interval")?;
                 let held = |later: f64| u64::from((low + later..=high + later).contains(&x[4]));
                 let (mine, others) = if is_held { (0.0, later) } else { (later, 0.0) };

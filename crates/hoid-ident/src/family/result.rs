@@ -188,7 +188,9 @@ impl FamilyFit {
     /// Delay tau_e in s of a record if its error runs straight from sample to sample, logged from what is faster or
     /// continuous: half a sample longer, as it was recorded, where nothing shows or says what it does.
     pub fn delay_if_straight_s(&self, record: usize) -> Option<f64> {
-        let tau = self.operator(record).operator.tau_e_s();
+        let of = self.operator(record);
+        let averaged = of.parameters.iter().find(|p| p.name == Coordinate::Delay.parameter());
+        let tau = averaged.map_or_else(|| of.operator.tau_e_s(), |tau| tau.value);
         (!self.course_is_known).then(|| tau + 0.5 * self.sample_time.s() - self.lead_s)
     }
 

@@ -102,7 +102,7 @@ impl Found<'_> {
                 _ => "tau_e is that of an error that runs straight between its samples.\n".to_owned(),
             };
         };
-        let half = straight - fit.operator(0).operator.tau_e_s();
+        let half = straight - tau.value;
         if half < LEAST_HALF_S || half < STRAIGHT_ERRORS * tau.standard_error.unwrap_or(f64::INFINITY) {
             return String::new();
         }
