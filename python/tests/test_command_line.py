@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import json
 import math
 from pathlib import Path
 from typing import Any
@@ -165,6 +166,9 @@ def test_track(
     assert [change["t"] for change in trace.changes] == [
         change["t"] for change in found.get("changes", [])
     ]
+    own = json.loads(trace.to_json())
+    for key in ("kind", "verdict", "last", "updated_from", "rows", "faults", "rms_relative_error"):
+        assert own[key] == found[key], key
     # `adaptive` begins without a fit.
     started = None if trace.start is None else trace.start.orders
     assert (found["start"] and found["start"]["orders"]) == started

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import json
 import math
+import pickle
 from pathlib import Path
 from typing import Any
 
@@ -231,3 +232,12 @@ def test_the_delay_depends_on_what_the_error_does_between_its_samples(c1: pyhoid
     assert straight.parameters["tau_e"].value == pytest.approx(tau + half, abs=1e-4)
     with pytest.raises(pyhoid.OptionError):
         pyhoid.identify(c1, intersample="cubic")
+
+
+def test_the_page_of_a_person(found: pyhoid.OperatorFit, tmp_path: Path) -> None:
+    page = found.report(tmp_path / "page", title="One of three").read_text(encoding="utf-8")
+    assert "One of three" in page and "<svg" in page and found.verdict.level in page
+    again = pickle.loads(pickle.dumps(found))
+    assert "phase margin" in again.report(tmp_path / "again").read_text(encoding="utf-8")
+    with pytest.raises(pyhoid.DataError, match="no records"):
+        pyhoid.from_json(found.to_json()).report(tmp_path / "none")

@@ -14,7 +14,8 @@ __all__ = ["faults_of", "used"]
 
 
 def used(
-    native: _pyhoid.Fit | _pyhoid.OperatorFit | _pyhoid.TimeVaryingFit, given: Sequence[Record]
+    native: _pyhoid.Fit | _pyhoid.OperatorFit | _pyhoid.TimeVaryingFit | _pyhoid.Trace,
+    given: Sequence[Record],
 ) -> tuple[Record, ...]:
     """The records as they were fitted, from those that were given and what was done to them."""
     several = []
