@@ -125,6 +125,29 @@ def test_a_second_run_chooses_the_start_covariance(c4: pyhoid.Record) -> None:
     assert not np.array_equal(on["a1"], off["a1"])
 
 
+def test_the_error_is_a_difference_of_columns(c1: pyhoid.Record) -> None:
+    frame = c1.to_pandas().rename(columns={"e": "r"}).assign(y=0.25)
+    made = pyhoid.Record.from_pandas(frame, input="r-y")
+    np.testing.assert_array_equal(made.e, c1.e - 0.25)
+    np.testing.assert_array_equal(made["y"], 0.25)
+    turned = pyhoid.Record.from_pandas(frame, input="-r")
+    np.testing.assert_array_equal(turned.e, -c1.e)
+    with pytest.raises(pyhoid.Error, match="the table"):
+        pyhoid.Record.from_pandas(frame, input="r-q")
+
+
+def test_a_file_whose_time_has_another_name(c1: pyhoid.Record, tmp_path: Path) -> None:
+    frame = c1.to_pandas().reset_index().rename(columns={"t": "clock"})
+    frame["clock"] *= 1000
+    frame.to_csv(tmp_path / "run.csv", index=False)
+    assert pyhoid.info(tmp_path / "run.csv")["look"]["no_record"] is not None
+    look = pyhoid.info(tmp_path / "run.csv", time="clock:ms")["look"]
+    assert look["no_record"] is None
+    with pytest.warns(UserWarning, match="clock is taken as t"):
+        record = pyhoid.read(tmp_path / "run.csv", **look["read"])
+    assert abs(record.sample_time - 0.01) < 1e-9
+
+
 def test_tables_with_instants_and_durations(c1: pyhoid.Record, tmp_path: Path) -> None:
     pd = pytest.importorskip("pandas")
     pl = pytest.importorskip("polars")

@@ -66,6 +66,18 @@ impl ColumnExpression {
         self.resolve(names, "").is_ok()
     }
 
+    /// The columns that it is made of, each with its sign and its place among `names`.
+    ///
+    /// # Errors
+    /// [`IoError`] where it has no meaning among them; `file` is what they are of.
+    pub fn signed_columns(&self, names: &[&str], file: &str) -> Result<Vec<(f64, usize)>, IoError> {
+        Ok(match self.resolve(names, file)? {
+            Signal::Column(one) => vec![(1.0, one)],
+            Signal::Negative(one) => vec![(-1.0, one)],
+            Signal::Difference(one, other) => vec![(1.0, one), (-1.0, other)],
+        })
+    }
+
     /// The columns that are meant, among `names`.
     pub(crate) fn resolve(&self, names: &[&str], file: &str) -> Result<Signal, IoError> {
         let find = |name: &str| {
@@ -156,6 +168,14 @@ mod tests {
 
     #[test]
     fn name_negative_and_difference() {
+        let signed = |text: &str| {
+            text.parse::<ColumnExpression>()
+                .unwrap()
+                .signed_columns(&NAMES, "run.csv")
+        };
+        assert_eq!(signed("r-y").unwrap(), vec![(1.0, 1), (-1.0, 2)]);
+        assert_eq!(signed("-y").unwrap(), vec![(-1.0, 2)]);
+        assert!(signed("q-y").is_err());
         assert_eq!(resolve("y").unwrap(), Signal::Column(2));
         assert_eq!(resolve(" -y ").unwrap(), Signal::Negative(2));
         assert_eq!(resolve("- y").unwrap(), Signal::Negative(2));

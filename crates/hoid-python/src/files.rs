@@ -3,7 +3,7 @@
 use std::{collections::BTreeMap, path::PathBuf, str::FromStr};
 
 use hoid_analysis::Reading;
-use hoid_io::{ColumnValues, IoError, NewRate, Preparation, ReadOptions, Repair, Step, write_record};
+use hoid_io::{ColumnExpression, ColumnValues, IoError, NewRate, Preparation, ReadOptions, Repair, Step, write_record};
 use hoid_model::{Decimation, SampleTime};
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::{prelude::*, types::PyDict};
@@ -136,6 +136,14 @@ pub fn even_times(times: PyReadonlyArray1<'_, f64>) -> (Option<f64>, usize) {
         Ok(sample_time_s) => (Some(sample_time_s), 0),
         Err(row) => (None, row),
     }
+}
+
+/// The columns of a table that a signal is made of, each with its sign: `r-y`, `-e`.
+#[pyfunction]
+#[pyo3(signature = (text, names))]
+pub fn signal_of(text: &str, names: Vec<String>) -> Outcome<Vec<(f64, usize)>> {
+    let names: Vec<&str> = names.iter().map(String::as_str).collect();
+    Ok(text.parse::<ColumnExpression>()?.signed_columns(&names, "the table")?)
 }
 
 /// The record without the mean or the linear trend of input and output.

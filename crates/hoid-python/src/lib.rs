@@ -62,6 +62,7 @@ fn _pyhoid(module: &Bound<'_, PyModule>) -> PyResult<()> {
         wrap_pyfunction!(describing::describing_function, module)?,
         wrap_pyfunction!(files::check_record, module)?,
         wrap_pyfunction!(files::decimated, module)?,
+        wrap_pyfunction!(files::signal_of, module)?,
         wrap_pyfunction!(files::detrended, module)?,
         wrap_pyfunction!(files::even_times, module)?,
         wrap_pyfunction!(files::read, module)?,

@@ -9,7 +9,8 @@ use pyo3::{prelude::*, types::PyDict};
 use crate::errors::Outcome;
 
 #[pyfunction]
-#[pyo3(signature = (path, *, input, output, excitation, controlled_element, sampling_frequency))]
+#[pyo3(signature = (path, *, input, output, excitation, controlled_element, time, trial, sampling_frequency))]
+#[allow(clippy::too_many_arguments)]
 pub fn info<'py>(
     py: Python<'py>,
     path: PathBuf,
@@ -17,6 +18,8 @@ pub fn info<'py>(
     output: Option<String>,
     excitation: Option<String>,
     controlled_element: Option<String>,
+    time: Option<&str>,
+    trial: Option<&str>,
     sampling_frequency: Option<f64>,
 ) -> Outcome<Bound<'py, PyDict>> {
     let controlled_element = match controlled_element {
@@ -31,6 +34,8 @@ pub fn info<'py>(
         output,
         excitation,
         controlled_element,
+        time: time.map(str::parse).transpose()?,
+        trial: trial.map(str::parse).transpose()?,
         sampling_hz: sampling_frequency,
         ..Known::default()
     };
@@ -107,6 +112,15 @@ fn keywords<'py>(py: Python<'py>, advice: &Advice) -> PyResult<Bound<'py, PyDict
     for (name, column) in [("input", &advice.input), ("output", &advice.output)] {
         if let Some(column) = column {
             all.set_item(name, column)?;
+        }
+    }
+    let texts = [
+        ("time", advice.time.as_ref().map(ToString::to_string)),
+        ("trial", advice.trial.as_ref().map(ToString::to_string)),
+    ];
+    for (name, text) in texts {
+        if let Some(text) = text {
+            all.set_item(name, text)?;
         }
     }
     let numbers = [

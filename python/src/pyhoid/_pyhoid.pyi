@@ -65,6 +65,7 @@ __all__ = [
     "recursive_methods",
     "renamed_method",
     "reproduce",
+    "signal_of",
     "simulate",
     "simulate_group",
     "simulate_people",
@@ -456,6 +457,7 @@ def describing_function(
     detrend: str,
     smoothing_bins: int,
 ) -> DescribingFunction: ...
+def signal_of(text: str, names: list[str]) -> list[tuple[float, int]]: ...
 def decimated(record: Record, decimate: str) -> tuple[dict[str, Any], str] | None: ...
 def detrended(record: Record, how: str) -> dict[str, Any]: ...
 def discretise_transfer_function(
@@ -491,6 +493,8 @@ def info(
     output: str | None,
     excitation: str | None,
     controlled_element: str | None,
+    time: str | None,
+    trial: str | None,
     sampling_frequency: float | None,
 ) -> dict[str, Any]: ...
 def margins(

@@ -293,6 +293,8 @@ def info(
     output: str | None = None,
     excitation: str | None = None,
     controlled_element: str | None = None,
+    time: str | None = None,
+    trial: str | None = None,
     sampling_frequency: float | None = None,
 ) -> dict[str, Any]:
     """Describe a file and what it looks like, as ``hoid info --json`` does.
@@ -305,6 +307,8 @@ def info(
     controlled_element : str, optional
         As ``"90/(s(s+6))"``: with it and a column y it is found by how many samples the control was
         recorded late.
+    time, trial : str, optional
+        As in `read`: the column of the time with its unit, and what makes the trials of the file.
     sampling_frequency : float, optional
         Hz; without it the column ``t`` (s) gives the sampling.
 
@@ -333,6 +337,8 @@ def info(
             output=output,
             excitation=excitation,
             controlled_element=controlled_element,
+            time=time,
+            trial=trial,
             sampling_frequency=sampling_frequency,
         )
     return found

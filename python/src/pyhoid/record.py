@@ -181,6 +181,8 @@ class Record:
     ) -> Record:
         """Make a record from a table; other columns with numbers become channels.
 
+        `input` and `output` are columns, a difference of two (``"r-y"``) or one with its sign (``"-e"``).
+
         The sample time is `sample_time`, or that of a column ``t`` or an index: times in s, a
         DatetimeIndex (whose first time becomes 0) or a TimedeltaIndex. They must be even.
 
@@ -232,6 +234,14 @@ class Record:
         """A record from columns by name, and from the times beside them where there is no column t."""
         for name in (input, output):
             if name is not None and name not in columns:
+                if "-" in name:
+                    # A difference of columns, or one with its sign, as in files.
+                    names = list(columns)
+                    terms = _pyhoid.signal_of(name, names)
+                    columns[name] = np.sum(
+                        [sign * signal(columns[names[k]], names[k]) for sign, k in terms], axis=0
+                    )
+                    continue
                 near = get_close_matches(name, columns, 1, 0.6)
                 meant = f"; did you mean {near[0]}?" if near else ""
                 raise DataError(

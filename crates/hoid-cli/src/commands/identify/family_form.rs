@@ -77,9 +77,11 @@ impl Found<'_> {
             coherence.map_or_else(String::new, |share| format!(
                 "; coherence of u with the excitation {share:.2}"
             )),
-            fit.agreement
-                .as_ref()
-                .map_or_else(String::new, |a| format!("; methods agree with p = {:.2}", a.p_value)),
+            // Where they do not, a finding says so.
+            match fit.agreement.is_some() && fit.verdict.findings().iter().all(|found| found.kind != "agreement") {
+                true => "; the methods agree",
+                false => "",
+            },
         ));
         if let Some((file, q)) = &self.validation {
             page.push_str(&format!(

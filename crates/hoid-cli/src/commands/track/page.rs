@@ -193,8 +193,8 @@ fn changes(tracked: &Tracked) -> String {
     for (t, c) in trace.changes() {
         let changed = c.changed();
         lines.push_str(&format!(
-            "Change declared at {t:.2} s, of {:.2} s before: {}; log odds {:.1}.\n",
-            c.seconds_ago,
+            "Change at {:.2} s, declared at {t:.2} s: {}; log odds {:.1}.\n",
+            t - c.seconds_ago,
             if changed.is_empty() {
                 "no single quantity by two standard errors".to_owned()
             } else {
