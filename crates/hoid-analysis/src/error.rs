@@ -70,13 +70,22 @@ pub enum AnalysisError {
     NoRecordings,
     /// An estimator refuses.
     #[error(transparent)]
-    Ident(#[from] IdentError),
+    Ident(IdentError),
     /// A file cannot be read.
     #[error(transparent)]
     Io(#[from] IoError),
     /// A record cannot be made.
     #[error(transparent)]
     Model(#[from] ModelError),
+}
+
+impl From<IdentError> for AnalysisError {
+    fn from(error: IdentError) -> Self {
+        match error {
+            IdentError::Option { name, reason } => Self::Option { name, reason },
+            other => Self::Ident(other),
+        }
+    }
 }
 
 impl AnalysisError {

@@ -88,7 +88,7 @@ impl<E: BatchEstimator> Identification<E> {
         let reading = data.source.as_ref().map(|source| &source.reading);
         let by_default = Identification::of(self.estimator.by_default());
         let usual_reading = reading.map(|_| Reading::default());
-        let mut usual = by_default.estimator.settings(data.records[0].sample_time());
+        let mut usual = by_default.settings(data.records[0].sample_time());
         usual.extend(shared_settings(&by_default, usual_reading.as_ref()));
         let mut settings = Setting::against(used, &usual);
         settings.extend(found);

@@ -24,7 +24,7 @@
 //! | a recursion over a recording, from it to the verdict | `tracking` |
 //! | the level of u, the settings that all share | `level`, `settings` |
 //!
-//! Options come as fields, or by their names from texts: `options`.
+//! Options come as fields, or by their names from texts: `options`. What there is stands in [`registry`].
 //!
 //! ```
 //! use hoid_analysis::{Identification, Recordings};
@@ -58,6 +58,7 @@ mod quality;
 mod rate;
 mod reading;
 mod recordings;
+pub mod registry;
 mod repair;
 mod request;
 mod settings;
@@ -72,7 +73,6 @@ pub use identification::Identification;
 pub use identified::{Identified, Validated, identify};
 pub use look::{Advice, Known, Lag, Look, OtherColumns, Periods, Role, Roles, Seen, typed};
 pub use offset::{late_samples, without_offsets};
-pub use options::Options;
 pub use prior::prior_of_text;
 pub use quality::Of;
 pub use rate::kept_rate;

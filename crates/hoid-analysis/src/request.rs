@@ -9,19 +9,14 @@
 
 use std::collections::BTreeMap;
 
-use hoid_ident::{
-    GreyBox, IvMethod, SigmoidChange, estimators,
-    family::FamilyEstimator,
-    registry::{CHANGE, OPERATOR, PEM, REMNANT},
-    settings::{MethodSpec, Setting},
-};
+use hoid_ident::{GreyBox, IvMethod, SigmoidChange, family::FamilyEstimator, settings::MethodSpec};
 use hoid_model::{Decimation, FaultHandling, Structure};
 
 use crate::{
     AnalysisError,
-    estimators::{BatchEstimator, Polynomials, REMNANT_ORDERS},
+    estimators::{BatchEstimator, Polynomials},
     identification::Identification,
-    options::Options,
+    registry::{CHANGE, OPERATOR, PEM, REMNANT, estimators},
 };
 
 /// What is to be identified, by names and texts.
@@ -75,7 +70,7 @@ impl Asked {
         };
         Some(match name {
             OPERATOR => Self::Operator(Identification::of(FamilyEstimator::default())),
-            REMNANT => Self::Remnant(Identification::of(GreyBox::new(REMNANT_ORDERS))),
+            REMNANT => Self::Remnant(Identification::of(GreyBox::default())),
             CHANGE => Self::Change(Identification::of(SigmoidChange::default())),
             PEM => polynomials(structure, None),
             name => {
@@ -117,8 +112,8 @@ impl Asked {
     ///
     /// # Errors
     /// [`AnalysisError`] for a text that is no value of it.
-    pub fn set(&mut self, option: &Setting, text: &str) -> Result<bool, AnalysisError> {
-        each!(self, how => how.set(option, text))
+    pub fn set(&mut self, name: &str, text: &str) -> Result<bool, AnalysisError> {
+        each!(self, how => how.set(name, text))
     }
 }
 
@@ -141,7 +136,7 @@ impl Request {
         // In the order of the registry: what an option makes of others comes before them.
         for setting in own {
             if let Some(text) = self.options.get(setting.name) {
-                asked.set(setting, text)?;
+                asked.set(setting.name, text)?;
             }
         }
         if !asked.has_input()

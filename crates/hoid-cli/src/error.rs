@@ -1,7 +1,7 @@
 //! What ends a command early, and with which exit code.
 
-use hoid::analysis::AnalysisError;
-use hoid::ident::{IdentError, estimator_setting};
+use hoid::analysis::{AnalysisError, registry::estimator_setting};
+use hoid::ident::IdentError;
 use hoid::io::{IoError, ScenarioFileError};
 use hoid::model::{ModelError, Verdict, VerdictLevel};
 use hoid::report::ReportError;

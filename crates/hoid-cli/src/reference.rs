@@ -3,10 +3,8 @@
 //!
 //! `HOID_UPDATE_DOCS=1 cargo test -p hoid-cli` renews them.
 
-use hoid::ident::{
-    estimators,
-    settings::{Kind, MethodSpec, Setting},
-};
+use hoid::analysis::registry::estimators;
+use hoid::ident::settings::{Kind, MethodSpec, Setting};
 use hoid::track::Method;
 
 use crate::args::in_words;

@@ -131,6 +131,14 @@ pub enum IdentError {
         /// What would be right.
         expected: String,
     },
+    /// An option that contradicts another, or does not fit the estimator.
+    #[error("{name}: {reason}")]
+    Option {
+        /// Its name.
+        name: &'static str,
+        /// What was found, what was expected, what to do.
+        reason: String,
+    },
     /// Not one start led to a finite loss.
     #[error("no start of the search gave a finite loss; check the scale of the data and the orders")]
     NoFiniteLoss,

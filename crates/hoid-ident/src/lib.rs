@@ -102,9 +102,9 @@ mod optimize;
 pub mod order_selection;
 mod pem;
 pub mod progress;
-pub mod registry;
 mod searched_delay;
 pub mod settings;
+pub mod shared_options;
 mod sigmoid;
 mod summary;
 pub mod validation;
@@ -120,7 +120,6 @@ pub use iv::{InstrumentalVariable, Instruments, IvMethod};
 pub use optimize::{Reason, SearchMethod, SearchOptions, Termination};
 pub use order_selection::{Candidate, Choice, NamedOrders, OrderRanges, choose_orders, identify_box_jenkins};
 pub use pem::loss::Loss;
-pub use registry::{estimator_setting, estimators};
 pub use sigmoid::{
     ChangeParameter, ChangedOperator, Comparison, GainsAt, NamedEstimate, NoiseLevel, Remark, SIGMOID_NAMES,
     SigmoidChange, SigmoidFit,

@@ -2,11 +2,11 @@
 //!
 //! The messages are those of the libraries, with keywords in place of command-line options.
 
-use hoid_analysis::AnalysisError;
-use hoid_ident::{
-    IdentError,
+use hoid_analysis::{
+    AnalysisError,
     registry::{CHANGE, OPERATOR, REMNANT},
 };
+use hoid_ident::IdentError;
 use hoid_io::{IoError, ScenarioFileError};
 use hoid_model::{ModelError, NotConvertible, UnknownName};
 use hoid_report::ReportError;
@@ -108,6 +108,7 @@ impl From<IdentError> for Failure {
             IdentError::BadStart { .. }
             | IdentError::UnknownParameter { .. }
             | IdentError::BadOption { .. }
+            | IdentError::Option { .. }
             | IdentError::EmptyRange { .. } => OptionError::new_err(text),
             IdentError::SingularRegressors { .. }
             | IdentError::SingularInstruments { .. }

@@ -5,11 +5,9 @@ use std::{collections::BTreeMap, sync::Arc};
 use hoid_analysis::{
     AnalysisError, Asked, BatchEstimator, Identification, Identified, Recordings, Request,
     json::{Answer, state},
+    registry::estimators,
 };
-use hoid_ident::{
-    estimators,
-    settings::{Kind, MethodSpec, Setting},
-};
+use hoid_ident::settings::{Kind, MethodSpec, Setting};
 use hoid_model::{FaultHandling, Record};
 use pyo3::prelude::*;
 

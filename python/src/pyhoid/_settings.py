@@ -184,18 +184,6 @@ class BatchSettings(TypedDict, total=False):
     # omega_nm=10.5:0.3 (the spread is relative). For operator, change="sigmoid".
     prior: str | PathLike[str] | Mapping[str, tuple[float, float]] | OperatorFit | None
 
-    # Column of the recorded disturbance or target, for the fit at its lines; none for no such
-    # fit. For operator.
-    excitation: str | None
-
-    # Period of the excitation. For operator.
-    period: float | None
-
-    # Controlled element in s, as 90/(s(s+6)), or NUM/DEN by descending powers of s, as
-    # 90/1,6,0: adds crossover frequency and margins. For polynomials, operator,
-    # noise="remnant".
-    controlled_element: str | tuple[Sequence[float], Sequence[float]] | None
-
     # Delay tau_e, or the shortest and the longest; of polynomials in place of nk = tau_e/Ts +
     # 1.
     delay: float | tuple[float, float] | None
@@ -205,16 +193,12 @@ class BatchSettings(TypedDict, total=False):
     # held one, and what data without noise show. For operator.
     intersample: Literal["auto", "zoh", "foh"] | None
 
-    # Parameters that each record has for itself, as K,T_L. For operator, noise="remnant".
-    individual: Sequence[str] | None
-
     # What a person's gain varies by from run to run, as a part of it: in the error bars of
     # fewer than five records. For operator.
     run_to_run: float | None
 
-    # What the verdict is about: response, crossover, phase_margin, parameters by their names,
-    # as crossover,tau_e.
-    answers: Sequence[str] | None
+    # Parameters that each record has for itself, as K,T_L. For operator, noise="remnant".
+    individual: Sequence[str] | None
 
     # Initial states of each record; auto: estimate, and backcast for an output alone (ar, ma,
     # arma). For operators, pem.
@@ -229,6 +213,22 @@ class BatchSettings(TypedDict, total=False):
 
     # Relative decrease of the loss below which the search has converged.
     tolerance: float | None
+
+    # Column of the recorded disturbance or target, for the fit at its lines; none for no such
+    # fit. For operator.
+    excitation: str | None
+
+    # Period of the excitation. For operator.
+    period: float | None
+
+    # Controlled element in s, as 90/(s(s+6)), or NUM/DEN by descending powers of s, as
+    # 90/1,6,0: adds crossover frequency and margins. For polynomials, operator,
+    # noise="remnant".
+    controlled_element: str | tuple[Sequence[float], Sequence[float]] | None
+
+    # What the verdict is about: response, crossover, phase_margin, parameters by their names,
+    # as crossover,tau_e.
+    answers: Sequence[str] | None
 
     # Order m of the remnant, a number or a range to search. For noise="remnant".
     remnant_order: int | tuple[int, int] | range | None
@@ -248,6 +248,10 @@ class BatchSettings(TypedDict, total=False):
     # What decides between candidates when something is searched. For polynomials.
     criterion: Literal["loss", "aic", "aicc", "bic", "fpe", "mdl", "yic"] | None
 
+    # What the model is to be good at: one-step prediction, or simulation from the input alone.
+    # For pem.
+    focus: Literal["prediction", "simulation"] | None
+
     # Start of the search, all coefficients as f1=-1.9,f2=.92,b0=.04,.... For pem.
     start: Mapping[str, float] | None
 
@@ -258,10 +262,6 @@ class BatchSettings(TypedDict, total=False):
     # Loss of Huber instead of squares: residuals beyond so many standard deviations count
     # linearly; of no number 1.345. For pem.
     robust: float | bool | None
-
-    # What the model is to be good at: one-step prediction, or simulation from the input alone.
-    # For pem.
-    focus: Literal["prediction", "simulation"] | None
 
     # Take only models that are stable from e to u (C and F always are stable). For pem.
     stable: bool | None
@@ -367,15 +367,6 @@ BATCH_SETTINGS = """noise : Literal['ar', 'arma', 'remnant']
             What is known of the person before the data: population (published people), none, a
             JSON result of another fit, or NAME=CENTRE:SPREAD of omega_nm, zeta_nm, tau_e, T_L,
             T_I, as omega_nm=10.5:0.3 (the spread is relative). For operator, change="sigmoid".
-        excitation : str
-            Column of the recorded disturbance or target, for the fit at its lines; none for no
-            such fit. For operator.
-        period : float
-            Period of the excitation. For operator.
-        controlled_element : str | tuple[Sequence[float], Sequence[float]]
-            Controlled element in s, as 90/(s(s+6)), or NUM/DEN by descending powers of s, as
-            90/1,6,0: adds crossover frequency and margins. For polynomials, operator,
-            noise="remnant".
         delay : float | tuple[float, float]
             Delay tau_e, or the shortest and the longest; of polynomials in place of nk =
             tau_e/Ts + 1.
@@ -383,14 +374,11 @@ BATCH_SETTINGS = """noise : Literal['ar', 'arma', 'remnant']
             What e does between its samples: zoh is held, foh runs straight (logged from what is
             faster or continuous; tau_e is half a sample longer); auto: smooth, with the delay
             of a held one, and what data without noise show. For operator.
-        individual : Sequence[str]
-            Parameters that each record has for itself, as K,T_L. For operator, noise="remnant".
         run_to_run : float
             What a person's gain varies by from run to run, as a part of it: in the error bars
             of fewer than five records. For operator.
-        answers : Sequence[str]
-            What the verdict is about: response, crossover, phase_margin, parameters by their
-            names, as crossover,tau_e.
+        individual : Sequence[str]
+            Parameters that each record has for itself, as K,T_L. For operator, noise="remnant".
         initial_state : Literal['auto', 'zero', 'estimate', 'backcast']
             Initial states of each record; auto: estimate, and backcast for an output alone (ar,
             ma, arma). For operators, pem.
@@ -401,6 +389,18 @@ BATCH_SETTINGS = """noise : Literal['ar', 'arma', 'remnant']
             Largest number of search steps from each start.
         tolerance : float
             Relative decrease of the loss below which the search has converged.
+        excitation : str
+            Column of the recorded disturbance or target, for the fit at its lines; none for no
+            such fit. For operator.
+        period : float
+            Period of the excitation. For operator.
+        controlled_element : str | tuple[Sequence[float], Sequence[float]]
+            Controlled element in s, as 90/(s(s+6)), or NUM/DEN by descending powers of s, as
+            90/1,6,0: adds crossover frequency and margins. For polynomials, operator,
+            noise="remnant".
+        answers : Sequence[str]
+            What the verdict is about: response, crossover, phase_margin, parameters by their
+            names, as crossover,tau_e.
         remnant_order : int | tuple[int, int] | range
             Order m of the remnant, a number or a range to search. For noise="remnant".
         fix : Mapping[str, float]
@@ -414,6 +414,9 @@ BATCH_SETTINGS = """noise : Literal['ar', 'arma', 'remnant']
             0.1s..0.4s) to search. For polynomials.
         criterion : Literal['loss', 'aic', 'aicc', 'bic', 'fpe', 'mdl', 'yic']
             What decides between candidates when something is searched. For polynomials.
+        focus : Literal['prediction', 'simulation']
+            What the model is to be good at: one-step prediction, or simulation from the input
+            alone. For pem.
         start : Mapping[str, float]
             Start of the search, all coefficients as f1=-1.9,f2=.92,b0=.04,.... For pem.
         coefficient_prior : Mapping[str, tuple[float, float]]
@@ -422,9 +425,6 @@ BATCH_SETTINGS = """noise : Literal['ar', 'arma', 'remnant']
         robust : float | bool
             Loss of Huber instead of squares: residuals beyond so many standard deviations count
             linearly; of no number 1.345. For pem.
-        focus : Literal['prediction', 'simulation']
-            What the model is to be good at: one-step prediction, or simulation from the input
-            alone. For pem.
         stable : bool
             Take only models that are stable from e to u (C and F always are stable). For pem.
         instruments : str

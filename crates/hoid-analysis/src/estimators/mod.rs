@@ -6,32 +6,38 @@
 //! | `operator` | the operator of a person, its form by evidence |
 //! | `remnant` | an operator with a gain and a lead, and its remnant of order m |
 //! | `sigmoid` | an operator whose gains change once |
-//! | `polynomials` | a polynomial structure, its orders given or searched; prediction error or instruments |
+//! | `polynomials`, `polynomial_options` | a polynomial structure, its orders given or searched; prediction error or instruments |
 
 mod operator;
+mod polynomial_options;
 mod polynomials;
 mod remnant;
 mod sigmoid;
 
-use std::{collections::BTreeMap, ops::RangeInclusive};
-
-use hoid_ident::{Constraint, SearchOptions, frequency::Description};
+use hoid_ident::{SearchOptions, frequency::Description, settings::MethodSpec};
 use hoid_model::{Detrend, SampleTime, Verdict};
 
-pub use polynomials::{PolynomialFit, Polynomials};
-pub(crate) use remnant::ORDERS as REMNANT_ORDERS;
+pub use polynomial_options::Polynomials;
+pub use polynomials::PolynomialFit;
 
 use crate::{
-    AnalysisError, answers::Answers, identification::Identification, quality::Of, recordings::Recordings,
-    settings::Setting,
+    AnalysisError, answers::Answers, identification::Identification, options::AnalysisOption, quality::Of,
+    recordings::Recordings, registry::OPERATOR, settings::Setting,
 };
 
 /// A batch estimator as [`Identification`] runs it.
-pub trait BatchEstimator: Sized {
+pub trait BatchEstimator: Sized + 'static {
     /// Its result.
     type Fit: Answers;
     /// Whose records it judges: of a person, who answers an error within a second, one without a response is told.
     const OF: Of = Of::Person;
+
+    /// What the registry knows of it: one entry, or one for each of its methods.
+    fn specs() -> Vec<MethodSpec>;
+
+    /// Its options and those of the analysis around it that it has use for, in the order in which they are set
+    /// and printed.
+    fn options_of_analysis() -> Vec<AnalysisOption<Self>>;
 
     /// Whether orders and delay are numbers of samples, so that a high rate is kept.
     fn counts_samples(&self) -> bool {
@@ -47,8 +53,15 @@ pub trait BatchEstimator: Sized {
     /// The same estimator with its defaults.
     fn by_default(&self) -> Self;
 
-    /// Its own settings as they are printed, at a sample time.
-    fn settings(&self, sample_time: SampleTime) -> Vec<Setting>;
+    /// What it is called among the printed settings.
+    fn structure(&self) -> Setting {
+        Setting::new("structure", OPERATOR)
+    }
+
+    /// A printed setting that no option of its own sets.
+    fn beside_options(&self) -> Option<Setting> {
+        None
+    }
 
     /// Fits recordings that have been repaired and are at their rate; takes out of them what it fits without.
     ///
@@ -71,54 +84,24 @@ pub struct Fitted<F> {
     pub described: Option<Description>,
     /// What was taken out of e and u for it.
     pub taken_out: Detrend,
-    /// The estimator as it was used.
+    /// The settings of the estimator as it was used.
     pub used: Vec<Setting>,
     /// What was found of what was left open.
     pub found: Vec<Setting>,
 }
 
-/// A range as users write it.
-fn range(r: &RangeInclusive<usize>) -> String {
-    if r.start() == r.end() {
-        r.start().to_string()
-    } else {
-        format!("{}..{}", r.start(), r.end())
+impl<E: BatchEstimator> Identification<E> {
+    /// The settings of the estimator as they are printed, at a sample time.
+    pub(crate) fn settings(&self, sample_time: SampleTime) -> Vec<Setting> {
+        let options = E::options_of_analysis();
+        let own = options.iter().filter_map(|option| option.words(self, sample_time));
+        let own = own.map(|(name, words)| Setting::new(name, words));
+        let structure = [self.estimator.structure()].into_iter();
+        structure.chain(own).chain(self.estimator.beside_options()).collect()
     }
 }
 
-/// A range of the delay.
-fn delay((low, high): (f64, f64)) -> Setting {
-    Setting::new("delay in s", format!("{low}..{high}"))
-}
-
-/// `name=value, name=value`.
-fn named<'a>(values: impl IntoIterator<Item = (&'a String, f64)>) -> String {
-    let all: Vec<String> = values
-        .into_iter()
-        .map(|(name, value)| format!("{name}={value}"))
-        .collect();
-    all.join(", ")
-}
-
-/// What was fixed and bounded.
-fn constraints(all: &BTreeMap<String, Constraint>) -> Vec<Setting> {
-    let end = |v: f64| if v.is_finite() { v.to_string() } else { String::new() };
-    let fixed = |c: &Constraint| match c {
-        Constraint::Fixed(value) => Some(*value),
-        Constraint::Between(..) => None,
-    };
-    let held = named(all.iter().filter_map(|(name, c)| Some((name, fixed(c)?))));
-    let bounds: Vec<String> = all
-        .iter()
-        .filter(|(_, c)| fixed(c).is_none())
-        .map(|(name, c)| {
-            let (low, high) = c.limits();
-            format!("{name}={}..{}", end(low), end(high))
-        })
-        .collect();
-    let rows = [("fixed", held), ("bounds", bounds.join(", "))];
-    rows.into_iter()
-        .filter(|(_, text)| !text.is_empty())
-        .map(|(name, text)| Setting::new(name, text))
-        .collect()
+/// The settings of options.
+fn known<E: 'static>(options: Vec<AnalysisOption<E>>) -> Vec<hoid_ident::settings::Setting> {
+    options.into_iter().map(|option| option.setting).collect()
 }

@@ -5,17 +5,41 @@ use hoid_ident::{
     SearchOptions,
     family::{FamilyEstimator, FamilyFit, Intersample},
     judgement::second_opinion,
+    settings::MethodSpec,
 };
-use hoid_model::{Detrend, FaultHandling, Form, SampleTime, Verdict};
+use hoid_model::{Detrend, FaultHandling, Structure, Verdict};
 
-use super::{BatchEstimator, Fitted, delay, range};
+use super::{BatchEstimator, Fitted, known};
 use crate::{
-    AnalysisError, description::of_lines, identification::Identification, level::levels_into, recordings::Recordings,
+    AnalysisError,
+    description::of_lines,
+    identification::Identification,
+    level::levels_into,
+    options::{self, AnalysisOption},
+    recordings::Recordings,
+    registry::OPERATOR,
     settings::Setting,
 };
 
 impl BatchEstimator for FamilyEstimator {
     type Fit = FamilyFit;
+
+    fn specs() -> Vec<MethodSpec> {
+        vec![MethodSpec {
+            name: OPERATOR,
+            help: "the operator of a person: form, parameters with prior, errors by runs, a verdict",
+            source: "McRuer and Jex 1967; the reference text, equation 2.2",
+            structures: &[Structure::BoxJenkins],
+            settings: known(Self::options_of_analysis()),
+        }]
+    }
+
+    fn options_of_analysis() -> Vec<AnalysisOption<Self>> {
+        let mut all = options::with_prior_of_fits(options::own(), |how: &mut Self| &mut how.prior);
+        all.extend(options::excitation());
+        all.extend([options::controlled_element(), options::answers()]);
+        all
+    }
 
     /// Straight lines are those between the samples as they were recorded.
     fn counts_samples(&self) -> bool {
@@ -34,31 +58,8 @@ impl BatchEstimator for FamilyEstimator {
         Self::default()
     }
 
-    fn settings(&self, _sample_time: SampleTime) -> Vec<Setting> {
-        let names: Vec<&str> = self.forms.iter().map(|form: &Form| form.name()).collect();
-        let form = match names.as_slice() {
-            [only] => (*only).to_owned(),
-            all => format!("auto of {}", all.join(", ")),
-        };
-        let mut list = vec![
-            Setting::new("structure", "operator"),
-            Setting::new("form", form),
-            Setting::new("neuromuscular", if self.neuromuscular { "yes" } else { "no" }),
-            Setting::new("prior", self.prior.to_string()),
-            Setting::new(
-                "noise orders",
-                format!("nc={}, nd={}, by AIC", range(&self.nc), range(&self.nd)),
-            ),
-            delay(self.delay_range_s),
-            Setting::new("e between samples", self.intersample.name()),
-            Setting::new("taken out of e and u", self.detrend.to_string()),
-            Setting::new("variation from run to run", self.run_to_run.to_string()),
-        ];
-        if !self.individual.is_empty() {
-            let names: Vec<&str> = self.individual.iter().map(|c| c.parameter()).collect();
-            list.push(Setting::new("individual", names.join(", ")));
-        }
-        list
+    fn beside_options(&self) -> Option<Setting> {
+        Some(Setting::new("taken out of e and u", self.detrend.to_string()))
     }
 
     fn fit(with: &Identification<Self>, data: &mut Recordings) -> Result<Fitted<FamilyFit>, AnalysisError> {
@@ -93,7 +94,12 @@ impl BatchEstimator for FamilyEstimator {
         let channel = described.as_ref().and_then(|d| d.channel.clone());
         let is_named = with.excitation.named().is_some();
         let found = channel.map(|channel| Setting::new("excitation", channel).given(is_named));
-        let used = estimator.settings(fit.sample_time);
+        let asked = Identification {
+            estimator,
+            ..with.clone()
+        };
+        let used = asked.settings(fit.sample_time);
+        let estimator = asked.estimator;
         if estimator.detrend == Detrend::Mean {
             levels_into(&mut data.accounts, &data.records, |k, record| {
                 fit.operator(k).polynomial_fit.level(record)

@@ -1,46 +1,30 @@
 //! A polynomial structure by the prediction error method or by instruments, its orders and its delay given
 //! or searched.
 
-use std::collections::BTreeMap;
-
 use hoid_ident::{
-    Choice, Estimator, Fit, InitialState, InstrumentalVariable, Instruments, IvMethod, Loss, NamedOrders,
-    SearchOptions,
+    Choice, Estimator, Fit, InitialState, InstrumentalVariable, Instruments, IvMethod, Loss, SearchOptions,
     judgement::second_opinion,
-    order_selection::{Criterion, OrderRanges, default_operator_ranges, fit_or_choose},
+    order_selection::{OrderRanges, default_operator_ranges, fit_or_choose},
     progress,
+    settings::MethodSpec,
 };
 use hoid_model::{ContinuousTransferFunction, FaultHandling, Orders, SampleTime, Structure, theta_of};
 
-use super::{BatchEstimator, Fitted, constraints, named};
+use super::{
+    BatchEstimator, Fitted, known,
+    polynomial_options::{self, Polynomials},
+};
 use crate::{
     AnalysisError,
     answers::{Answered, Answers, of_operator},
     identification::Identification,
     level::Level,
+    options::{self, AnalysisOption},
     quality::Of,
     recordings::Recordings,
+    registry::PEM,
     settings::Setting,
 };
-
-/// A polynomial structure and how it is fitted.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Polynomials {
-    /// Structure, initial states, search, constraints, loss, focus. Its orders and its start are those below.
-    pub template: Estimator,
-    /// Orders that are given or searched in a range, by name; the others are the operator's.
-    pub orders: NamedOrders,
-    /// Shortest and longest dead time in s, in place of an order nk.
-    pub delay_s: Option<(f64, f64)>,
-    /// What chooses between candidates.
-    pub criterion: Criterion,
-    /// Where the search starts: all coefficients, by name.
-    pub start: Option<BTreeMap<String, f64>>,
-    /// Instrumental variables in place of the prediction error method, at the orders that this one chose.
-    pub method: Option<IvMethod>,
-    /// What the instruments are made of; by default the forcing function where it is recorded.
-    pub instruments: Option<Instruments>,
-}
 
 /// A polynomial model, and the table that it was chosen from where something was searched.
 #[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
@@ -58,19 +42,6 @@ impl Answers for PolynomialFit {
 }
 
 impl Polynomials {
-    /// The operator's orders, by the prediction error method.
-    pub fn new(structure: Structure) -> Self {
-        Self {
-            template: Estimator::new(structure, Orders::default()),
-            orders: NamedOrders::new(),
-            delay_s: None,
-            criterion: Criterion::Bic,
-            start: None,
-            method: None,
-            instruments: None,
-        }
-    }
-
     /// What is searched at a sample time.
     ///
     /// # Errors
@@ -126,6 +97,35 @@ impl BatchEstimator for Polynomials {
     type Fit = PolynomialFit;
     const OF: Of = Of::System;
 
+    fn specs() -> Vec<MethodSpec> {
+        let of = |has: fn(&str) -> bool| {
+            let mut settings = known(Self::options_of_analysis());
+            settings.retain(|setting| has(setting.name));
+            settings
+        };
+        let pem = MethodSpec {
+            name: PEM,
+            help: "polynomials by the prediction error method",
+            source: "Ljung 1999, chapters 7 and 10; the reference text, section III",
+            structures: &Structure::ALL,
+            settings: of(|name| !polynomial_options::belongs_to_instruments(name)),
+        };
+        let instrumental = IvMethod::ALL.map(|method| MethodSpec {
+            name: method.name(),
+            help: method.help(),
+            source: method.source(),
+            structures: method.structures(),
+            settings: of(|name| !polynomial_options::belongs_to_prediction(name)),
+        });
+        [pem].into_iter().chain(instrumental).collect()
+    }
+
+    fn options_of_analysis() -> Vec<AnalysisOption<Self>> {
+        let mut all = options::own();
+        all.extend([options::controlled_element(), options::answers()]);
+        all
+    }
+
     fn counts_samples(&self) -> bool {
         true
     }
@@ -142,53 +142,9 @@ impl BatchEstimator for Polynomials {
         Self::new(self.template.structure)
     }
 
-    fn settings(&self, sample_time: SampleTime) -> Vec<Setting> {
-        let template = &self.template;
-        let start = self.start.as_ref();
-        let start = start.map_or("own".to_owned(), |start| {
-            named(start.iter().map(|(name, v)| (name, *v)))
-        });
-        let mut list = vec![
-            // The default is no polynomial structure: whoever has one asked for it.
-            Setting::new("structure", template.structure.name()).given(true),
-            Setting::new(
-                "orders",
-                self.ranges(sample_time)
-                    .map_or_else(|_| String::new(), |ranges| ranges.to_string()),
-            ),
-            Setting::new("criterion", self.criterion.to_string()),
-            Setting::new("focus", template.focus.to_string()),
-            Setting::new("start", start),
-        ];
-        if let Some((low, high)) = self.delay_s {
-            let words = if low == high {
-                format!("{low} s")
-            } else {
-                format!("{low}..{high} s")
-            };
-            list.push(Setting::new("delay", words));
-        }
-        if !template.priors.is_empty() {
-            let guess = template
-                .priors
-                .iter()
-                .map(|(name, p)| format!("{name}={}:{}", p.value, p.weight));
-            list.push(Setting::new(
-                "prior of coefficients",
-                guess.collect::<Vec<_>>().join(", "),
-            ));
-        }
-        if let Loss::Huber { threshold } = template.loss {
-            list.push(Setting::new(
-                "robust loss",
-                format!("Huber, {threshold} standard deviations"),
-            ));
-        }
-        if template.stable {
-            list.push(Setting::new("stable models only", "yes"));
-        }
-        list.extend(constraints(&template.constraints));
-        list
+    fn structure(&self) -> Setting {
+        // The default is no polynomial structure: whoever has one asked for it.
+        Setting::new("structure", self.template.structure.name()).given(true)
     }
 
     fn fit(with: &Identification<Self>, data: &mut Recordings) -> Result<Fitted<PolynomialFit>, AnalysisError> {
@@ -198,7 +154,7 @@ impl BatchEstimator for Polynomials {
         let ranges = how.ranges(records[0].sample_time())?;
         let combinations = ranges.combinations()?;
         let estimator = how.estimator(&combinations)?;
-        let used = how.settings(records[0].sample_time());
+        let used = with.settings(records[0].sample_time());
         let mut found = Vec::new();
         let told = progress::counter("candidates", combinations.len());
         let (mut fit, choice) = fit_or_choose(&estimator, &ranges, how.criterion, records, &told)?;

@@ -1,18 +1,36 @@
 //! An operator with a gain and a lead, and its remnant of order m, in physical parameters.
 
-use std::ops::RangeInclusive;
+use hoid_ident::{GreyBox, GreyBoxFit, SearchOptions, judgement::second_opinion, settings::MethodSpec};
+use hoid_model::{FaultHandling, Structure};
 
-use hoid_ident::{GreyBox, GreyBoxFit, SearchOptions, judgement::second_opinion};
-use hoid_model::{FaultHandling, SampleTime};
-
-use super::{BatchEstimator, Fitted, constraints, delay, range};
-use crate::{AnalysisError, identification::Identification, level::Level, recordings::Recordings, settings::Setting};
-
-/// Orders m of the remnant that are tried.
-pub(crate) const ORDERS: RangeInclusive<usize> = 1..=4;
+use super::{BatchEstimator, Fitted, known};
+use crate::{
+    AnalysisError,
+    identification::Identification,
+    level::Level,
+    options::{self, AnalysisOption},
+    recordings::Recordings,
+    registry::REMNANT,
+};
 
 impl BatchEstimator for GreyBox {
     type Fit = GreyBoxFit;
+
+    fn specs() -> Vec<MethodSpec> {
+        vec![MethodSpec {
+            name: REMNANT,
+            help: "operator and remnant in physical parameters, with a real delay",
+            source: "Ljung 1999, section 4.3; the reference text, equation 4",
+            structures: &[Structure::BoxJenkins],
+            settings: known(Self::options_of_analysis()),
+        }]
+    }
+
+    fn options_of_analysis() -> Vec<AnalysisOption<Self>> {
+        let mut all = options::own();
+        all.extend([options::controlled_element(), options::answers()]);
+        all
+    }
 
     fn search(&self) -> &SearchOptions {
         &self.search
@@ -23,23 +41,7 @@ impl BatchEstimator for GreyBox {
     }
 
     fn by_default(&self) -> Self {
-        Self::new(ORDERS)
-    }
-
-    fn settings(&self, _sample_time: SampleTime) -> Vec<Setting> {
-        let order = range(&self.order);
-        let one = self.order.start() == self.order.end();
-        let mut settings = vec![
-            Setting::new("structure", "operator"),
-            Setting::new("noise", "remnant"),
-            Setting::new("remnant order m", if one { order } else { format!("{order}, by BIC") }),
-            delay(self.delay_range_s),
-        ];
-        if !self.individual.is_empty() {
-            settings.push(Setting::new("individual", self.individual.join(", ")));
-        }
-        settings.extend(constraints(&self.constraints));
-        settings
+        Self::default()
     }
 
     fn fit(with: &Identification<Self>, data: &mut Recordings) -> Result<Fitted<GreyBoxFit>, AnalysisError> {
@@ -57,7 +59,7 @@ impl BatchEstimator for GreyBox {
             verdict,
             described: None,
             taken_out: level.detrend(),
-            used: estimator.settings(data.records[0].sample_time()),
+            used: with.settings(data.records[0].sample_time()),
             found: found.into_iter().collect(),
         })
     }

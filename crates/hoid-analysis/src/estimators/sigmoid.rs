@@ -1,20 +1,40 @@
 //! An operator whose gains change once, by a sigmoid. A level of u is an unknown of it: the mean of e is that
 //! of two persons.
 
-use hoid_ident::{InitialState, SearchOptions, SigmoidChange, SigmoidFit, judgement::second_opinion};
-use hoid_model::{Detrend, FaultHandling, SampleTime};
+use hoid_ident::{
+    InitialState, SearchOptions, SigmoidChange, SigmoidFit, judgement::second_opinion, settings::MethodSpec,
+};
+use hoid_model::{Detrend, FaultHandling, Structure};
 
-use super::{BatchEstimator, Fitted, constraints, delay};
+use super::{BatchEstimator, Fitted, known};
 use crate::{
     AnalysisError,
     identification::Identification,
     level::{levels_into, may_have_level},
+    options::{self, AnalysisOption},
     recordings::Recordings,
+    registry::CHANGE,
     settings::Setting,
 };
 
 impl BatchEstimator for SigmoidChange {
     type Fit = SigmoidFit;
+
+    fn specs() -> Vec<MethodSpec> {
+        vec![MethodSpec {
+            name: CHANGE,
+            help: "the operator's gains change once, by a sigmoid; any form",
+            source: "Zaal 2016; the reference text, section II",
+            structures: &[Structure::BoxJenkins],
+            settings: known(Self::options_of_analysis()),
+        }]
+    }
+
+    fn options_of_analysis() -> Vec<AnalysisOption<Self>> {
+        let mut all = options::with_prior_of_fits(options::own(), |how: &mut Self| &mut how.prior);
+        all.push(options::answers());
+        all
+    }
 
     fn search(&self) -> &SearchOptions {
         &self.search
@@ -26,20 +46,6 @@ impl BatchEstimator for SigmoidChange {
 
     fn by_default(&self) -> Self {
         Self::default()
-    }
-
-    fn settings(&self, _sample_time: SampleTime) -> Vec<Setting> {
-        let mut settings = vec![
-            Setting::new("structure", "operator"),
-            Setting::new("change", "sigmoid"),
-            Setting::new("form", self.form.name()),
-            Setting::new("neuromuscular", if self.neuromuscular { "yes" } else { "no" }),
-            Setting::new("prior", self.prior.to_string()),
-            Setting::new("orders", format!("nd={}", self.nd)),
-            delay(self.delay_range_s),
-        ];
-        settings.extend(constraints(&self.constraints));
-        settings
     }
 
     fn fit(with: &Identification<Self>, data: &mut Recordings) -> Result<Fitted<SigmoidFit>, AnalysisError> {
@@ -60,7 +66,7 @@ impl BatchEstimator for SigmoidChange {
             verdict,
             described: None,
             taken_out: Detrend::None,
-            used: estimator.settings(data.records[0].sample_time()),
+            used: with.settings(data.records[0].sample_time()),
             found: estimator.level.then(Setting::level).into_iter().collect(),
         })
     }

@@ -1,6 +1,6 @@
 //! An operator whose gains change once, as JSON.
 
-use hoid_ident::{ChangedOperator, SigmoidFit, registry, validation::whiteness};
+use hoid_ident::{ChangedOperator, SigmoidFit, validation::whiteness};
 use serde_json::{Map, Value, json};
 
 use super::{
@@ -8,7 +8,7 @@ use super::{
     result::{BatchAnswer, OPERATOR},
     termination,
 };
-use crate::{AnalysisError, identified::Identified};
+use crate::{AnalysisError, identified::Identified, registry};
 
 impl BatchAnswer for SigmoidFit {
     const ESTIMATOR: &'static str = registry::CHANGE;

@@ -1,11 +1,8 @@
 //! The operator of a person as JSON: form, parameters with intervals, the other methods, covariance.
 
-use hoid_ident::{
-    family::{
-        AgreementMethod, AgreementPair, AgreementRow, ClusterKind, FamilyFit, FormFigures, LoopMeasures,
-        OperatorOfRecord, Parameter,
-    },
-    registry,
+use hoid_ident::family::{
+    AgreementMethod, AgreementPair, AgreementRow, ClusterKind, FamilyFit, FormFigures, LoopMeasures, OperatorOfRecord,
+    Parameter,
 };
 use hoid_model::{FamilyOperator, uncertainty::Estimate};
 use serde_json::{Map, Value, json};
@@ -15,7 +12,7 @@ use super::{
     result::{BatchAnswer, OPERATOR},
     termination,
 };
-use crate::{AnalysisError, identified::Identified};
+use crate::{AnalysisError, identified::Identified, registry};
 
 impl BatchAnswer for FamilyFit {
     const ESTIMATOR: &'static str = registry::OPERATOR;

@@ -4,7 +4,6 @@ use hoid_ident::{
     Candidate, Choice, Fit, GreyBoxFit, MarginEstimates, Root,
     family::{FamilyConversion, PoleRole},
     grey_box::OrderCandidate,
-    registry,
     validation::{GoodnessOfFit, Validation},
 };
 use hoid_model::{
@@ -20,7 +19,9 @@ use super::{
     result::{BatchAnswer, OPERATOR, POLYNOMIAL},
     termination, validation,
 };
-use crate::{AnalysisError, estimators::PolynomialFit, identified::Identified, recordings::Account, settings::Setting};
+use crate::{
+    AnalysisError, estimators::PolynomialFit, identified::Identified, recordings::Account, registry, settings::Setting,
+};
 
 fn root(r: &Root, sample_time_s: f64) -> Value {
     let of_s = r.frequency_and_damping(sample_time_s);

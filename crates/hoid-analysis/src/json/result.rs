@@ -1,6 +1,6 @@
 //! A result to its JSON and back.
 
-use hoid_ident::{GreyBoxFit, SigmoidFit, registry};
+use hoid_ident::{GreyBoxFit, SigmoidFit};
 use hoid_model::{ContinuousTransferFunction, Decimation, Detrend, Fault, Verdict, uncertainty::Estimate};
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use serde_json::{Map, Value, json};
@@ -12,6 +12,7 @@ use crate::{
     estimators::PolynomialFit,
     identified::Identified,
     recordings::{Account, Recordings},
+    registry,
     settings::Setting,
 };
 

@@ -6,10 +6,8 @@ use clap::{
     Args,
     builder::{PossibleValue, PossibleValuesParser},
 };
-use hoid::ident::{
-    IvMethod,
-    registry::{OPERATOR, PEM},
-};
+use hoid::analysis::registry::{OPERATOR, PEM};
+use hoid::ident::IvMethod;
 use hoid::io::{readable_endings, writable_endings};
 use hoid::model::{Structure, remnant::RemnantDiscretisation};
 

@@ -4,9 +4,9 @@
 use std::{collections::BTreeSet, marker::PhantomData};
 
 use clap::{Arg, ArgAction, ArgMatches, Args, Command, FromArgMatches};
+use hoid::analysis::registry::{CHANGE, OPERATOR, PEM, REMNANT, estimators};
 use hoid::ident::{
-    IvMethod, estimators,
-    registry::{CHANGE, OPERATOR, PEM, REMNANT},
+    IvMethod,
     settings::{Kind, MethodSpec, Setting},
 };
 use hoid::track::Method;

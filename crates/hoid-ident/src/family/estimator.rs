@@ -1,7 +1,7 @@
-//! From records of a person to their operator: what may be chosen, and the searches of each form.
+//! From records of a person to their operator: the searches of each form.
 //! The steps are those of the [module](super).
 
-use hoid_model::{Detrend, Form, Record, Structure, operator_family::Coordinate};
+use hoid_model::{Detrend, Form, Record, Structure};
 
 use super::{
     arx_response::ArxResponse,
@@ -12,90 +12,24 @@ use super::{
     lines::LineData,
     low_noise::{LittleNoise, Starts},
     noise::{Autoregression, NoiseProducts},
+    options::{FamilyEstimator, HIGHEST_NOISE_ORDER},
     prediction::{NoiseOrders, Prediction},
     prediction_fit::PredictionFit,
-    prior::OperatorPrior,
     response_fit::{MeasuredResponse, ResponseCriterion},
     result::FamilyFit,
 };
 use crate::{
-    IdentError, InitialState, SearchOptions,
+    IdentError,
     criterion::{Data, Workspace},
     frequency::{DescribingFunction, DescriptionOptions, describe_runs},
-    informative_data,
-    order_selection::{NamedOrders, written},
-    progress,
+    informative_data, progress,
 };
 
-/// Highest order of the noise model.
-pub const HIGHEST_NOISE_ORDER: usize = 24;
-/// Highest nd that is searched beside an nc: an ARMA model needs few.
-const HIGHEST_BESIDE_NC: usize = 8;
 /// Most pairs (nc, nd) that are compared where there is an nc.
 const MOST_NOISE_PAIRS: usize = 60;
 
 /// Why nothing is fitted to the lines where there is little noise.
 const TOO_LITTLE_NOISE: &str = "there is less noise than leakage";
-
-/// What is to be estimated of a person, and how.
-#[derive(Debug, Clone, PartialEq)]
-pub struct FamilyEstimator {
-    /// The forms to choose from; one alone is fitted without a choice. Default all that are proper.
-    pub forms: Vec<Form>,
-    /// With the neuromuscular part. Default true.
-    pub neuromuscular: bool,
-    /// What is known before the data. Default [`OperatorPrior::population`].
-    pub prior: OperatorPrior,
-    /// Shortest and longest delay tau_e in s. Default 0.02 to 0.8.
-    pub delay_range_s: (f64, f64),
-    /// What the error does between its samples. Default [`Intersample::Auto`].
-    pub intersample: Intersample,
-    /// Orders nc of the noise model to choose from. Default 0.
-    pub nc: std::ops::RangeInclusive<usize>,
-    /// Orders nd of the noise model to choose from. Default 0 to 24.
-    pub nd: std::ops::RangeInclusive<usize>,
-    /// Channel of the recorded disturbance or target, for the fit at its lines.
-    pub excitation: Option<String>,
-    /// Period of the excitation in s; found from its lines where it is `None`.
-    pub period_s: Option<f64>,
-    /// Coordinates that each record has for itself; all others are common to the records.
-    pub individual: Vec<Coordinate>,
-    /// What the gain of a person varies by from one run to the next, as a part of it: it stands in
-    /// the error bars of fewer than five records, whose blocks cannot show it. Default 0.06: between
-    /// 4 and 9 % in repeated runs of three people, each left out in turn.
-    pub run_to_run: f64,
-    /// What is taken out of e and u of each record beforehand: an operator with a lag integrates an
-    /// offset. Default their mean.
-    pub detrend: Detrend,
-    /// Initial states of each record. Default: estimated.
-    pub initial_state: InitialState,
-    /// Limits of the search.
-    pub search: SearchOptions,
-}
-
-impl Default for FamilyEstimator {
-    fn default() -> Self {
-        Self {
-            forms: Form::ALL.to_vec(),
-            neuromuscular: true,
-            prior: OperatorPrior::population(),
-            delay_range_s: (0.02, 0.8),
-            intersample: Intersample::Auto,
-            nc: 0..=0,
-            nd: 0..=HIGHEST_NOISE_ORDER,
-            excitation: None,
-            period_s: None,
-            individual: Vec::new(),
-            run_to_run: 0.06,
-            detrend: Detrend::Mean,
-            initial_state: InitialState::Estimate,
-            search: SearchOptions {
-                tolerance: 1e-9,
-                ..SearchOptions::default()
-            },
-        }
-    }
-}
 
 /// Where the searches of a form begin.
 struct Start {
@@ -107,36 +41,6 @@ struct Start {
 }
 
 impl FamilyEstimator {
-    /// With orders nc and nd of the noise that are named; an nd that is not is searched, beside an nc from 0 to
-    /// 8.
-    ///
-    /// # Errors
-    /// [`IdentError::BadOption`] for another order, and for one that is too high.
-    pub fn with_noise_orders(self, named: &NamedOrders) -> Result<Self, IdentError> {
-        for (name, range) in named {
-            let refuse = |expected: String| IdentError::BadOption {
-                option: format!("order {name}"),
-                found: written(range),
-                expected,
-            };
-            if !matches!(name.as_str(), "nc" | "nd") {
-                return Err(refuse(
-                    "the orders nc and nd of the noise alone: the form says the others".to_owned(),
-                ));
-            }
-            if *range.end() > HIGHEST_NOISE_ORDER {
-                return Err(refuse(format!("a number or a range within 0..{HIGHEST_NOISE_ORDER}")));
-            }
-        }
-        let nc = named.get("nc").cloned().unwrap_or(0..=0);
-        let highest = match *nc.end() {
-            0 => HIGHEST_NOISE_ORDER,
-            _ => HIGHEST_BESIDE_NC,
-        };
-        let nd = named.get("nd").cloned().unwrap_or(0..=highest);
-        Ok(Self { nc, nd, ..self })
-    }
-
     /// Fits all records together.
     ///
     /// # Errors

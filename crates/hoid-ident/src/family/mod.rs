@@ -22,7 +22,8 @@
 //!
 //! | file | what it holds |
 //! |---|---|
-//! | `estimator` | [`FamilyEstimator`]: options, and the searches of all forms |
+//! | `options` | [`FamilyEstimator`]: what may be chosen, by fields and by names |
+//! | `estimator` | the searches of all forms |
 //! | `comparison` | what each form is worth beside the others |
 //! | `assembly` | from the searches of the forms that count to the result |
 //! | `estimated` | the operator of a record with its errors |
@@ -75,6 +76,7 @@ mod mixture;
 pub(crate) mod noise;
 mod of_polynomials;
 mod open_loop;
+mod options;
 mod parameter;
 mod pole_reading;
 mod prediction;
@@ -88,13 +90,13 @@ mod sensitivity;
 pub use agreement::{Agreement, AgreementMethod, AgreementPair, AgreementRow};
 pub use choice::FormFigures;
 pub use clusters::ClusterKind;
-pub use estimator::{FamilyEstimator, HIGHEST_NOISE_ORDER};
 pub use instrumental::InstrumentalFit;
 pub use intersample::Intersample;
 pub use line_fit::LineFit;
 pub use loop_shape::{KnownResponse, LoopShape};
 pub use of_polynomials::{FamilyConversion, family_of_polynomials};
 pub use open_loop::{Crossover, LoopMeasures, loop_measures};
+pub use options::{FamilyEstimator, HIGHEST_NOISE_ORDER};
 pub use parameter::Parameter;
 pub use pole_reading::{PoleRole, RealPole};
 pub use prior::{OperatorPrior, ParameterPrior};

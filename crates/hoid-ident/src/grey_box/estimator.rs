@@ -1,18 +1,17 @@
-//! The grey-box estimator: options, and the fit of each order of the remnant.
-
-use std::{collections::BTreeMap, ops::RangeInclusive};
+//! The grey-box estimator: the fit of each order of the remnant.
 
 use hoid_model::{PolynomialModel, Record, SampleTime, Structure, remnant::HIGHEST_ORDER};
 
 use super::{
     layout::{self, Layout, TIME_CONSTANT},
     objective::PhysicalCriterion,
+    options::GreyBox,
     parametrisation::Parametrisation,
     result::{GreyBoxFit, OrderCandidate, OrderFigures},
     starts::{self, Start},
 };
 use crate::{
-    Constraint, Fit, IdentError, InitialState, Reason, SearchOptions,
+    Fit, IdentError, Reason, SearchOptions,
     criterion::{Data, Workspace, first_residual, output_variance},
     fit::Physical,
     informative_data,
@@ -26,41 +25,7 @@ use crate::{
 const QUICK_TOLERANCE: f64 = 1e-7;
 const QUICK_ITERATIONS: usize = 30;
 
-/// What is to be estimated in physical parameters, and how.
-#[derive(Debug, Clone, PartialEq)]
-pub struct GreyBox {
-    /// Orders m of the remnant filter to choose from, 0 (white) to 4.
-    pub order: RangeInclusive<usize>,
-    /// Shortest and longest delay tau_e in s. Default 0.05 to 0.6.
-    pub delay_range_s: (f64, f64),
-    /// Fixed and bounded parameters by name ([`GREY_BOX_NAMES`](super::GREY_BOX_NAMES)). T_L or
-    /// K_e_dot, not both.
-    pub constraints: BTreeMap<String, Constraint>,
-    /// Names of the parameters that each record has for itself; all others are common to the
-    /// records.
-    pub individual: Vec<String>,
-    /// Initial states of each record. Default: estimated.
-    pub initial_state: InitialState,
-    /// Limits of the search.
-    pub search: SearchOptions,
-    /// Number of points of the grid from which the search runs to its end. Default 2.
-    pub starts: usize,
-}
-
 impl GreyBox {
-    /// A grey box with the default options.
-    pub fn new(order: RangeInclusive<usize>) -> Self {
-        Self {
-            order,
-            delay_range_s: (0.05, 0.6),
-            constraints: BTreeMap::new(),
-            individual: Vec::new(),
-            initial_state: InitialState::default(),
-            search: SearchOptions::default(),
-            starts: 2,
-        }
-    }
-
     /// Fits one model to all records, initial states of each.
     ///
     /// # Errors

@@ -17,7 +17,8 @@
 //!
 //! | module | what it holds |
 //! |---|---|
-//! | `estimator` | options, and the fit |
+//! | `options` | [`GreyBox`]: what may be chosen, by fields and by names |
+//! | `estimator` | the fit |
 //! | `layout` | order and bounds of the physical parameters |
 //! | `parametrisation` | what the criterion needs to know of physical parameters |
 //! | `objective` | the criterion in physical parameters, and its derivatives |
@@ -27,10 +28,11 @@
 mod estimator;
 pub(crate) mod layout;
 pub(crate) mod objective;
+mod options;
 pub(crate) mod parametrisation;
 mod result;
 mod starts;
 
-pub use estimator::GreyBox;
 pub use layout::GREY_BOX_NAMES;
+pub use options::GreyBox;
 pub use result::{GreyBoxFit, OrderCandidate, OrderFigures};

@@ -31,12 +31,14 @@
 //! plan or Python has in its own types is brought into that form first, so that there is one reader
 //! of each type ([`Value`]).
 
+mod batch_option;
 mod declare;
 mod kind;
 mod range;
 mod setting;
 mod value;
 
+pub use batch_option::{BatchOption, BatchOptions};
 pub use kind::{Bounds, Kind};
 pub use range::{DelayRange, OneOrSpan};
 pub use setting::{MethodSpec, Setting};

@@ -1,6 +1,6 @@
 //! What is known of an option.
 
-use hoid_model::Structure;
+use hoid_model::{NamedChoice, Structure};
 
 use super::{
     kind::{Bounds, Kind},
@@ -35,6 +35,18 @@ impl Setting {
             default: default.text().unwrap_or_default(),
             bounds: Bounds::Any,
             help: String::new(),
+        }
+    }
+
+    /// An option of a type that no value has by itself, without a default.
+    pub fn new(name: &'static str, kind: Kind, help: &str) -> Self {
+        Self {
+            name,
+            kind,
+            unit: "",
+            default: String::new(),
+            bounds: Bounds::Any,
+            help: help.to_owned(),
         }
     }
 
@@ -75,15 +87,41 @@ impl Setting {
     /// # Errors
     /// [`IdentError::BadOption`] for a text that is none, or out of the bounds.
     pub fn read<V: Value>(&self, text: &str) -> Result<V, IdentError> {
-        let bad = |expected: String| IdentError::BadOption {
-            option: self.name.to_owned(),
-            found: text.to_owned(),
-            expected,
-        };
+        let bad = |expected: String| self.refused(text, &expected);
         let value = V::read(text.trim()).map_err(bad)?;
         match value.numbers().into_iter().all(|x| self.bounds.hold(x)) {
             true => Ok(value),
             false => Err(bad(self.bounds.to_string())),
+        }
+    }
+}
+
+impl Setting {
+    /// One of the words of a choice, with hyphens or underscores.
+    ///
+    /// # Errors
+    /// [`IdentError::BadOption`] with the words that there are.
+    pub fn word<T: NamedChoice>(&self, text: &str) -> Result<T, IdentError> {
+        T::of_name(&text.replace('_', "-")).map_err(|_| {
+            let words: Vec<&str> = T::CHOICES.iter().map(|choice| choice.choice_name()).collect();
+            self.refused(text, &format!("one of {}", words.join(", ")))
+        })
+    }
+
+    /// Refuses a text, with what was expected.
+    pub fn refused(&self, text: &str, expected: &str) -> IdentError {
+        IdentError::BadOption {
+            option: self.name.to_owned(),
+            found: text.to_owned(),
+            expected: expected.to_owned(),
+        }
+    }
+
+    /// Refuses it beside others, with the reason.
+    pub fn error(&self, reason: impl Into<String>) -> IdentError {
+        IdentError::Option {
+            name: self.name,
+            reason: reason.into(),
         }
     }
 }

@@ -23,7 +23,8 @@
 //!
 //! | module | what it holds |
 //! |---|---|
-//! | `estimator` | options, and the fit |
+//! | `options` | [`SigmoidChange`]: what may be chosen, by fields and by names |
+//! | `estimator` | the fit |
 //! | `layout` | order and meaning of the parameters |
 //! | `bounds` | within what they are sought |
 //! | `instant` | the sigmoid and the numerator at one time |
@@ -48,6 +49,7 @@ mod instant;
 mod layout;
 mod noise_level;
 mod objective;
+mod options;
 mod prior;
 mod profile_likelihood;
 mod ranking;
@@ -57,8 +59,8 @@ mod starts;
 mod unit_operator;
 
 pub use ends::{ChangedOperator, NamedEstimate};
-pub use estimator::SigmoidChange;
 pub use fit::{ChangeParameter, GainsAt, SigmoidFit};
 pub use inference::{Comparison, Remark};
 pub use layout::SIGMOID_NAMES;
 pub use noise_level::NoiseLevel;
+pub use options::SigmoidChange;

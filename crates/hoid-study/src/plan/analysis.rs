@@ -3,13 +3,11 @@
 //!
 //! Their options are those of the registry of estimators.
 
-use hoid_analysis::{Asked, Identification};
-use hoid_ident::{
-    IdentError, NamedOrders, estimators,
-    family::OperatorPrior,
-    registry::{self, CHANGE},
-    settings::MethodSpec,
+use hoid_analysis::{
+    Asked, Identification,
+    registry::{self, CHANGE, estimators},
 };
+use hoid_ident::{IdentError, NamedOrders, family::OperatorPrior, settings::MethodSpec};
 use hoid_model::{Form, Orders, Structure};
 
 /// Words for `method`.

@@ -2,9 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use hoid_analysis::{AnalysisError, Asked};
+use hoid_analysis::{AnalysisError, Asked, registry::estimator_setting};
 use hoid_ident::{
-    Estimator, GreyBox, IdentError, InitialState, NamedOrders, SearchOptions, estimator_setting,
+    Estimator, GreyBox, IdentError, InitialState, NamedOrders, SearchOptions,
     settings::{Kind, MethodSpec, Setting},
 };
 use hoid_model::{Detrend, NamedChoice, Orders, Structure};
@@ -350,7 +350,7 @@ impl EstimatorTable {
             given.extend(setting.map(|(setting, text)| (setting, key.to_owned(), text)));
         }
         for (setting, key, text) in given {
-            let set = asked.set(&setting, &text);
+            let set = asked.set(setting.name, &text);
             let known = set.map_err(|error| match error {
                 AnalysisError::Ident(error) => at(&key, in_plan(&error)),
                 AnalysisError::Option { reason, .. } => at(&key, format!("is wrong: {reason}")),

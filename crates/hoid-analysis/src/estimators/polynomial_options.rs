@@ -1,0 +1,225 @@
+//! What may be chosen of a polynomial structure: the fields of [`Polynomials`], and the names under which texts
+//! set them. An option is declared here and nowhere else.
+
+use std::{collections::BTreeMap, ops::RangeInclusive};
+
+use hoid_ident::{
+    Estimator, Focus, IdentError, Instruments, IvMethod, Loss, NamedOrders, Prior, SearchOptions,
+    order_selection::{Criterion, check_order},
+    settings::{BatchOption, BatchOptions, Bounds, DelayRange, Kind, OneOrSpan, Setting},
+    shared_options as shared,
+};
+use hoid_model::{Orders, SampleTime, Structure};
+
+/// Standard deviations from which a robust loss is linear where no number is given: 95 % efficient for normal
+/// noise (Huber 1981).
+const HUBER: f64 = 1.345;
+
+/// A polynomial structure and how it is fitted.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Polynomials {
+    /// Structure, initial states, search, constraints, loss, focus. Its orders and its start are those below.
+    pub template: Estimator,
+    /// Orders that are given or searched in a range, by name; the others are the operator's.
+    pub orders: NamedOrders,
+    /// Shortest and longest dead time in s, in place of an order nk.
+    pub delay_s: Option<(f64, f64)>,
+    /// What chooses between candidates.
+    pub criterion: Criterion,
+    /// Where the search starts: all coefficients, by name.
+    pub start: Option<BTreeMap<String, f64>>,
+    /// Instrumental variables in place of the prediction error method, at the orders that this one chose.
+    pub method: Option<IvMethod>,
+    /// What the instruments are made of; by default the forcing function where it is recorded.
+    pub instruments: Option<Instruments>,
+}
+
+impl Polynomials {
+    /// The operator's orders, by the prediction error method.
+    pub fn new(structure: Structure) -> Self {
+        Self {
+            template: Estimator::new(structure, Orders::default()),
+            orders: NamedOrders::new(),
+            delay_s: None,
+            criterion: Criterion::Bic,
+            start: None,
+            method: None,
+            instruments: None,
+        }
+    }
+
+    fn order(&mut self, option: &Setting, name: String, range: RangeInclusive<usize>) -> Result<(), IdentError> {
+        check_order(&name, &range)?;
+        if self.orders.contains_key(&name) {
+            return Err(option.error(format!("{name} is given twice; drop one")));
+        }
+        self.orders.insert(name, range);
+        Ok(())
+    }
+}
+
+/// Whether an option is one of instrumental variables alone.
+pub(super) fn belongs_to_instruments(name: &str) -> bool {
+    by_instruments().iter().any(|option| option.setting.name == name)
+}
+
+/// Whether an option is one of the prediction error method alone.
+pub(super) fn belongs_to_prediction(name: &str) -> bool {
+    by_prediction().iter().any(|option| option.setting.name == name)
+}
+
+impl BatchOptions for Polynomials {
+    fn options() -> Vec<BatchOption<Self>> {
+        let ends = shared::search_ends(SearchOptions::default(), |how: &mut Self| &mut how.template.search);
+        let mut all = searched();
+        all.extend(by_prediction());
+        all.extend(by_instruments());
+        all.extend(ends);
+        all
+    }
+}
+
+/// Orders and delay.
+fn searched() -> Vec<BatchOption<Polynomials>> {
+    let usual = "the operator's: bj nb=2,nd=1..4,nf=2; arx na=2,nb=2";
+    let nk =
+        "Delay of b0 in samples (29), or dead time in s (0.28s); a number or a range (20..40, 0.1s..0.4s) to search";
+    let criterion = "What decides between candidates when something is searched";
+    vec![
+        BatchOption::new(shared::orders(usual), |how: &mut Polynomials, option, text| {
+            for (name, range) in option.read::<NamedOrders>(text)? {
+                how.order(option, name, range)?;
+            }
+            Ok(())
+        })
+        .printed("orders", |how, sample_time: SampleTime| {
+            Some(
+                how.ranges(sample_time)
+                    .map_or_else(|_| String::new(), |ranges| ranges.to_string()),
+            )
+        }),
+        BatchOption::new(
+            Setting::new("nk", Kind::Delay, nk).default("0.05 to 0.6 s"),
+            |how: &mut Polynomials, option, text| {
+                match option.read(text)? {
+                    DelayRange::Samples(range) => how.order(option, "nk".to_owned(), range)?,
+                    DelayRange::Seconds(low, high) => how.delay_s = Some((low, high)),
+                }
+                Ok(())
+            },
+        ),
+        BatchOption::new(
+            Setting::new("criterion", Kind::Choice(&Criterion::NAMES), criterion).default(Criterion::Bic.name()),
+            |how: &mut Polynomials, option, text| {
+                how.criterion = option.word(text)?;
+                Ok(())
+            },
+        )
+        .printed("criterion", |how, _| Some(how.criterion.to_string())),
+        BatchOption::new(shared::delay(""), |how: &mut Polynomials, option, text| {
+            if how.delay_s.is_some() || how.orders.contains_key("nk") {
+                return Err(option.error("it is nk in s in place of samples; give one of them"));
+            }
+            let OneOrSpan(low, high) = option.read(text)?;
+            how.delay_s = Some((low, high));
+            Ok(())
+        })
+        .printed("delay", |how, _| match how.delay_s? {
+            (low, high) if low == high => Some(format!("{low} s")),
+            (low, high) => Some(format!("{low}..{high} s")),
+        }),
+    ]
+}
+
+/// What the prediction error method alone has.
+fn by_prediction() -> Vec<BatchOption<Polynomials>> {
+    let focus = "What the model is to be good at: one-step prediction, or simulation from the input alone";
+    let start = "Start of the search, all coefficients as f1=-1.9,f2=.92,b0=.04,...";
+    let guess = "Guesses of coefficients with a weight W, as f1=-1.9:0.5: the loss grows by W (f1 + 1.9)^2";
+    let robust = "Loss of Huber instead of squares: residuals beyond so many standard deviations count linearly; of no number 1.345";
+    let stable = "Take only models that are stable from e to u (C and F always are stable)";
+    let mut all = vec![
+        BatchOption::new(
+            Setting::new("focus", Kind::Choice(&Focus::NAMES), focus).default(Focus::default().name()),
+            |how: &mut Polynomials, option, text| {
+                how.template.focus = option.word(text)?;
+                Ok(())
+            },
+        )
+        .printed("focus", |how, _| Some(how.template.focus.to_string())),
+        BatchOption::new(
+            Setting::new("start", Kind::Named(&Kind::Number), start)
+                .default("own starts")
+                .bounds(Bounds::Finite),
+            |how: &mut Polynomials, option, text| {
+                how.start = Some(option.read(text)?);
+                Ok(())
+            },
+        )
+        .printed("start", |how, _| {
+            let given = how.start.as_ref();
+            let given = given.and_then(|start| shared::named_words(start.iter().map(|(name, v)| (name, *v))));
+            Some(given.unwrap_or_else(|| "own".to_owned()))
+        }),
+        BatchOption::new(
+            Setting::new("coefficient_prior", Kind::Named(&Kind::Guess), guess),
+            |how: &mut Polynomials, option, text| {
+                how.template.priors = option.read::<BTreeMap<String, Prior>>(text)?;
+                Ok(())
+            },
+        )
+        .printed("prior of coefficients", |how, _| {
+            let all = how.template.priors.iter();
+            let all: Vec<String> = all
+                .map(|(name, p)| format!("{name}={}:{}", p.value, p.weight))
+                .collect();
+            (!all.is_empty()).then(|| all.join(", "))
+        }),
+        BatchOption::new(
+            Setting::new("robust", Kind::NumberOrUsual("1.345"), robust).bounds(Bounds::Positive),
+            |how: &mut Polynomials, option, text| {
+                let threshold = match text {
+                    "true" => HUBER,
+                    _ => option.read(text)?,
+                };
+                how.template.loss = Loss::Huber { threshold };
+                Ok(())
+            },
+        )
+        .printed("robust loss", |how, _| match how.template.loss {
+            Loss::Huber { threshold } => Some(format!("Huber, {threshold} standard deviations")),
+            Loss::Quadratic => None,
+        }),
+        BatchOption::new(
+            Setting::new("stable", Kind::Flag, stable).default("false"),
+            |how: &mut Polynomials, option, text| {
+                how.template.stable = option.read(text)?;
+                Ok(())
+            },
+        )
+        .printed("stable models only", |how, _| {
+            how.template.stable.then(|| "yes".to_owned())
+        }),
+        shared::initial_state(|how: &mut Polynomials, _, rule| {
+            how.template.initial_state = rule;
+            Ok(())
+        }),
+        shared::search_method(|how: &mut Polynomials| &mut how.template.search),
+    ];
+    all.extend(shared::constraints(
+        |how: &mut Polynomials| &mut how.template.constraints,
+        |how| &how.template.constraints,
+    ));
+    all
+}
+
+/// What instrumental variables alone have.
+fn by_instruments() -> Vec<BatchOption<Polynomials>> {
+    let help = "Instruments: a channel that the noise does not reach, or `simulated` from the input, for an open loop";
+    let setting =
+        Setting::new("instruments", Kind::Channel, help).default("f_t where all records have it, else simulated");
+    vec![BatchOption::new(setting, |how: &mut Polynomials, _, text| {
+        how.instruments = Some(Instruments::of_text(text));
+        Ok(())
+    })]
+}

@@ -1,0 +1,65 @@
+//! The registry of batch estimators: what each is called, what it is, and which options it takes.
+//!
+//! Flags and help of the command line, keys of plans, keywords of Python, the page of options and the names of
+//! printed settings are made from this list. An option stands in the file of its estimator
+//! ([`BatchOptions`](hoid_ident::settings::BatchOptions)), an estimator in a file of `estimators/`, and a new
+//! instrumental-variable method is here by being in [`IvMethod::ALL`](hoid_ident::IvMethod::ALL).
+
+use hoid_ident::{
+    GreyBox, SigmoidChange,
+    family::FamilyEstimator,
+    settings::{MethodSpec, Setting},
+};
+
+use crate::estimators::{BatchEstimator, Polynomials};
+
+/// The operator of a person.
+pub const OPERATOR: &str = "operator";
+/// The same with its remnant of order m as noise: a gain with a lead.
+pub const REMNANT: &str = "operator noise=remnant";
+/// The same with gains that change once.
+pub const CHANGE: &str = "operator change=sigmoid";
+/// Polynomials by the prediction error method.
+pub const PEM: &str = "pem";
+
+/// What is known of each batch estimator.
+pub fn estimators() -> Vec<MethodSpec> {
+    [
+        FamilyEstimator::specs(),
+        GreyBox::specs(),
+        SigmoidChange::specs(),
+        Polynomials::specs(),
+    ]
+    .concat()
+}
+
+/// An option of the registry by its name.
+pub fn estimator_setting(name: &str) -> Option<Setting> {
+    estimators()
+        .into_iter()
+        .flat_map(|spec| spec.settings)
+        .find(|setting| setting.name == name)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_estimator_says_what_it_is_and_each_option_once() {
+        let all = estimators();
+        for spec in &all {
+            assert!(
+                !spec.help.is_empty() && !spec.source.is_empty() && !spec.structures.is_empty(),
+                "{}",
+                spec.name
+            );
+            for setting in &spec.settings {
+                let same = spec.settings.iter().filter(|other| other.name == setting.name).count();
+                assert!(same == 1 && !setting.help.is_empty(), "{} {}", spec.name, setting.name);
+            }
+        }
+        let names: Vec<&str> = all.iter().map(|spec| spec.name).collect();
+        assert_eq!(names, [OPERATOR, REMNANT, CHANGE, PEM, "iv4", "sriv", "rivbj"]);
+    }
+}

@@ -1,0 +1,200 @@
+//! What may be chosen of the operator of a person: the fields of [`FamilyEstimator`], and the names under which
+//! texts set them. An option is declared here and nowhere else.
+
+use hoid_model::{Detrend, Form, operator_family::Coordinate};
+
+use super::{intersample::Intersample, prior::OperatorPrior};
+use crate::{
+    IdentError, InitialState, SearchOptions,
+    order_selection::{NamedOrders, written},
+    settings::{BatchOption, BatchOptions, Bounds, Kind, Setting},
+    shared_options as shared,
+};
+
+/// Highest order of the noise model.
+pub const HIGHEST_NOISE_ORDER: usize = 24;
+/// Highest nd that is searched beside an nc: an ARMA model needs few.
+const HIGHEST_BESIDE_NC: usize = 8;
+
+/// What is to be estimated of a person, and how.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FamilyEstimator {
+    /// The forms to choose from; one alone is fitted without a choice. Default all that are proper.
+    pub forms: Vec<Form>,
+    /// With the neuromuscular part. Default true.
+    pub neuromuscular: bool,
+    /// What is known before the data. Default [`OperatorPrior::population`].
+    pub prior: OperatorPrior,
+    /// Shortest and longest delay tau_e in s. Default 0.02 to 0.8.
+    pub delay_range_s: (f64, f64),
+    /// What the error does between its samples. Default [`Intersample::Auto`].
+    pub intersample: Intersample,
+    /// Orders nc of the noise model to choose from. Default 0.
+    pub nc: std::ops::RangeInclusive<usize>,
+    /// Orders nd of the noise model to choose from. Default 0 to 24.
+    pub nd: std::ops::RangeInclusive<usize>,
+    /// Channel of the recorded disturbance or target, for the fit at its lines.
+    pub excitation: Option<String>,
+    /// Period of the excitation in s; found from its lines where it is `None`.
+    pub period_s: Option<f64>,
+    /// Coordinates that each record has for itself; all others are common to the records.
+    pub individual: Vec<Coordinate>,
+    /// What the gain of a person varies by from one run to the next, as a part of it: it stands in
+    /// the error bars of fewer than five records, whose blocks cannot show it. Default 0.06: between
+    /// 4 and 9 % in repeated runs of three people, each left out in turn.
+    pub run_to_run: f64,
+    /// What is taken out of e and u of each record beforehand: an operator with a lag integrates an
+    /// offset. Default their mean.
+    pub detrend: Detrend,
+    /// Initial states of each record. Default: estimated.
+    pub initial_state: InitialState,
+    /// Limits of the search.
+    pub search: SearchOptions,
+}
+
+impl Default for FamilyEstimator {
+    fn default() -> Self {
+        Self {
+            forms: Form::ALL.to_vec(),
+            neuromuscular: true,
+            prior: OperatorPrior::population(),
+            delay_range_s: (0.02, 0.8),
+            intersample: Intersample::Auto,
+            nc: 0..=0,
+            nd: 0..=HIGHEST_NOISE_ORDER,
+            excitation: None,
+            period_s: None,
+            individual: Vec::new(),
+            run_to_run: 0.06,
+            detrend: Detrend::Mean,
+            initial_state: InitialState::Estimate,
+            search: SearchOptions {
+                tolerance: 1e-9,
+                ..SearchOptions::default()
+            },
+        }
+    }
+}
+
+impl FamilyEstimator {
+    /// With orders nc and nd of the noise that are named; an nd that is not is searched, beside an nc from 0 to
+    /// 8.
+    ///
+    /// # Errors
+    /// [`IdentError::BadOption`] for another order, and for one that is too high.
+    pub fn with_noise_orders(self, named: &NamedOrders) -> Result<Self, IdentError> {
+        for (name, range) in named {
+            let refuse = |expected: String| IdentError::BadOption {
+                option: format!("order {name}"),
+                found: written(range),
+                expected,
+            };
+            if !matches!(name.as_str(), "nc" | "nd") {
+                return Err(refuse(
+                    "the orders nc and nd of the noise alone: the form says the others".to_owned(),
+                ));
+            }
+            if *range.end() > HIGHEST_NOISE_ORDER {
+                return Err(refuse(format!("a number or a range within 0..{HIGHEST_NOISE_ORDER}")));
+            }
+        }
+        let nc = named.get("nc").cloned().unwrap_or(0..=0);
+        let highest = match *nc.end() {
+            0 => HIGHEST_NOISE_ORDER,
+            _ => HIGHEST_BESIDE_NC,
+        };
+        let nd = named.get("nd").cloned().unwrap_or(0..=highest);
+        Ok(Self { nc, nd, ..self })
+    }
+}
+
+impl BatchOptions for FamilyEstimator {
+    fn options() -> Vec<BatchOption<Self>> {
+        let usual = Self::default();
+        let mut all = vec![
+            shared::noise(|how: &mut Self, _, text| {
+                if text == "arma" {
+                    let orders = NamedOrders::from([("nc".to_owned(), 1..=2)]);
+                    *how = how.clone().with_noise_orders(&orders)?;
+                }
+                Ok(())
+            }),
+            shared::change(),
+            shared::form(|how: &mut Self, form| how.forms = form.map_or(Form::ALL.to_vec(), |form| vec![form]))
+                .printed("form", |how, _| Some(how.forms_in_words())),
+            shared::neuromuscular(|how: &mut Self| &mut how.neuromuscular)
+                .printed("neuromuscular", |how, _| Some(shared::yes_words(how.neuromuscular))),
+            shared::prior("population", |how: &mut Self| &mut how.prior)
+                .printed("prior", |how, _| Some(how.prior.to_string())),
+            BatchOption::new(
+                shared::orders("nc=0,nd=0..24 of its noise"),
+                |how: &mut Self, option, text| {
+                    let mut named: NamedOrders = option.read(text)?;
+                    if *how.nc.end() > 0 {
+                        named.entry("nc".to_owned()).or_insert_with(|| how.nc.clone());
+                    }
+                    *how = how.clone().with_noise_orders(&named)?;
+                    Ok(())
+                },
+            )
+            .printed("noise orders", |how, _| {
+                let (nc, nd) = (shared::range_words(&how.nc), shared::range_words(&how.nd));
+                Some(format!("nc={nc}, nd={nd}, by AIC"))
+            }),
+            shared::delay_range(usual.delay_range_s, |how: &mut Self| &mut how.delay_range_s)
+                .printed("delay in s", |how, _| Some(shared::delay_words(how.delay_range_s))),
+            BatchOption::new(intersample(), |how: &mut Self, option, text| {
+                how.intersample = option.word(text)?;
+                Ok(())
+            })
+            .printed("e between samples", |how, _| Some(how.intersample.name().to_owned())),
+            BatchOption::new(run_to_run(usual.run_to_run), |how: &mut Self, option, text| {
+                how.run_to_run = option.read(text)?;
+                Ok(())
+            })
+            .printed("variation from run to run", |how, _| Some(how.run_to_run.to_string())),
+            shared::individual(|how: &mut Self, option, names| {
+                let coordinate = |name: &String| {
+                    let expected = "K, T_L, T_I, omega_nm, zeta_nm or tau_e";
+                    Coordinate::of_parameter(name).ok_or_else(|| option.refused(name, expected))
+                };
+                how.individual = names.iter().map(coordinate).collect::<Result<_, _>>()?;
+                Ok(())
+            })
+            .printed("individual", |how, _| {
+                let names: Vec<&str> = how.individual.iter().map(|c| c.parameter()).collect();
+                (!names.is_empty()).then(|| names.join(", "))
+            }),
+            shared::initial_state(|how: &mut Self, _, rule| {
+                how.initial_state = rule.unwrap_or_default();
+                Ok(())
+            }),
+        ];
+        all.extend(shared::search(usual.search, |how: &mut Self| &mut how.search));
+        all
+    }
+}
+
+impl FamilyEstimator {
+    fn forms_in_words(&self) -> String {
+        let names: Vec<&str> = self.forms.iter().map(|form| form.name()).collect();
+        match names.as_slice() {
+            [only] => (*only).to_owned(),
+            all => format!("auto of {}", all.join(", ")),
+        }
+    }
+}
+
+fn intersample() -> Setting {
+    let help = "What e does between its samples: zoh is held, foh runs straight (logged from what is faster or continuous; tau_e is \
+                half a sample longer); auto: smooth, with the delay of a held one, and what data without noise show";
+    Setting::new("intersample", Kind::Choice(&Intersample::NAMES), help).default("auto")
+}
+
+fn run_to_run(usual: f64) -> Setting {
+    let help =
+        "What a person's gain varies by from run to run, as a part of it: in the error bars of fewer than five records";
+    Setting::new("run_to_run", Kind::Number, help)
+        .default(&usual.to_string())
+        .bounds(Bounds::AtLeast(0.0))
+}

@@ -1,0 +1,99 @@
+//! What may be chosen of the operator with a remnant of order m: the fields of [`GreyBox`], and the names under
+//! which texts set them. An option is declared here and nowhere else.
+
+use std::{collections::BTreeMap, ops::RangeInclusive};
+
+use crate::{
+    Constraint, InitialState, SearchOptions,
+    settings::{BatchOption, BatchOptions, Kind, Setting},
+    shared_options as shared,
+};
+
+/// Orders m of the remnant that are tried where none is given.
+const USUAL_ORDERS: RangeInclusive<usize> = 1..=4;
+
+/// What is to be estimated in physical parameters, and how.
+#[derive(Debug, Clone, PartialEq)]
+pub struct GreyBox {
+    /// Orders m of the remnant filter to choose from, 0 (white) to 4.
+    pub order: RangeInclusive<usize>,
+    /// Shortest and longest delay tau_e in s. Default 0.05 to 0.6.
+    pub delay_range_s: (f64, f64),
+    /// Fixed and bounded parameters by name ([`GREY_BOX_NAMES`](super::GREY_BOX_NAMES)). T_L or
+    /// K_e_dot, not both.
+    pub constraints: BTreeMap<String, Constraint>,
+    /// Names of the parameters that each record has for itself; all others are common to the
+    /// records.
+    pub individual: Vec<String>,
+    /// Initial states of each record. Default: estimated.
+    pub initial_state: InitialState,
+    /// Limits of the search.
+    pub search: SearchOptions,
+    /// Number of points of the grid from which the search runs to its end. Default 2.
+    pub starts: usize,
+}
+
+impl Default for GreyBox {
+    /// Orders 1 to 4 of the remnant.
+    fn default() -> Self {
+        Self::new(USUAL_ORDERS)
+    }
+}
+
+impl GreyBox {
+    /// A grey box with the default options.
+    pub fn new(order: RangeInclusive<usize>) -> Self {
+        Self {
+            order,
+            delay_range_s: (0.05, 0.6),
+            constraints: BTreeMap::new(),
+            individual: Vec::new(),
+            initial_state: InitialState::default(),
+            search: SearchOptions::default(),
+            starts: 2,
+        }
+    }
+}
+
+impl BatchOptions for GreyBox {
+    fn options() -> Vec<BatchOption<Self>> {
+        let usual = Self::default();
+        let mut all = vec![
+            shared::noise(|_: &mut Self, _, _| Ok(())).printed("noise", |_, _| Some("remnant".to_owned())),
+            shared::change(),
+            BatchOption::new(remnant_order(), |how: &mut Self, option, text| {
+                how.order = option.read(text)?;
+                Ok(())
+            })
+            .printed("remnant order m", |how, _| {
+                let order = shared::range_words(&how.order);
+                let one = how.order.start() == how.order.end();
+                Some(if one { order } else { format!("{order}, by BIC") })
+            }),
+            shared::delay_range(usual.delay_range_s, |how: &mut Self| &mut how.delay_range_s)
+                .printed("delay in s", |how, _| Some(shared::delay_words(how.delay_range_s))),
+            shared::individual(|how: &mut Self, _, names| {
+                how.individual = names;
+                Ok(())
+            })
+            .printed("individual", |how, _| {
+                (!how.individual.is_empty()).then(|| how.individual.join(", "))
+            }),
+            shared::initial_state(|how: &mut Self, _, rule| {
+                how.initial_state = rule.unwrap_or_default();
+                Ok(())
+            }),
+        ];
+        all.extend(shared::constraints(
+            |how: &mut Self| &mut how.constraints,
+            |how| &how.constraints,
+        ));
+        all.extend(shared::search(usual.search, |how: &mut Self| &mut how.search));
+        all
+    }
+}
+
+fn remnant_order() -> Setting {
+    let help = "Order m of the remnant, a number or a range to search";
+    Setting::new("remnant_order", Kind::Counts, help).default(&shared::range_words(&USUAL_ORDERS))
+}

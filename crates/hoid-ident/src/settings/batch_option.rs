@@ -1,0 +1,87 @@
+//! An option of a batch estimator, declared once: what is known of it, what its text sets, what is printed of it.
+
+use hoid_model::SampleTime;
+
+use super::setting::Setting;
+use crate::IdentError;
+
+/// What a text makes of an estimator.
+type Set<E, X> = Box<dyn Fn(&mut E, &Setting, &str) -> Result<(), X>>;
+/// The value in words at a sample time; `None` for one that is not worth a line.
+type Words<E> = Box<dyn Fn(&E, SampleTime) -> Option<String>>;
+
+/// An option of an estimator `E`, whose texts are refused by an `X`.
+pub struct BatchOption<E, X = IdentError> {
+    /// Name, type, default, bounds, help.
+    pub setting: Setting,
+    set: Set<E, X>,
+    printed: Option<(&'static str, Words<E>)>,
+}
+
+/// An estimator that declares its options.
+pub trait BatchOptions: Sized + 'static {
+    /// All of them, in the order in which they are set and printed.
+    fn options() -> Vec<BatchOption<Self>>;
+}
+
+impl<E: 'static, X: 'static> BatchOption<E, X> {
+    /// An option, and what its text sets.
+    pub fn new(setting: Setting, set: impl Fn(&mut E, &Setting, &str) -> Result<(), X> + 'static) -> Self {
+        Self {
+            setting,
+            set: Box::new(set),
+            printed: None,
+        }
+    }
+
+    /// Printed among the settings that were used, under this name.
+    #[must_use]
+    pub fn printed(self, name: &'static str, words: impl Fn(&E, SampleTime) -> Option<String> + 'static) -> Self {
+        Self {
+            printed: Some((name, Box::new(words))),
+            ..self
+        }
+    }
+
+    /// Sets it from its text.
+    ///
+    /// # Errors
+    /// For a text that is no value of it, or contradicts what was set before.
+    pub fn set(&self, of: &mut E, text: &str) -> Result<(), X> {
+        (self.set)(of, &self.setting, text)
+    }
+
+    /// Its name and value as they are printed.
+    pub fn words(&self, of: &E, sample_time: SampleTime) -> Option<(&'static str, String)> {
+        let (name, words) = self.printed.as_ref()?;
+        Some((*name, words(of, sample_time)?))
+    }
+
+    /// The same with another reader of its texts.
+    #[must_use]
+    pub fn read_by(self, set: impl Fn(&mut E, &Setting, &str) -> Result<(), X> + 'static) -> Self {
+        Self {
+            set: Box::new(set),
+            ..self
+        }
+    }
+
+    /// The same option of what the estimator is a part of.
+    pub fn within<W: 'static, Y: From<X> + 'static>(
+        self,
+        part: fn(&W) -> &E,
+        part_mut: fn(&mut W) -> &mut E,
+    ) -> BatchOption<W, Y> {
+        let Self { setting, set, printed } = self;
+        BatchOption {
+            setting,
+            set: Box::new(move |whole, setting, text| set(part_mut(whole), setting, text).map_err(Y::from)),
+            printed: printed.map(|(name, words)| -> (&'static str, Words<W>) {
+                (
+                    name,
+                    Box::new(move |whole, sample_time| words(part(whole), sample_time)),
+                )
+            }),
+        }
+    }
+}

@@ -1,0 +1,276 @@
+//! Options that several batch estimators have: each is declared here once, over the field of the estimator.
+
+use std::{collections::BTreeMap, ops::RangeInclusive};
+
+use hoid_model::Form;
+
+use crate::{
+    Constraint, IdentError,
+    criterion::InitialState,
+    family::OperatorPrior,
+    optimize::{SearchMethod, SearchOptions},
+    settings::{BatchOption, Bounds, Kind, OneOrSpan, Setting, Value},
+};
+
+/// Words for a form.
+static FORMS: [&str; Form::NAMES.len() + 1] = or_auto(Form::NAMES);
+/// Words for a rule of initial states.
+static INITIAL_STATES: [&str; InitialState::NAMES.len() + 1] = or_auto(InitialState::NAMES);
+
+/// `auto`, and these names.
+const fn or_auto<const N: usize, const M: usize>(names: [&'static str; N]) -> [&'static str; M] {
+    let (mut all, mut i) = (["auto"; M], 0);
+    while i < N {
+        all[i + 1] = names[i];
+        i += 1;
+    }
+    all
+}
+
+/// A field of an estimator.
+pub type Field<E, T> = fn(&mut E) -> &mut T;
+
+/// What noise an operator has: which of the operators is fitted follows from it.
+pub fn noise<E: 'static>(set: impl Fn(&mut E, &Setting, &str) -> Result<(), IdentError> + 'static) -> BatchOption<E> {
+    let help =
+        "Noise of the operator: ar an autoregression, arma with a moving average (nc), remnant the remnant of order m";
+    let setting = Setting::new("noise", Kind::Choice(&["ar", "arma", "remnant"]), help).default("ar");
+    BatchOption::new(setting, set)
+}
+
+/// Whether an operator changes: which of the operators is fitted follows from it.
+pub fn change<E: 'static>() -> BatchOption<E> {
+    let help = "Whether the operator changes: not at all, or its gains once, by a sigmoid";
+    let setting = Setting::new("change", Kind::Choice(&["none", "sigmoid"]), help).default("none");
+    BatchOption::new(setting, |_, _, _| Ok(()))
+}
+
+/// The form of an operator; of the text `auto` none.
+pub fn form<E: 'static>(set: fn(&mut E, Option<Form>)) -> BatchOption<E> {
+    let help = "Form of the operator; auto: estimates are averaged over the forms that the data leave, of one that changes lead";
+    let setting = Setting::new("form", Kind::Choice(&FORMS), help).default("auto");
+    BatchOption::new(setting, move |how, option, text| {
+        let form = match text {
+            "auto" => None,
+            name => Some(option.word(name)?),
+        };
+        set(how, form);
+        Ok(())
+    })
+}
+
+/// Whether an operator has its neuromuscular part.
+pub fn neuromuscular<E: 'static>(field: Field<E, bool>) -> BatchOption<E> {
+    let help = "With neuromuscular dynamics omega_nm, zeta_nm";
+    let setting = Setting::new("neuromuscular", Kind::Choice(&["yes", "no"]), help).default("yes");
+    BatchOption::new(setting, move |how, option, text| {
+        *field(how) = match text {
+            "yes" | "true" => true,
+            "no" | "false" => false,
+            _ => return Err(option.refused(text, "yes or no")),
+        };
+        Ok(())
+    })
+}
+
+/// Yes or no.
+pub fn yes_words(yes: bool) -> String {
+    if yes { "yes" } else { "no" }.to_owned()
+}
+
+/// What is known of the person before the data.
+pub fn prior<E: 'static>(usual: &str, field: Field<E, OperatorPrior>) -> BatchOption<E> {
+    let help = "What is known of the person before the data: population (published people), none, a JSON result of another fit, or \
+                NAME=CENTRE:SPREAD of omega_nm, zeta_nm, tau_e, T_L, T_I, as omega_nm=10.5:0.3 (the spread is relative)";
+    let setting = Setting::new("prior", Kind::Prior, help).default(usual);
+    BatchOption::new(setting, move |how, _, text| {
+        *field(how) = text.parse()?;
+        Ok(())
+    })
+}
+
+/// Orders, each given or searched.
+pub fn orders(usual: &str) -> Setting {
+    let help = "Orders, each a number or a range to search, as nb=2,nc=0,nd=1..4,nf=2; nb counts b0, b1, ...";
+    Setting::new("orders", Kind::Named(&Kind::Counts), help).default(usual)
+}
+
+/// The delay in s.
+pub fn delay(usual: &str) -> Setting {
+    let help = "Delay tau_e, or the shortest and the longest; of polynomials in place of nk = tau_e/Ts + 1";
+    Setting::new("delay", Kind::NumberOrSpan, help)
+        .default(usual)
+        .unit("s")
+        .bounds(Bounds::NonNegative)
+}
+
+/// The shortest and the longest delay of an operator.
+pub fn delay_range<E: 'static>((low, high): (f64, f64), field: Field<E, (f64, f64)>) -> BatchOption<E> {
+    BatchOption::new(delay(&format!("{low}..{high}")), move |how, option, text| {
+        let OneOrSpan(low, high) = option.read(text)?;
+        *field(how) = (low, high);
+        Ok(())
+    })
+}
+
+/// A range of the delay in words.
+pub fn delay_words((low, high): (f64, f64)) -> String {
+    format!("{low}..{high}")
+}
+
+/// A range of orders in words.
+pub fn range_words(range: &RangeInclusive<usize>) -> String {
+    range.text().unwrap_or_default()
+}
+
+/// Parameters that each record has for itself.
+pub fn individual<E: 'static>(
+    set: impl Fn(&mut E, &Setting, Vec<String>) -> Result<(), IdentError> + 'static,
+) -> BatchOption<E> {
+    let help = "Parameters that each record has for itself, as K,T_L";
+    let setting = Setting::new("individual", Kind::Names, help);
+    BatchOption::new(setting, move |how, option, text| set(how, option, option.read(text)?))
+}
+
+/// The rule for initial states; of the text `auto` none.
+pub fn initial_state<E: 'static>(
+    set: impl Fn(&mut E, &Setting, Option<InitialState>) -> Result<(), IdentError> + 'static,
+) -> BatchOption<E> {
+    let help = "Initial states of each record; auto: estimate, and backcast for an output alone (ar, ma, arma)";
+    let setting = Setting::new("initial_state", Kind::Choice(&INITIAL_STATES), help).default("auto");
+    BatchOption::new(setting, move |how, option, text| {
+        let rule = match text {
+            "auto" => None,
+            name => Some(option.word(name)?),
+        };
+        set(how, option, rule)
+    })
+}
+
+/// What is held at a value, and what within bounds; each parameter once.
+pub fn constraints<E: 'static>(
+    field: Field<E, BTreeMap<String, Constraint>>,
+    of: Constraints<E>,
+) -> [BatchOption<E>; 2] {
+    let fix = "Parameters held at a value, as d1=-0.85,f1=-1.9";
+    let fix = Setting::new("fix", Kind::Named(&Kind::Number), fix).bounds(Bounds::Finite);
+    let bound = "Bounds of parameters, as b0=0..0.2,f2=..0.99; an end may be left open";
+    let bound = Setting::new("bound", Kind::Named(&Kind::OpenSpan), bound);
+    let fixed = move |how: &mut E, option: &Setting, text: &str| {
+        let all: BTreeMap<String, f64> = option.read(text)?;
+        constrain(
+            field(how),
+            option,
+            all.into_iter().map(|(name, value)| (name, Constraint::Fixed(value))),
+        )
+    };
+    let bounded = move |how: &mut E, option: &Setting, text: &str| {
+        let all: BTreeMap<String, Constraint> = option.read(text)?;
+        constrain(field(how), option, all.into_iter())
+    };
+    [
+        BatchOption::new(fix, fixed).printed("fixed", move |how, _| fixed_words(of(how))),
+        BatchOption::new(bound, bounded).printed("bounds", move |how, _| bound_words(of(how))),
+    ]
+}
+
+/// The constraints of an estimator.
+pub type Constraints<E> = fn(&E) -> &BTreeMap<String, Constraint>;
+
+fn constrain(
+    all: &mut BTreeMap<String, Constraint>,
+    option: &Setting,
+    given: impl Iterator<Item = (String, Constraint)>,
+) -> Result<(), IdentError> {
+    for (name, constraint) in given {
+        if all.contains_key(&name) {
+            return Err(option.error(format!("{name} is both fixed and bounded; drop one")));
+        }
+        all.insert(name, constraint);
+    }
+    Ok(())
+}
+
+fn fixed_words(all: &BTreeMap<String, Constraint>) -> Option<String> {
+    let fixed = all.iter().filter_map(|(name, c)| match c {
+        Constraint::Fixed(value) => Some((name, *value)),
+        Constraint::Between(..) => None,
+    });
+    named_words(fixed)
+}
+
+fn bound_words(all: &BTreeMap<String, Constraint>) -> Option<String> {
+    let bounded = all.iter().filter(|(_, c)| matches!(c, Constraint::Between(..)));
+    let words: Vec<String> = bounded
+        .map(|(name, c)| format!("{name}={}", c.text().unwrap_or_default()))
+        .collect();
+    (!words.is_empty()).then(|| words.join(", "))
+}
+
+/// `name=value, name=value`; of nothing none.
+pub fn named_words<'a>(values: impl IntoIterator<Item = (&'a String, f64)>) -> Option<String> {
+    let all: Vec<String> = values
+        .into_iter()
+        .map(|(name, value)| format!("{name}={value}"))
+        .collect();
+    (!all.is_empty()).then(|| all.join(", "))
+}
+
+/// How the search of an estimator steps and ends, by its own defaults.
+pub fn search<E: 'static>(usual: SearchOptions, field: Field<E, SearchOptions>) -> Vec<BatchOption<E>> {
+    let mut all = vec![search_method(field)];
+    all.extend(search_ends(usual, field));
+    all
+}
+
+/// How a search steps.
+pub fn search_method<E: 'static>(field: Field<E, SearchOptions>) -> BatchOption<E> {
+    let help = "How the search steps: gn Gauss-Newton, lm Levenberg-Marquardt, grad steepest descent";
+    let setting =
+        Setting::new("search_method", Kind::Choice(&SearchMethod::NAMES), help).default(SearchMethod::default().name());
+    BatchOption::new(setting, move |how, option, text| {
+        field(how).method = option.word(text)?;
+        Ok(())
+    })
+}
+
+/// How a search ends.
+pub fn search_ends<E: 'static>(usual: SearchOptions, field: Field<E, SearchOptions>) -> [BatchOption<E>; 2] {
+    let steps = Setting::new(
+        "max_iterations",
+        Kind::Count,
+        "Largest number of search steps from each start",
+    )
+    .default(&usual.max_iterations.to_string());
+    let tolerance = "Relative decrease of the loss below which the search has converged";
+    let tolerance = Setting::new("tolerance", Kind::Number, tolerance)
+        .default(&format!("{:e}", usual.tolerance))
+        .bounds(Bounds::PositiveFinite);
+    [
+        BatchOption::new(steps, move |how, option, text| {
+            field(how).max_iterations = option.read(text)?;
+            Ok(())
+        }),
+        BatchOption::new(tolerance, move |how, option, text| {
+            field(how).tolerance = option.read(text)?;
+            Ok(())
+        }),
+    ]
+}
+
+#[cfg(test)]
+mod tests {
+    use hoid_model::NamedChoice;
+
+    use super::*;
+
+    #[test]
+    fn words_of_a_choice_are_those_that_the_library_reads() {
+        fn named<T: NamedChoice>() -> Vec<&'static str> {
+            T::CHOICES.iter().map(|choice| choice.choice_name()).collect()
+        }
+        assert_eq!(FORMS[1..], named::<Form>());
+        assert_eq!(INITIAL_STATES[1..], named::<InitialState>());
+        assert_eq!(SearchMethod::NAMES.to_vec(), named::<SearchMethod>());
+    }
+}

@@ -1,0 +1,127 @@
+//! What may be chosen of an operator who changes once: the fields of [`SigmoidChange`], and the names under which
+//! texts set them. An option is declared here and nowhere else.
+
+use std::collections::BTreeMap;
+
+use hoid_model::Form;
+
+use super::noise_level::NoiseLevel;
+use crate::{
+    Constraint, IdentError, InitialState, SearchOptions,
+    family::OperatorPrior,
+    order_selection::{NamedOrders, written},
+    settings::{BatchOption, BatchOptions},
+    shared_options as shared,
+};
+
+/// What is to be estimated, and how.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SigmoidChange {
+    /// Form of the operator: what changes is its numerator (K, T_L, c_1, c_2, alpha), with a lag the
+    /// gain K/T_I. Lag, neuromuscular part and delay do not change. Default a gain and a lead.
+    pub form: Form,
+    /// With the neuromuscular part. Default true.
+    pub neuromuscular: bool,
+    /// A level of u in each record, estimated: of recorded data ([`SigmoidFit::level`]). Default false.
+    pub level: bool,
+    /// What is known of the person before the data; that of T_L counts before and after the change.
+    /// Default nothing.
+    pub prior: OperatorPrior,
+    /// Order nd of D.
+    pub nd: usize,
+    /// Shortest and longest delay tau_e, s; any fraction of a sample. Equal ends fix it.
+    pub delay_range_s: (f64, f64),
+    /// Fixed and bounded parameters by name ([`SigmoidChange::names`]). By default t_M lies in the middle nine tenths of the span that the records have in common, and
+    /// G between 5/span and 2/Ts.
+    pub constraints: BTreeMap<String, Constraint>,
+    /// Size of the innovations over the record.
+    pub noise_level: NoiseLevel,
+    /// Start instead of the own ones: the parameters of [`SigmoidChange::names`] in their units.
+    pub start: Option<Vec<f64>>,
+    /// Method and limits of each search.
+    pub search: SearchOptions,
+    /// Whether t_M and G get likelihood intervals; they take about as long as the fit. Default
+    /// true.
+    pub likelihood_intervals: bool,
+}
+
+impl Default for SigmoidChange {
+    /// First-order noise, delay between 0.05 and 0.6 s, noise level that changes, own starts;
+    /// searches of up to 200 steps to a relative decrease of 1e-10 (a thousandth of a standard
+    /// error): a small change fills its loss with ripples in t_M.
+    fn default() -> Self {
+        Self {
+            form: Form::Lead,
+            neuromuscular: true,
+            level: false,
+            prior: OperatorPrior::none(),
+            nd: 1,
+            delay_range_s: (0.05, 0.6),
+            constraints: BTreeMap::new(),
+            noise_level: NoiseLevel::default(),
+            start: None,
+            search: SearchOptions {
+                max_iterations: 200,
+                tolerance: 1e-10,
+                ..SearchOptions::default()
+            },
+            likelihood_intervals: true,
+        }
+    }
+}
+
+impl SigmoidChange {
+    /// With an order nd of the noise that is named.
+    ///
+    /// # Errors
+    /// [`IdentError::BadOption`] for another order, and for a range.
+    pub fn with_noise_orders(self, named: &NamedOrders) -> Result<Self, IdentError> {
+        for (name, range) in named {
+            if name != "nd" || range.start() != range.end() {
+                return Err(IdentError::BadOption {
+                    option: format!("order {name}"),
+                    found: written(range),
+                    expected: "a single number nd of an operator that changes, as nd=2".to_owned(),
+                });
+            }
+        }
+        let nd = named.get("nd").map_or(self.nd, |nd| *nd.start());
+        Ok(Self { nd, ..self })
+    }
+}
+
+impl BatchOptions for SigmoidChange {
+    fn options() -> Vec<BatchOption<Self>> {
+        let usual = Self::default();
+        let mut all = vec![
+            shared::noise(|_: &mut Self, _, _| Ok(())),
+            shared::change().printed("change", |_, _| Some("sigmoid".to_owned())),
+            shared::form(|how: &mut Self, form| how.form = form.unwrap_or(Self::default().form))
+                .printed("form", |how, _| Some(how.form.name().to_owned())),
+            shared::neuromuscular(|how: &mut Self| &mut how.neuromuscular)
+                .printed("neuromuscular", |how, _| Some(shared::yes_words(how.neuromuscular))),
+            shared::prior("none", |how: &mut Self| &mut how.prior)
+                .printed("prior", |how, _| Some(how.prior.to_string())),
+            BatchOption::new(shared::orders("nd=1 of its noise"), |how: &mut Self, option, text| {
+                *how = how.clone().with_noise_orders(&option.read(text)?)?;
+                Ok(())
+            })
+            .printed("orders", |how, _| Some(format!("nd={}", how.nd))),
+            shared::delay_range(usual.delay_range_s, |how: &mut Self| &mut how.delay_range_s)
+                .printed("delay in s", |how, _| Some(shared::delay_words(how.delay_range_s))),
+            shared::initial_state(|_: &mut Self, option, rule| match rule {
+                None | Some(InitialState::Estimate) => Ok(()),
+                Some(other) => {
+                    let expected = "auto or estimate: a fit with a change estimates the initial states";
+                    Err(option.refused(other.name(), expected))
+                }
+            }),
+        ];
+        all.extend(shared::constraints(
+            |how: &mut Self| &mut how.constraints,
+            |how| &how.constraints,
+        ));
+        all.extend(shared::search(usual.search, |how: &mut Self| &mut how.search));
+        all
+    }
+}
