@@ -12,25 +12,11 @@ use hoid_ident::{
 };
 
 use crate::{
-    AnalysisError, answers::asked_for, description::Excitation, estimators::BatchEstimator,
-    identification::Identification, prior::prior_of_text,
+    AnalysisError, answers::asked_for, description::Excitation, identification::Identification, prior::prior_of_text,
 };
 
 /// An option of an estimator and of the analysis around it.
 pub type AnalysisOption<E> = BatchOption<Identification<E>, AnalysisError>;
-
-impl<E: BatchEstimator> Identification<E> {
-    /// Sets an option of the registry by its name; false for one of another estimator.
-    ///
-    /// # Errors
-    /// [`AnalysisError`] for a text that is no value of it, or out of its bounds.
-    pub fn set(&mut self, name: &str, text: &str) -> Result<bool, AnalysisError> {
-        let option = E::options_of_analysis()
-            .into_iter()
-            .find(|option| option.setting.name == name);
-        option.map_or(Ok(false), |option| option.set(self, text).map(|()| true))
-    }
-}
 
 /// The options that an estimator declares.
 pub(crate) fn own<E: BatchOptions>() -> Vec<AnalysisOption<E>> {

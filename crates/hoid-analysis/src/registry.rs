@@ -11,16 +11,9 @@ use hoid_ident::{
     settings::{MethodSpec, Setting},
 };
 
-use crate::estimators::{BatchEstimator, Polynomials};
+pub use crate::names::{CHANGE, OPERATOR, PEM, REMNANT};
 
-/// The operator of a person.
-pub const OPERATOR: &str = "operator";
-/// The same with its remnant of order m as noise: a gain with a lead.
-pub const REMNANT: &str = "operator noise=remnant";
-/// The same with gains that change once.
-pub const CHANGE: &str = "operator change=sigmoid";
-/// Polynomials by the prediction error method.
-pub const PEM: &str = "pem";
+use crate::estimators::{BatchEstimator, Polynomials};
 
 /// What is known of each batch estimator.
 pub fn estimators() -> Vec<MethodSpec> {

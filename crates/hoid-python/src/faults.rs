@@ -1,8 +1,7 @@
 //! What was found in the records of a fit, and what was done to them.
 
-use hoid_analysis::Recordings;
+use hoid_analysis::{FoundFault, Recordings};
 use hoid_io::Step;
-use hoid_model::Fault;
 use pyo3::{prelude::*, types::PyDict};
 
 use crate::arrays::parts;
@@ -10,26 +9,25 @@ use crate::arrays::parts;
 /// Which of the given records it belongs to, and its parts.
 type Of<'py> = (usize, Bound<'py, PyDict>);
 
-/// The faults of recordings: which of those given, and the fault.
+/// What was found in recordings: which of those given, and what.
 pub fn faults_of<'py>(py: Python<'py>, data: &Recordings) -> PyResult<Vec<Of<'py>>> {
     let all = data.origins.iter().zip(&data.accounts);
-    all.flat_map(|(origin, account)| account.faults.iter().map(|fault| (*origin, fault)))
-        .map(|(origin, fault)| Ok((origin, fault_parts(py, fault)?)))
+    all.flat_map(|(origin, account)| account.found().into_iter().map(|found| (*origin, found)))
+        .map(|(origin, found)| Ok((origin, parts_of(py, found)?)))
         .collect()
 }
 
-/// A fault by the names of its fields.
-fn fault_parts<'py>(py: Python<'py>, fault: &Fault) -> PyResult<Bound<'py, PyDict>> {
+fn parts_of(py: Python<'_>, found: FoundFault) -> PyResult<Bound<'_, PyDict>> {
     let one = PyDict::new(py);
-    one.set_item("kind", fault.kind.name())?;
-    one.set_item("channel", &fault.channel)?;
-    one.set_item("from", fault.from_s)?;
-    one.set_item("to", fault.to_s)?;
-    one.set_item("samples", fault.samples)?;
-    one.set_item("size", fault.size)?;
-    one.set_item("deviations", fault.deviations)?;
-    one.set_item("action", fault.action.name())?;
-    one.set_item("words", fault.to_string())?;
+    one.set_item("kind", found.kind)?;
+    one.set_item("channel", found.channel)?;
+    one.set_item("from", found.from_s)?;
+    one.set_item("to", found.to_s)?;
+    one.set_item("samples", found.samples)?;
+    one.set_item("size", found.size)?;
+    one.set_item("deviations", found.deviations)?;
+    one.set_item("action", found.action)?;
+    one.set_item("words", found.words)?;
     Ok(one)
 }
 

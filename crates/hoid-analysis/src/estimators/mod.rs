@@ -21,8 +21,8 @@ pub use polynomial_options::Polynomials;
 pub use polynomials::PolynomialFit;
 
 use crate::{
-    AnalysisError, answers::Answers, identification::Identification, options::AnalysisOption, quality::Of,
-    recordings::Recordings, registry::OPERATOR, settings::Setting,
+    AnalysisError, answers::Answers, identification::Identification, names::OPERATOR, options::AnalysisOption,
+    quality::Of, recordings::Recordings, settings::Setting,
 };
 
 /// A batch estimator as [`Identification`] runs it.
@@ -91,6 +91,17 @@ pub struct Fitted<F> {
 }
 
 impl<E: BatchEstimator> Identification<E> {
+    /// Sets an option of the registry by its name; false for one of another estimator.
+    ///
+    /// # Errors
+    /// [`AnalysisError`] for a text that is no value of it, or out of its bounds.
+    pub fn set(&mut self, name: &str, text: &str) -> Result<bool, AnalysisError> {
+        let option = E::options_of_analysis()
+            .into_iter()
+            .find(|option| option.setting.name == name);
+        option.map_or(Ok(false), |option| option.set(self, text).map(|()| true))
+    }
+
     /// The settings of the estimator as they are printed, at a sample time.
     pub(crate) fn settings(&self, sample_time: SampleTime) -> Vec<Setting> {
         let options = E::options_of_analysis();

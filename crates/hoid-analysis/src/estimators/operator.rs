@@ -15,9 +15,9 @@ use crate::{
     description::of_lines,
     identification::Identification,
     level::levels_into,
+    names::OPERATOR,
     options::{self, AnalysisOption},
     recordings::Recordings,
-    registry::OPERATOR,
     settings::Setting,
 };
 

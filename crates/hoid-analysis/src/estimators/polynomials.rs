@@ -19,10 +19,10 @@ use crate::{
     answers::{Answered, Answers, of_operator},
     identification::Identification,
     level::Level,
+    names::PEM,
     options::{self, AnalysisOption},
     quality::Of,
     recordings::Recordings,
-    registry::PEM,
     settings::Setting,
 };
 

@@ -8,9 +8,9 @@ use crate::{
     AnalysisError,
     identification::Identification,
     level::Level,
+    names::REMNANT,
     options::{self, AnalysisOption},
     recordings::Recordings,
-    registry::REMNANT,
 };
 
 impl BatchEstimator for GreyBox {

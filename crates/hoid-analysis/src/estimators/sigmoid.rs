@@ -11,9 +11,9 @@ use crate::{
     AnalysisError,
     identification::Identification,
     level::{levels_into, may_have_level},
+    names::CHANGE,
     options::{self, AnalysisOption},
     recordings::Recordings,
-    registry::CHANGE,
     settings::Setting,
 };
 

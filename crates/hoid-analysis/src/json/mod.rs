@@ -28,7 +28,7 @@ use hoid_ident::{
     validation::{GoodnessOfFit, LjungBox},
 };
 use hoid_model::{
-    Fault, Finding, NotConvertible, Orders, Record, Severity, Verdict,
+    Finding, NotConvertible, Orders, Record, Severity, Verdict,
     margins::{Crossing, Crossings},
     uncertainty::{Estimate, OperatorEstimate},
 };
@@ -39,7 +39,7 @@ pub use polynomials::{PolynomialAnswer, of_family};
 pub use result::{Answer, BatchAnswer};
 pub use trace::{change, open_loop, responses, track_fault, tracked_operator};
 
-use crate::{recordings::Account, settings::Setting};
+use crate::{found::FoundFault, recordings::Account, settings::Setting};
 
 /// The envelope of a result: version, kind, records, what was done to them, settings, verdict.
 pub fn envelope(
@@ -274,42 +274,15 @@ pub fn warnings(files: &[String], accounts: &[Account]) -> Value {
 /// All faults of the records, and what is wrong with their files, one object each.
 pub fn faults(files: &[String], accounts: &[Account]) -> Value {
     let all = files.iter().zip(accounts);
-    all.flat_map(|(file, account)| {
-        let faults = account.faults.iter().map(move |one| fault(file, one));
-        let issues = account.quality_issues.iter().map(move |issue| {
-            let (first, last) = (issue.places.first(), issue.places.last());
-            json!({
-                "record": file,
-                "kind": issue.kind.name(),
-                "channel": issue.channel,
-                "from": optional(first.and_then(|place| place.from_s)),
-                "to": optional(last.and_then(|place| place.to_s)),
-                "samples": issue.rows,
-                "size": number(issue.size),
-                "deviations": Value::Null,
-                "action": "reported",
-                "words": issue.text,
-            })
-        });
-        faults.chain(issues)
-    })
-    .collect()
+    all.flat_map(|(file, account)| account.found().into_iter().map(move |found| fault(file, &found)))
+        .collect()
 }
 
-/// One fault as an object.
-pub fn fault(record: &str, fault: &Fault) -> Value {
-    json!({
-        "record": record,
-        "kind": fault.kind.name(),
-        "channel": fault.channel,
-        "from": number(fault.from_s),
-        "to": number(fault.to_s),
-        "samples": fault.samples,
-        "size": number(fault.size),
-        "deviations": optional(fault.deviations),
-        "action": fault.action.name(),
-        "words": fault.to_string(),
-    })
+/// One of them as an object.
+pub fn fault(record: &str, found: &FoundFault) -> Value {
+    let mut object = json!(found);
+    object["record"] = json!(record);
+    object
 }
 
 /// What the library writes about itself, one object each.

@@ -1,6 +1,7 @@
 //! A result to its JSON and back.
 
 use hoid_ident::{GreyBoxFit, SigmoidFit};
+use hoid_io::{Place, QualityIssue, QualityIssueKind};
 use hoid_model::{ContinuousTransferFunction, Decimation, Detrend, Fault, Verdict, uncertainty::Estimate};
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use serde_json::{Map, Value, json};
@@ -68,7 +69,26 @@ impl Answer {
 #[derive(Serialize, Deserialize)]
 struct FoundIn {
     faults: Vec<Fault>,
+    #[serde(default)]
+    quality_issues: Vec<Issue>,
     level: Option<Estimate>,
+}
+
+/// Trouble of a channel with all its fields; printed it is shorter.
+#[derive(Serialize, Deserialize)]
+struct Issue(#[serde(with = "IssueFields")] QualityIssue);
+
+#[derive(Serialize, Deserialize)]
+#[serde(remote = "QualityIssue")]
+struct IssueFields {
+    kind: QualityIssueKind,
+    channel: String,
+    rows: usize,
+    share: f64,
+    size: f64,
+    unit: String,
+    places: Vec<Place>,
+    text: String,
 }
 
 /// What is written of a result, and read.
@@ -106,6 +126,7 @@ impl FoundIn {
     fn of(account: &Account) -> Self {
         Self {
             faults: account.faults.clone(),
+            quality_issues: account.quality_issues.iter().cloned().map(Issue).collect(),
             level: account.level,
         }
     }
@@ -113,6 +134,7 @@ impl FoundIn {
     fn account(self) -> Account {
         Account {
             faults: self.faults,
+            quality_issues: self.quality_issues.into_iter().map(|Issue(issue)| issue).collect(),
             level: self.level,
             ..Account::default()
         }

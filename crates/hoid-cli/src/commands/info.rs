@@ -17,7 +17,7 @@ pub fn run(args: &InfoArgs) -> Result<(), CliError> {
     let faults = faults_of(&look);
     if args.json {
         let mut object = object(&look.survey);
-        object["faults"] = faults.iter().map(|fault| json::fault(&file, fault)).collect();
+        object["faults"] = faults.iter().map(|fault| json::fault(&file, &fault.into())).collect();
         object["look"] = looked(&look, &file);
         json::print(&object)?;
     } else {

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::wording::decimal;
 
@@ -10,7 +10,7 @@ use crate::wording::decimal;
 const PLACES_WRITTEN: usize = 100;
 
 /// What is wrong.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum QualityIssueKind {
@@ -75,7 +75,7 @@ hoid_model::named_choice!(QualityIssueKind, "kind of fault", 11, {
 });
 
 /// Rows that follow each other.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Place {
     /// The first row, counted from 1 without header and comments; of a gap the row before it.
     pub row: usize,
