@@ -14,11 +14,11 @@
 
 use std::path::Path;
 
-use hoid_analysis::Recordings;
+use hoid_analysis::{Recordings, Tracking};
 use hoid_ident::{Estimator, GreyBox, choose_orders, order_selection::Criterion};
 use hoid_io::OutputTable;
-use hoid_model::{Form, Orders, Record, Structure, uncertainty::Estimate};
-use hoid_track::{Method, StartAt, TrackOptions, track};
+use hoid_model::{Decimation, Form, Orders, Record, Structure, uncertainty::Estimate};
+use hoid_track::{Method, TrackRequest};
 
 use super::{
     analysis_settings::AnalysisSettings,
@@ -195,25 +195,31 @@ impl<'a> RunAnalysis<'a> {
     /// A recursion over the run: one that starts itself is told nothing, another has the orders of the cell and
     /// starts from a fit of the first window.
     fn track(&mut self, run: &Run, windows: &[Window; 3], method: &Method, from_cell: &FromCell) {
-        let record = &run.record;
         let label = traces::label_of(method);
-        let structure = method.usual_structure();
-        let options = if method.starts_itself() {
-            TrackOptions::told_nothing(method.clone(), record.sample_time())
-        } else {
+        let mut tracking = Tracking {
+            // The run is mended and at its rate.
+            rate: Decimation::Off,
+            every: run.samples(self.settings.trace_every as f64).round().max(1.0) as usize,
+            ..Tracking::of(TrackRequest::of(method.clone()))
+        };
+        if !method.starts_itself() {
+            let structure = method.usual_structure();
             match from_cell.orders(structure) {
-                Ok(orders) => TrackOptions {
-                    start: StartAt::Span(Some((windows[0].from_s, windows[0].to_s))),
-                    ..TrackOptions::new(method.clone(), structure, *orders)
-                },
+                Ok(orders) => {
+                    let has = |name: &str| name == "nk" || structure.polynomials().contains(&name[1..]);
+                    let named = orders.named().into_iter().filter(|(name, _)| has(name));
+                    tracking.recursion.orders = named.map(|(name, n)| (name.to_owned(), n..=n)).collect();
+                    tracking.start_span_s = Some((windows[0].from_s, windows[0].to_s));
+                }
                 Err(reason) => return self.rows.failed(None, &label, reason),
             }
-        };
-        let every = run.samples(self.settings.trace_every as f64).round().max(1.0);
-        let trace = match track(record, &options, every as usize) {
-            Ok(trace) => trace,
+        }
+        let tracked = match tracking.run(Recordings::of_records([run.record.clone()]), None, &|| ()) {
+            Ok(tracked) => tracked,
             Err(error) => return self.rows.failed(None, &label, &error.to_string()),
         };
+        let trace = tracked.trace;
+        self.rows.judged(&label, &tracked.verdict);
         self.rows.trace_rows(&trace);
         for window in &windows[..2] {
             for (name, values) in traces::values_within(&trace, window.from_s, window.to_s) {

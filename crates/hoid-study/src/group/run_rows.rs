@@ -4,7 +4,7 @@
 use hoid_ident::{Fit, frequency::Crossover};
 use hoid_io::{OutputTable, TableSchema};
 use hoid_model::{
-    Complex64, ContinuousTransferFunction, NotConvertible, PolynomialModel, Record,
+    Complex64, ContinuousTransferFunction, NotConvertible, PolynomialModel, Record, Verdict, VerdictLevel,
     uncertainty::{Estimate, OperatorEstimate},
 };
 use hoid_track::Trace;
@@ -216,6 +216,17 @@ impl<'a> RunRows<'a> {
         self.begin(Some(window), estimator);
         self.estimates.text("status", "not convertible");
         self.estimates.text("reason", reason);
+    }
+
+    /// What speaks against a recursion over the whole run; of one that is trustworthy nothing.
+    pub fn judged(&mut self, estimator: &str, verdict: &Verdict) {
+        if verdict.level == VerdictLevel::Trustworthy {
+            return;
+        }
+        let reasons: Vec<&str> = verdict.reasons().collect();
+        self.begin(None, estimator);
+        self.estimates.text("status", verdict.level.name());
+        self.estimates.text("reason", &reasons.join("; "));
     }
 
     /// What could not be estimated, and why.
