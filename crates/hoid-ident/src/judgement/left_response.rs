@@ -15,7 +15,8 @@
 //! sums over blocks of 2 s, with Hotelling's `T^2`, which holds whatever the size of the remnant does (H.
 //! Hotelling, *Annals of Mathematical Statistics* 2 (1931) 360-378). The larger p-value counts.
 //!
-//! Signals are thinned to [`RATE_HZ`] at most; residuals beyond 3.5 standard deviations count as such.
+//! Signals are thinned to [`RATE_HZ`] at most. Residuals count in full: the pulses of a person who moves a stick by
+//! pulses are their response to e, and what limits would take off them looks like a response that is missed.
 
 use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ChiSquared, ContinuousCDF, FisherSnedecor};
@@ -72,7 +73,7 @@ pub fn left_response(
     if !z.iter().all(|v| v.is_finite()) {
         return None;
     }
-    let Whitened { v, d, x: xd, eps, .. } = Whitened::of(columns, u, &rows)?;
+    let Whitened { v, d, x: xd, eps, .. } = Whitened::of(columns, u, &rows, f64::INFINITY)?;
     let lagged = lags(&v);
     let known = DMatrix::from_fn(n - NOISE, p + NOISE, |i, j| match j {
         j if j < p => xd[(i, j)],

@@ -1,7 +1,7 @@
 //! Least squares behind an autoregression: what remains of u when some columns are taken out, white.
 //!
 //! Of `u = X b + level + v`, `D v = eps`, noise model of order [`NOISE`] and b in turn, residuals beyond
-//! [`LIMIT`] standard deviations limited to it.
+//! so many standard deviations limited to it where a limit is asked for.
 
 use nalgebra::{DMatrix, DVector};
 
@@ -9,8 +9,8 @@ use nalgebra::{DMatrix, DVector};
 pub(super) const NOISE: usize = 16;
 /// Rate to which signals are thinned, Hz.
 const RATE_HZ: f64 = 50.0;
-/// Standard deviations beyond which a residual is limited.
-const LIMIT: f64 = 3.5;
+/// Standard deviations beyond which a residual is an outlier.
+pub(super) const LIMIT: f64 = 3.5;
 /// Share of the power of u below which v is rounding.
 const EXACT: f64 = 1e-18;
 /// Rounds of noise model and least squares.
@@ -37,8 +37,8 @@ pub(super) struct Whitened {
 
 impl Whitened {
     /// Of these samples of columns and u; `None` where something is no number, or columns are not independent, or
-    /// nothing but rounding is left.
-    pub fn of(columns: &[Vec<f64>], u: &[f64], samples: &[usize]) -> Option<Self> {
+    /// nothing but rounding is left. Residuals are limited to `limit` standard deviations.
+    pub fn of(columns: &[Vec<f64>], u: &[f64], samples: &[usize], limit: f64) -> Option<Self> {
         let (n, p) = (samples.len(), columns.len() + 1);
         let x = DMatrix::from_fn(n, p, |i, j| columns.get(j).map_or(1.0, |c| c[samples[i]]));
         let y = DVector::from_fn(n, |i, _| u[samples[i]]);
@@ -50,10 +50,10 @@ impl Whitened {
         let mut b = DVector::zeros(p);
         for _ in 0..ROUNDS {
             let (xd, yd) = (whitened(&x, &d), whitened_vector(&y, &d));
-            b = solution(&xd, &limited(&xd, &yd)?)?;
+            b = solution(&xd, &limited(&xd, &yd, limit)?)?;
             v = &y - &x * &b;
             let lags = lags(&v);
-            d = solution(&lags, &limited(&lags, &tail(&v))?)?
+            d = solution(&lags, &limited(&lags, &tail(&v), limit)?)?
                 .iter()
                 .map(|d| -d)
                 .collect();
@@ -61,7 +61,7 @@ impl Whitened {
         if v.norm_squared() <= EXACT * y.norm_squared() {
             return None;
         }
-        let eps = clipped(&whitened_vector(&v, &d));
+        let eps = clipped(&whitened_vector(&v, &d), limit);
         let x = whitened(&x, &d);
         Some(Self { b, v, d, x, eps })
     }
@@ -92,14 +92,15 @@ pub(super) fn lags(v: &DVector<f64>) -> DMatrix<f64> {
 }
 
 /// y with what is far from its fit nearer to it.
-fn limited(x: &DMatrix<f64>, y: &DVector<f64>) -> Option<DVector<f64>> {
+fn limited(x: &DMatrix<f64>, y: &DVector<f64>, limit: f64) -> Option<DVector<f64>> {
     let fit = x * solution(x, y)?;
-    Some(&fit + clipped(&(y - &fit)))
+    Some(&fit + clipped(&(y - &fit), limit))
 }
 
-pub(super) fn clipped(eps: &DVector<f64>) -> DVector<f64> {
-    let most = LIMIT * (eps.norm_squared() / eps.len() as f64).sqrt();
-    eps.map(|v| v.clamp(-most, most))
+fn clipped(eps: &DVector<f64>, limit: f64) -> DVector<f64> {
+    let most = limit * (eps.norm_squared() / eps.len() as f64).sqrt();
+    // No limit for residuals that are all zero is no number; min and max leave it out.
+    eps.map(|v| v.max(-most).min(most))
 }
 
 /// Least squares by columns of unit length; `None` where they are not independent.

@@ -13,7 +13,7 @@ use super::{
     blocks::{BLOCK_S, ScoreBlock},
     search::{Change, Constancy, Course, Direction, drifts, sets, strongest_among, sways},
 };
-use crate::judgement::whitened::{NOISE, Whitened, thinning};
+use crate::judgement::whitened::{LIMIT, NOISE, Whitened, thinning};
 
 /// Fewest blocks of 2 s.
 const FEWEST: usize = 8;
@@ -47,7 +47,7 @@ fn found(columns: &[Vec<f64>], u: &[f64], samples: Range<usize>, sample_time_s: 
     if count < FEWEST || rows.last()? >= &u.len() || columns.iter().any(|c| c.len() != u.len()) {
         return None;
     }
-    let fit = Whitened::of(columns, u, &rows)?;
+    let fit = Whitened::of(columns, u, &rows, LIMIT)?;
     let (p, last) = (columns.len() + 1, columns.len() - 1);
     let blocks: Vec<ScoreBlock> = (0..count)
         .map(|k| {
