@@ -1,9 +1,10 @@
 //! The level of recorded data: one constant of u a record, estimated with the fit.
 
-use hoid_ident::level;
+use hoid_ident::{IdentError, level};
 use hoid_model::{Detrend, FaultHandling, Record, uncertainty::Estimate};
 
 use crate::{
+    AnalysisError,
     recordings::{Account, Recordings},
     settings::Setting,
 };
@@ -32,6 +33,8 @@ pub(crate) fn levels_into(
 pub(crate) struct Level {
     /// The records with it, where it was taken out.
     as_read: Option<Vec<Record>>,
+    /// What was found of it beside the means.
+    beside_means: Vec<f64>,
 }
 
 impl Level {
@@ -41,7 +44,10 @@ impl Level {
             let without = level::without_level(&data.records);
             std::mem::replace(&mut data.records, without)
         });
-        Self { as_read }
+        Self {
+            as_read,
+            beside_means: Vec::new(),
+        }
     }
 
     /// Whether it is still in the records.
@@ -54,13 +60,38 @@ impl Level {
         if self.is_kept() { Detrend::None } else { Detrend::Mean }
     }
 
+    /// Takes out what a fit with the level as an unknown has found of it beside the means.
+    pub(crate) fn refined(
+        &mut self,
+        data: &mut Recordings,
+        of: impl Fn(&Record) -> Result<Option<f64>, IdentError>,
+    ) -> Result<(), AnalysisError> {
+        for record in data.records.iter_mut().filter(|_| self.as_read.is_some()) {
+            let left = of(record)?.unwrap_or(0.0);
+            self.beside_means.push(left);
+            let mut is_output = false;
+            *record = record.clone().map_signals(|values| {
+                let by = if is_output { left } else { 0.0 };
+                values.iter_mut().for_each(|v| *v -= by);
+                is_output = true;
+            })?;
+        }
+        Ok(())
+    }
+
     /// Writes it into the accounts, and says so.
     pub(crate) fn told(
         &self,
         data: &mut Recordings,
         of: impl Fn(usize, &Record) -> Option<Estimate>,
     ) -> Option<Setting> {
-        levels_into(&mut data.accounts, self.as_read.as_ref()?, of);
+        levels_into(&mut data.accounts, self.as_read.as_ref()?, |k, record| {
+            let beside = self.beside_means.get(k).copied().unwrap_or(0.0);
+            of(k, record).map(|level| Estimate {
+                value: level.value + beside,
+                ..level
+            })
+        });
         Some(Setting::level())
     }
 }

@@ -10,6 +10,9 @@ use crate::{
     recordings::{Account, Recordings},
 };
 
+/// Most values of an input that steps.
+const MOST_LEVELS: usize = 16;
+
 impl Recordings {
     /// The recordings without their faults; one that is cut gives several. What was found and what it says
     /// of any result stands in the account of the first of them.
@@ -24,8 +27,14 @@ impl Recordings {
         };
         let one = self.names.into_iter().zip(self.records).zip(self.accounts);
         for (((name, record), account), origin) in one.zip(self.origins) {
+            let steps = of == Of::System && steps_from_level_to_level(&record);
+            let handling = match handling {
+                // A system that settles behind a step is no fault of its sensor: told, and nothing is cut.
+                FaultHandling::Bridge | FaultHandling::Cut if steps => FaultHandling::Report,
+                as_asked => as_asked,
+            };
             let mut found = mend(&record, handling)?;
-            if of == Of::System && record.sample_time().s() > SLOWEST_S {
+            if steps || (of == Of::System && record.sample_time().s() > SLOWEST_S) {
                 // No person's; of a furnace it is usual.
                 let note = |finding: Finding| Finding::note(finding.kind, finding.words);
                 found.findings = found.findings.into_iter().map(note).collect();
@@ -52,6 +61,20 @@ impl Recordings {
         }
         Ok(all)
     }
+}
+
+/// Whether the input steps between a few levels, as in a test of steps or a binary sequence.
+pub(crate) fn steps_from_level_to_level(record: &Record) -> bool {
+    let mut levels: Vec<f64> = Vec::new();
+    for value in record.input() {
+        if !levels.contains(value) {
+            levels.push(*value);
+        }
+        if levels.len() > MOST_LEVELS {
+            return false;
+        }
+    }
+    levels.len() > 1
 }
 
 /// The same records read another way, mended alike.

@@ -55,6 +55,9 @@ pub struct Estimator {
     pub loss: Loss,
     /// What the model is to be good at. Default: prediction.
     pub focus: Focus,
+    /// True where u of each record has a constant that is no response to e, an unknown as its initial states are
+    /// ([`crate::level`]); not with initial states of zero. Default false.
+    pub level: bool,
     /// True when A must be stable too, so that the model from e to u is. C and F always are.
     /// Default false.
     pub stable: bool,
@@ -74,6 +77,7 @@ impl Estimator {
             priors: BTreeMap::new(),
             loss: Loss::default(),
             focus: Focus::default(),
+            level: false,
             stable: false,
         }
     }
@@ -222,6 +226,7 @@ impl Estimator {
             constraints: self.constraints.clone(),
             priors: self.priors.clone(),
             loss: self.loss,
+            level: self.level && self.initial_state_in_use() != InitialState::Zero,
             stable: self.stable,
         }
     }

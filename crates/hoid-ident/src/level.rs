@@ -6,18 +6,25 @@
 //! `c = mean(u) - G(1) mean(e)`,
 //!
 //! so that a fit to e and u without their means ([`hoid_model::Detrend::Mean`]) is the fit with c for each record (L.
-//! Ljung, *System Identification*, 1999, section 14.1), but for the ends of the record. Its variance is
-//! `sigma^2 |H(1)|^2/n`, H = C/(A D) the noise model, and what is not known of G(1),
+//! Ljung, *System Identification*, 1999, section 14.1), but for the ends of the record and what happens in them: over a
+//! step the mean of u is no level. There c is an unknown of the fit, as the initial states are
+//! ([`crate::Estimator::level`]), and what is left of it in a record is
+//!
+//! `c = eps'z / z'z`, z the residuals of u = 1 at e = 0.
+//!
+//! Its variance is `sigma^2 |H(1)|^2/n`, H = C/(A D) the noise model, and what is not known of G(1),
 //! `mean(e)^2 var G(1)`.
 
 use hoid_model::{
-    Detrend, Record,
+    Channel, Detrend, Record,
     polynomial_model::monic,
     uncertainty::{Estimate, variance_along},
 };
 
-use crate::Fit;
+use crate::{Fit, IdentError, linalg::least_squares::dot};
 
+/// Mean square of the residuals of u = 1 below which a constant is nothing to the model.
+const LEAST: f64 = 1e-16;
 /// The channel of true gains that simulated runs carry: they have no level.
 const TRUTH: &str = "K_e";
 
@@ -36,6 +43,20 @@ pub fn without_level(records: &[Record]) -> Vec<Record> {
 }
 
 impl Fit {
+    /// The constant of u that is no response to e, by least squares over the residuals; `None` where the model makes
+    /// nothing of one, as with an integration.
+    ///
+    /// # Errors
+    /// Those of residuals.
+    pub fn constant_of(&self, record: &Record) -> Result<Option<f64>, IdentError> {
+        let ones = |name: &str, one: f64| Channel::new(name, "", vec![one; record.len()]);
+        let unit = Record::new(record.sample_time(), ones("e", 0.0), ones("u", 1.0))?;
+        let (of_record, of_unit) = (self.residuals(record)?.values, self.residuals(&unit)?.values);
+        let (products, squares) = (dot(&of_record, &of_unit), dot(&of_unit, &of_unit));
+        let found = products / squares;
+        Ok((squares > LEAST * of_unit.len() as f64 && found.is_finite()).then_some(found))
+    }
+
     /// The level c of u in a record, in the unit of u, with its standard error; the fit is one to the
     /// record without its means. `None` where the model has no static gain (an integration), no input or
     /// no noise.
@@ -134,6 +155,112 @@ mod tests {
             (level.value - twin).abs() < 0.1 * level.standard_error.unwrap(),
             "{level} and {twin}"
         );
+    }
+
+    /// `u(t) = level + y(t)`, `y(t) + a y(t-1) = b e(t-3)` after a rest.
+    fn after_a_rest(e: &[f64], level: f64) -> Record {
+        let mut y = vec![0.0; e.len()];
+        for t in 3..e.len() {
+            y[t] = 0.9 * y[t - 1] + 0.2 * e[t - 3];
+        }
+        let u = y.iter().map(|y| level + y).collect();
+        Record::new(
+            hoid_model::SampleTime::new(0.05).unwrap(),
+            Channel::new("e", "", e.to_vec()),
+            Channel::new("u", "", u),
+        )
+        .unwrap()
+    }
+
+    #[test]
+    fn over_a_step_it_is_an_unknown_and_exact() {
+        let step: Vec<f64> = (0..200).map(|t| if t < 40 { 0.0 } else { 10.0 }).collect();
+        let two: Vec<Record> = [13.5, -2.0].map(|level| after_a_rest(&step, level)).into();
+        let without = without_level(&two);
+        let orders = |na, nf| hoid_model::Orders {
+            na,
+            nb: 1,
+            nf,
+            nk: 3,
+            ..hoid_model::Orders::default()
+        };
+        for (structure, orders) in [
+            (Structure::Arx, orders(1, 0)),
+            (Structure::OutputError, orders(0, 1)),
+            (Structure::Arx, hoid_model::Orders { nb: 2, ..orders(2, 0) }),
+        ] {
+            let estimator = Estimator {
+                level: true,
+                ..Estimator::new(structure, orders)
+            };
+            let Ok(fit) = estimator.fit(&without) else {
+                // With one pole too many exact data say nothing of the second.
+                assert_eq!(orders.na, 2);
+                continue;
+            };
+            let gain = fit.model().response(0.0).re;
+            assert!((gain - 2.0).abs() < 1e-9, "{structure} {gain}");
+            for (record, level) in without.iter().zip([13.5, -2.0]) {
+                // The means took out mean(u), of which mean(e) explains a part.
+                let mean = |x: &[f64]| x.iter().sum::<f64>() / x.len() as f64;
+                let taken = mean(two[0].output()) - 13.5 + level - gain * mean(&step);
+                let found = fit.constant_of(record).unwrap().unwrap();
+                assert!((found + taken - level).abs() < 1e-8, "{structure} {found} {taken}");
+            }
+            // The means alone miss it, where a lag answers a step.
+            let beside = Estimator::new(structure, orders).fit(&without).unwrap();
+            let missed = (beside.model().response(0.0).re - 2.0).abs();
+            assert!(structure != Structure::Arx || missed > 1e-4, "{structure} {missed}");
+        }
+    }
+
+    #[test]
+    fn it_moves_steady_tracking_by_little_and_zero_states_have_none() {
+        let record = moved(&simulated(43), 0.0, 0.03);
+        let without = without_level(std::slice::from_ref(&record));
+        let plain = Estimator::new(Structure::BoxJenkins, Structure::BoxJenkins.operator_orders(29));
+        let with = Estimator {
+            level: true,
+            ..plain.clone()
+        };
+        let (beside, unknown) = (plain.fit(&without).unwrap(), with.fit(&without).unwrap());
+        assert_eq!(unknown.state_count(), beside.state_count() + 1);
+        for ((name, a), (_, b)) in beside.parameters().iter().zip(unknown.parameters()) {
+            let off = (a.value - b.value).abs() / a.standard_error.unwrap();
+            assert!(off < 0.2, "{name} {off}");
+        }
+        let zero = |level| Estimator {
+            level,
+            initial_state: Some(crate::InitialState::Zero),
+            ..plain.clone()
+        };
+        let both = [true, false].map(|level| zero(level).fit(&without).unwrap());
+        assert_eq!(both[0].model().theta(), both[1].model().theta());
+    }
+
+    #[test]
+    fn an_integration_makes_nothing_of_a_constant() {
+        let e: Vec<f64> = (0..400)
+            .map(|t| (0.31 * t as f64).sin() + (0.07 * t as f64).cos())
+            .collect();
+        let mut u = vec![0.0; 400];
+        for t in 1..400 {
+            u[t] = u[t - 1] + 0.1 * e[t - 1] + 1e-3 * (1.7 * t as f64).sin();
+        }
+        let ts = hoid_model::SampleTime::new(0.05).unwrap();
+        let record = Record::new(ts, Channel::new("e", "", e), Channel::new("u", "", u)).unwrap();
+        let orders = hoid_model::Orders {
+            na: 1,
+            nb: 1,
+            nk: 1,
+            ..hoid_model::Orders::default()
+        };
+        let exact = Estimator {
+            constraints: [("a1".to_owned(), crate::Constraint::Fixed(-1.0))].into(),
+            ..Estimator::new(Structure::Arx, orders)
+        };
+        let fit = exact.fit(std::slice::from_ref(&record)).unwrap();
+        assert_eq!(fit.constant_of(&record).unwrap(), None);
     }
 
     #[test]

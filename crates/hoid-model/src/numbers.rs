@@ -13,14 +13,20 @@ pub const Z_95: f64 = 1.959_963_984_540_054;
 const DIGITS_OF_ERROR: i32 = 2;
 const DIGITS_ALONE: i32 = 5;
 
+/// Part of a number below which an error is one of its last digits, and no uncertainty.
+const LAST_DIGITS: f64 = 16.0 * f64::EPSILON;
+/// Digits of a number that is known to its last ones.
+const ALL_DIGITS: i32 = 15;
+
 /// Value and standard error as text, both with the decimals that two significant digits of the
-/// error need. A dash for what is not finite.
+/// error need; the value with all its digits where its error is in the last ones. A dash for what is not finite.
 pub fn with_uncertainty(value: f64, standard_error: Option<f64>) -> (String, String) {
     if !value.is_finite() {
         return (DASH.to_owned(), DASH.to_owned());
     }
     match standard_error.filter(|s| s.is_finite() && *s > 0.0) {
         None => (plain(value), DASH.to_owned()),
+        Some(error) if error < LAST_DIGITS * value.abs() => (significant(value, ALL_DIGITS), DASH.to_owned()),
         Some(error) => {
             let last = last_digit(error, DIGITS_OF_ERROR);
             let exponent = exponent_for(value.abs().max(error));
@@ -145,6 +151,13 @@ mod tests {
         assert_eq!(both(0.3, 12.3), pair("0", "12"));
         assert_eq!(both(-0.001, 0.52), pair("0.00", "0.52"));
         assert_eq!(both(5.0e9, 1.0e8), pair("5.00e9", "0.10e9"));
+    }
+
+    #[test]
+    fn an_error_in_the_last_digits_is_none() {
+        assert_eq!(both(0.349_999_999_999_999_98, 1e-17), pair("0.35", DASH));
+        assert_eq!(both(-0.499_999_999_999_999_9, 1.2e-16), pair("-0.5", DASH));
+        assert_eq!(both(0.5, 1e-13), pair("0.50000000000000", "0.00000000000010"));
     }
 
     #[test]

@@ -2,13 +2,13 @@
 //! or searched.
 
 use hoid_ident::{
-    Choice, Estimator, Fit, InitialState, InstrumentalVariable, Instruments, IvMethod, Loss, SearchOptions,
+    Choice, Estimator, Fit, IdentError, InitialState, InstrumentalVariable, Instruments, IvMethod, Loss, SearchOptions,
     judgement::second_opinion,
     order_selection::{OrderRanges, default_operator_ranges, fit_or_choose},
     progress,
     settings::MethodSpec,
 };
-use hoid_model::{ContinuousTransferFunction, FaultHandling, Orders, SampleTime, Structure, theta_of};
+use hoid_model::{ContinuousTransferFunction, FaultHandling, Orders, SampleTime, Structure, Verdict, theta_of};
 
 use super::{
     BatchEstimator, Fitted, known,
@@ -23,6 +23,7 @@ use crate::{
     options::{self, AnalysisOption},
     quality::Of,
     recordings::Recordings,
+    repair::steps_from_level_to_level,
     settings::Setting,
 };
 
@@ -149,15 +150,28 @@ impl BatchEstimator for Polynomials {
 
     fn fit(with: &Identification<Self>, data: &mut Recordings) -> Result<Fitted<PolynomialFit>, AnalysisError> {
         let how = &with.estimator;
-        let level = Level::taken_out(data, how.template.structure.has_input(), with.faults);
+        let mut level = Level::taken_out(data, how.template.structure.has_input(), with.faults);
         let records = &data.records;
-        let ranges = how.ranges(records[0].sample_time())?;
+        let sample_time = records[0].sample_time();
+        let ranges = how.ranges(sample_time)?;
         let combinations = ranges.combinations()?;
-        let estimator = how.estimator(&combinations)?;
-        let used = with.settings(records[0].sample_time());
+        // Instruments have the means alone.
+        let mut estimator = Estimator {
+            level: !level.is_kept() && how.method.is_none(),
+            ..how.estimator(&combinations)?
+        };
+        let used = with.settings(sample_time);
         let mut found = Vec::new();
         let told = progress::counter("candidates", combinations.len());
-        let (mut fit, choice) = fit_or_choose(&estimator, &ranges, how.criterion, records, &told)?;
+        let search = |estimator: &Estimator| fit_or_choose(estimator, &ranges, how.criterion, records, &told);
+        let (mut fit, choice) = match search(&estimator) {
+            // What is not told from a level, as e that stands still, is fitted beside the means.
+            Err(IdentError::SingularRegressors { .. }) if estimator.level => {
+                estimator.level = false;
+                search(&estimator)?
+            }
+            other => other?,
+        };
         if let Some(method) = how.method {
             let instruments = how.instruments.clone().unwrap_or_else(|| Instruments::usual(records));
             found.push(Setting::new("method", format!("{method}, {instruments}")).given(true));
@@ -171,9 +185,21 @@ impl BatchEstimator for Polynomials {
             };
             fit = instrumental.fit(records)?;
         }
+        if estimator.level {
+            level.refined(data, |record| fit.constant_of(record))?;
+        }
+        let records = &data.records;
         let mut verdict = fit.verdict(records, choice.as_ref())?;
+        let steps = records.iter().all(steps_from_level_to_level);
+        if steps {
+            // What happens behind the steps is all that such data tell.
+            let others = verdict.findings().iter().filter(|finding| finding.kind != "stretch");
+            verdict = Verdict::of(others.cloned().collect());
+        }
         // What is asked again is the prediction error, and the loss of squares.
-        if with.faults != FaultHandling::Keep && how.method.is_none() && estimator.loss == Loss::Quadratic {
+        let is_asked_again =
+            how.method.is_none() && estimator.loss == Loss::Quadratic && !steps && fit.rounding().is_none();
+        if with.faults != FaultHandling::Keep && is_asked_again {
             let element = with.controlled_element.as_ref();
             verdict = verdict.and(second_opinion::of_polynomials(&estimator, &fit, records, element));
             // Where the level is not estimated it may matter.

@@ -14,6 +14,8 @@ use super::{
 };
 use crate::{Choice, Fit, IdentError};
 
+/// Share of the power of u below which residuals are the rounding of the data.
+const ROUNDING: f64 = 1e-22;
 /// Residuals for each unknown below which the numbers of a fit mean nothing.
 const FEWEST_RESIDUALS: usize = 5;
 /// Level at which b differs from zero.
@@ -31,11 +33,25 @@ impl Fit {
         all.extend(self.too_few());
         all.extend(self.system_findings());
         // Residuals that are rounding say nothing.
-        if self.covariance.is_some() {
+        if let Some(share) = self.rounding() {
+            all.push(Finding::note(
+                "no-noise",
+                format!(
+                    "there is no noise: the model explains u to {:.0e} of its size; error bars are those of the digits of the data",
+                    share.sqrt()
+                ),
+            ));
+        } else if self.covariance.is_some() {
             all.extend(self.residual_findings(&self.residual_measures(records)?));
             all.extend(self.constancy_findings(records));
         }
         Ok(Verdict::of(all))
+    }
+
+    /// What the residuals are of u, as a share of its power, where that is the rounding of the data.
+    pub fn rounding(&self) -> Option<f64> {
+        let share = self.loss / self.output_variance;
+        (share < ROUNDING).then_some(share)
     }
 
     /// Fewer residuals than the unknowns need.

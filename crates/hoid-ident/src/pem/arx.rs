@@ -9,8 +9,8 @@
 //! equations has an error of `cond(Phi' Phi) eps`; one step of refinement from the residuals
 //! themselves, `theta + (Phi' Phi)^-1 Phi' (y - Phi theta)`, squares that factor (A. Bjorck,
 //! *Numerical Methods for Least Squares Problems*, 1996, sec. 2.9.3). Where the regressors are too
-//! close to dependence for it, where the fit is exact, and where zeros stand before the record, QR
-//! with column pivoting decides and solves.
+//! close to dependence for it, where the fit is exact, where u has a level, and where zeros stand before the
+//! record, QR with column pivoting decides and solves.
 
 use hoid_model::{Orders, SampleTime, Structure};
 use nalgebra::{DMatrix, DVector};
@@ -62,11 +62,14 @@ pub(crate) fn fit(structure: Structure, criterion: &Criterion<'_>, sample_time: 
 
 /// Least squares over all records, residuals from sample `first` on.
 fn regress(orders: &Orders, data: &[Data<'_>], first: usize) -> Result<Regression, IdentError> {
-    if let Some(solved) = by_normal_equations(orders, data, first) {
+    let levels: Vec<usize> = (0..data.len()).filter(|k| data[*k].level).collect();
+    if levels.is_empty()
+        && let Some(solved) = by_normal_equations(orders, data, first)
+    {
         return Ok(solved);
     }
     let rows: usize = data.iter().map(|d| d.u.len() - first).sum();
-    let mut columns = Vec::with_capacity(orders.parameters() * rows);
+    let mut columns = Vec::with_capacity((orders.parameters() + levels.len()) * rows);
     let mut lagged = |signal: &[f64], lag: usize, sign: f64| {
         columns.extend(std::iter::repeat_n(
             0.0,
@@ -83,17 +86,30 @@ fn regress(orders: &Orders, data: &[Data<'_>], first: usize) -> Result<Regressio
     for j in 0..orders.nb {
         data.iter().for_each(|d| lagged(d.e, orders.nk + j, 1.0));
     }
+    // A level is a column of ones over its record.
+    for level in &levels {
+        for (k, d) in data.iter().enumerate() {
+            let one = if k == *level { 1.0 } else { 0.0 };
+            columns.extend(std::iter::repeat_n(one, d.u.len() - first));
+        }
+    }
     let mut y: Vec<f64> = data.iter().flat_map(|d| &d.u[first..]).copied().collect();
     let solved = LeastSquares::factor(&mut columns, &mut y);
     if !solved.has_full_rank() {
+        let mut names = orders.parameter_names();
+        names.extend(levels.iter().map(|k| format!("level of record {}", k + 1)));
         return Err(IdentError::SingularRegressors {
-            columns: solved.describe_dependence(&orders.parameter_names()),
+            columns: solved.describe_dependence(&names),
         });
     }
+    let (p, all) = (orders.na + orders.nb, orders.na + orders.nb + levels.len());
+    let mut theta = solved.solution();
+    theta.truncate(p);
+    let inverse = solved.inverse_gram();
     Ok(Regression {
-        theta: solved.solution(),
+        theta,
         sum_of_squares: solved.residual_sum_of_squares,
-        inverse_gram: solved.inverse_gram(),
+        inverse_gram: (0..p * p).map(|k| inverse[k / p * all + k % p]).collect(),
     })
 }
 

@@ -25,6 +25,8 @@ pub(crate) struct FitSettings {
     pub constraints: BTreeMap<String, Constraint>,
     pub priors: BTreeMap<String, Prior>,
     pub loss: Loss,
+    /// True where u of each record has a level.
+    pub level: bool,
     /// True when A must be stable too.
     pub stable: bool,
 }
@@ -47,7 +49,13 @@ impl FitSettings {
         }
         let criterion = Criterion {
             orders: self.orders,
-            data: Data::of(records),
+            data: Data::of(records)
+                .into_iter()
+                .map(|data| Data {
+                    level: self.level,
+                    ..data
+                })
+                .collect(),
             initial: self.initial_state,
             first,
             weights: None,

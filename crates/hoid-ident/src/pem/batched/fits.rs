@@ -26,7 +26,8 @@ pub(crate) fn fit_each(
     let plain = settings.structure == Structure::BoxJenkins
         && (o.nb > 0 && o.nc == 0 && o.nf > 0)
         && settings.initial_state == InitialState::Estimate
-        && settings.is_unconstrained();
+        && settings.is_unconstrained()
+        && !settings.level;
     let n = records.first()?.len();
     if !plain || records.iter().any(|record| record.len() != n) {
         return None;
