@@ -11,7 +11,9 @@ use std::{
 
 use tempfile::TempDir;
 
-use common::{bad, good, hoid};
+use hoid::model::numbers::with_uncertainty;
+
+use common::{bad, good, hoid, json, simulated};
 
 /// A simulated run `in.csv`, a group `g` of two runs, a plan.
 fn workplace() -> TempDir {
@@ -331,4 +333,35 @@ fn signals_end_with_their_code_and_leave_nothing() {
                 .all(|p| !p.file_name().to_string_lossy().ends_with(".part"))
         );
     }
+}
+
+/// Estimates with errors and intervals, for a paper: what the JSON says.
+#[test]
+fn a_result_is_a_table_for_a_paper() {
+    let directory = simulated();
+    let d = directory.path();
+    let identify = ["identify", "c1.csv", "--controlled-element", "90/(s(s+6))", "--json"];
+    let found = json(d, &[&identify, ["--table", "c1.tex"].as_slice()].concat());
+    let latex = fs::read_to_string(d.join("c1.tex")).unwrap();
+    let k_e = &found["parameters"][0];
+    let written = with_uncertainty(k_e["value"].as_f64().unwrap(), k_e["standard_error"].as_f64());
+    assert!(
+        latex.contains(&format!("$K_\\mathrm{{e}}$ & ${} \\pm {}$ &", written.0, written.1)),
+        "{latex}"
+    );
+    assert!(latex.contains("$\\omega_\\mathrm{c}$") && latex.ends_with("\\bottomrule\n\\end{tabular}\n"));
+    good(d, &["describe", "c1.csv", "--excitation", "f_t", "--table", "lines.md"]);
+    let lines = fs::read_to_string(d.join("lines.md")).unwrap();
+    assert!(
+        lines.contains("| omega_rad_s | gain_db | phase_deg |") && lines.lines().count() == 13,
+        "{lines}"
+    );
+    good(d, &["track", "c1.csv", "--out", "trace.csv", "--table", "last.csv"]);
+    let last = fs::read_to_string(d.join("last.csv")).unwrap();
+    assert!(
+        last.contains("quantity,value,standard_error,low,high,unit,verdict\nK_e,"),
+        "{last}"
+    );
+    let (_, refused) = bad(d, &["identify", "c1.csv", "--table", "c1.docx"]);
+    assert!(refused.contains(".tex, .md, .csv"), "{refused}");
 }

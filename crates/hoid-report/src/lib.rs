@@ -42,6 +42,7 @@
 //! | [`Report::of_operator`], [`operator_figure`], [`sentence_of_operator`] | the page of the operator of a person |
 //! | [`TrackReport`], [`TraceSection`], [`BatchLine`], [`batch_fit`], [`default_batch_fits`] | one such page about recursive estimates over a record |
 //! | [`GroupReport`], [`GroupTables`], [`write_group_pages`], [`group_figures`] | one such page about a group of recorded runs |
+//! | [`PaperTable`] | a result as a table for a paper |
 //! | [`facts`] | the settings on all of these pages |
 //! | [`figures`] | the figures of these pages, each as an SVG text of its own |
 //! | [`numbers`] | numbers with as many digits as their standard error allows |
@@ -59,6 +60,7 @@ mod model_figure;
 mod model_section;
 mod operator;
 mod page;
+mod paper_table;
 mod report;
 mod tables;
 mod track;
@@ -74,5 +76,6 @@ pub use model_figure::{model_figure, model_picture};
 pub use model_section::{ModelSection, known_operator};
 pub use operator::{operator_figure, sentence_of_operator, undetermined};
 pub use page::{render_with, write_page, write_report};
+pub use paper_table::PaperTable;
 pub use report::{Picture, Report};
 pub use track::{BatchFit, BatchLine, TraceSection, TrackReport, batch_fit, default_batch_fits};

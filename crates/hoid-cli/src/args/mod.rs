@@ -54,6 +54,7 @@ pub use recursion::{RecursionArgs, StreamArgs, TrackArgs};
 pub use settings::with_settings;
 pub use settings::{flag, in_words, methods_with};
 pub use shell::{CompletionsArgs, ManArgs};
+pub use show::ShowArgs;
 pub use simulate::{DemoArgs, MarginsArgs, ScenarioChoice, SimulateArgs, StateName};
 pub use study::{ReproduceArgs, StudyCommand, StudyMergeArgs, StudyRunArgs};
 pub use udp::UdpPlaces;

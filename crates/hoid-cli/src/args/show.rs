@@ -1,8 +1,10 @@
 //! How results are shown, the same for all commands that identify.
 
+use std::path::PathBuf;
+
 use clap::Args;
 
-#[derive(Debug, Clone, Copy, Args)]
+#[derive(Debug, Clone, Args)]
 pub struct ShowArgs {
     /// Print what is behind the answer as well: other methods, candidates, roots, tests of residuals,
     /// and every setting
@@ -11,4 +13,7 @@ pub struct ShowArgs {
     /// Print one JSON object instead of tables
     #[arg(long)]
     pub json: bool,
+    /// Write the estimates with errors and intervals as a table for a paper: .tex (booktabs), .md, .csv, .parquet ...
+    #[arg(long, value_name = "FILE")]
+    pub table: Option<PathBuf>,
 }

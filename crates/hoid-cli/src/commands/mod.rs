@@ -10,6 +10,7 @@ pub mod identify;
 pub mod info;
 pub mod lab;
 pub mod margins;
+mod paper_table;
 mod places;
 pub mod reading;
 pub mod reproduce;

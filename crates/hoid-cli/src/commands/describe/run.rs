@@ -10,7 +10,7 @@ use serde_json::Value;
 use super::form::Shown;
 use crate::{
     args::DescribeArgs,
-    commands::{figure, places, reading},
+    commands::{figure, paper_table, places, reading},
     error::CliError,
     json, output,
 };
@@ -20,7 +20,12 @@ pub fn run(args: &DescribeArgs) -> Result<(), CliError> {
         figure::check(path)?;
     }
     let inputs: Vec<&Path> = args.records.iter().map(PathBuf::as_path).collect();
-    places::check(&inputs, &[args.picture.figure.as_deref()], &[])?;
+    paper_table::check(&args.show)?;
+    places::check(
+        &inputs,
+        &[args.picture.figure.as_deref(), args.show.table.as_deref()],
+        &[],
+    )?;
     let (reading, offsets) = without_offsets(&reading::of(&args.read, Some(&args.mask), true)?);
     let read = reading.files(&args.records, reading::told)?;
     let describing = Describing {
@@ -48,6 +53,7 @@ pub fn run(args: &DescribeArgs) -> Result<(), CliError> {
             args.picture.width,
         )?;
     }
+    paper_table::write(&args.show, || Ok(described.json()))?;
     if args.show.json {
         json::print(&Value::Object(described.json()))?;
     } else {

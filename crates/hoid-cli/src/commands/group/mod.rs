@@ -19,7 +19,7 @@ use hoid::study::{
 
 use form::Finished;
 
-use super::{figure, places, study::with_progress};
+use super::{figure, paper_table, places, study::with_progress};
 use crate::{
     args::{GroupArgs, GroupCommand, GroupInitArgs, GroupRunArgs, SimulateGroupArgs},
     error::CliError,
@@ -167,6 +167,8 @@ fn analyse(path: &Path, out: &Path, args: &GroupRunArgs) -> Result<(), CliError>
         figure::check(figure)?;
         places::check(&[&path], &[Some(figure)], &[])?;
     }
+    paper_table::check(&args.show)?;
+    places::check(&[&path], &[args.show.table.as_deref()], &[])?;
     let manifest = Manifest::read(&path)?;
     // What goes on writes no manifest.
     if !args.resume {
@@ -194,6 +196,10 @@ fn analyse(path: &Path, out: &Path, args: &GroupRunArgs) -> Result<(), CliError>
         tables: shown(&outcome.tables),
         pages,
     };
+    paper_table::write(&args.show, || {
+        let object = finished.to_json();
+        Ok(object.as_object().cloned().unwrap_or_default())
+    })?;
     if args.show.json {
         json::print(&finished.to_json())?;
     } else {

@@ -5,7 +5,12 @@ use hoid::report::{Report, operator_figure, write_report};
 use serde_json::Value;
 
 use super::family_form::Found;
-use crate::{args::IdentifyArgs, commands::figure, error::CliError, json, output};
+use crate::{
+    args::IdentifyArgs,
+    commands::{figure, paper_table},
+    error::CliError,
+    json, output,
+};
 
 pub fn run(
     args: &IdentifyArgs,
@@ -34,6 +39,7 @@ pub fn run(
         let page = write_report(directory, &Report::of_operator(&identified).to_html()?)?;
         output::notice("", format!("report: {}", page.display()));
     }
+    paper_table::write(&args.show, || Ok(identified.json()?))?;
     if args.show.json {
         let mut object = identified.json()?;
         if let Some((file, quality)) = &found.validation {

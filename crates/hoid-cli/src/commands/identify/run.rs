@@ -18,7 +18,7 @@ use serde_json::Value;
 use super::{family, request, sigmoid};
 use crate::{
     args::IdentifyArgs,
-    commands::{figure, places, reading},
+    commands::{figure, paper_table, places, reading},
     error::CliError,
     family_operator, json, output, text,
 };
@@ -26,6 +26,7 @@ use crate::{
 pub fn run(args: &IdentifyArgs) -> Result<(), CliError> {
     let asked = request::asked(args)?;
     check_places(args)?;
+    paper_table::check(&args.show)?;
     if let Some(path) = &args.picture.figure {
         figure::check(path)?;
     }
@@ -105,6 +106,7 @@ fn show<F: BatchAnswer>(
         let page = write_report(directory, &report.to_html()?)?;
         output::notice("", format!("report: {}", page.display()));
     }
+    paper_table::write(&args.show, || Ok(answer.object()))?;
     if args.show.json {
         json::print(&Value::Object(found.with_state(answer.object())))?;
     } else {
@@ -127,7 +129,11 @@ fn check_places(args: &IdentifyArgs) -> Result<(), CliError> {
     inputs.extend(args.options.text("prior").map(Path::new));
     places::check(
         &inputs,
-        &[args.picture.figure.as_deref(), args.trace.as_deref()],
+        &[
+            args.picture.figure.as_deref(),
+            args.trace.as_deref(),
+            args.show.table.as_deref(),
+        ],
         &[args.report.as_deref()],
     )
 }

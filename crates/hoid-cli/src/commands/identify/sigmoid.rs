@@ -10,7 +10,7 @@ use hoid::model::{Channel, Form, GainUnit, Record, Verdict};
 use hoid::report::numbers;
 use serde_json::Value;
 
-use crate::{args::IdentifyArgs, error::CliError, json, output, text};
+use crate::{args::IdentifyArgs, commands::paper_table, error::CliError, json, output, text};
 
 pub fn run(
     args: &IdentifyArgs,
@@ -38,6 +38,7 @@ pub fn run(
         tests: &tests,
         settings: &identified.settings,
     };
+    paper_table::write(&args.show, || Ok(identified.json()?))?;
     if args.show.json {
         json::print(&Value::Object(identified.json()?))?;
     } else {

@@ -8,7 +8,7 @@ use serde_json::Value;
 use super::{page, report};
 use crate::{
     args::TrackArgs,
-    commands::{figure, places, reading},
+    commands::{figure, paper_table, places, reading},
     error::CliError,
     json, output, recursion,
 };
@@ -36,9 +36,14 @@ pub fn run(args: &TrackArgs) -> Result<(), CliError> {
     .into_iter()
     .flatten()
     .collect();
+    paper_table::check(&args.show)?;
     places::check(
         &inputs,
-        &[Some(&args.out), args.picture.figure.as_deref()],
+        &[
+            Some(&args.out),
+            args.picture.figure.as_deref(),
+            args.show.table.as_deref(),
+        ],
         &[args.report.as_deref()],
     )?;
     let tracking = recursion::tracking(args)?;
@@ -55,6 +60,7 @@ pub fn run(args: &TrackArgs) -> Result<(), CliError> {
         output::notice("", format!("report: {}", page.display()));
     }
     let out = args.out.display().to_string();
+    paper_table::write(&args.show, || Ok(tracked.json()?))?;
     if args.show.json {
         let mut object = tracked.json()?;
         object.insert("trace".to_owned(), Value::String(out));

@@ -1,0 +1,499 @@
+//! A result as a table for a paper: estimates with errors and intervals, in LaTeX (`.tex`, booktabs), Markdown
+//! (`.md`), or as data (CSV and the other formats of tables).
+//!
+//! The table is read from the object of the result ([`hoid_analysis::json`]), so that it says what the JSON says. In LaTeX
+//! and Markdown a value has the digits that two digits of its error need; as data every number has all of its own, an
+//! error in a column behind its value.
+
+use std::path::Path;
+
+use hoid_io::{ColumnValues, IoError, OutputColumn, OutputTable, check_table_path, write_atomically, write_table};
+use hoid_model::numbers::{DASH, Z_95, plain, with_uncertainty};
+use serde_json::{Map, Value};
+
+/// A table of a result.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PaperTable {
+    /// What it is of, a line each.
+    comments: Vec<String>,
+    columns: Vec<Column>,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+struct Column {
+    name: String,
+    cells: Cells,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+enum Cells {
+    Text(Vec<String>),
+    Number(Vec<f64>),
+    /// Values with their standard errors, which are in a column of this name as data.
+    Estimate(Vec<[f64; 2]>, String),
+    /// Ends of intervals, written with the digits of these errors.
+    End(Vec<[f64; 2]>),
+}
+
+/// An estimate of the object.
+struct Row {
+    quantity: String,
+    value: f64,
+    error: f64,
+    interval: [f64; 2],
+    unit: String,
+    worth: String,
+}
+
+impl PaperTable {
+    /// The table of a result, by its object; `None` where nothing in it is an estimate.
+    pub fn of(object: &Map<String, Value>) -> Option<Self> {
+        let text = |key: &str| object.get(key).and_then(Value::as_str).unwrap_or_default();
+        let level = object.get("verdict").and_then(|verdict| verdict["level"].as_str());
+        let comments = vec![format!(
+            "hoid {}: {}, {}",
+            text("hoid"),
+            [text("kind"), text("group")].concat(),
+            level.unwrap_or_default()
+        )];
+        let columns = match (object.get("people"), object.get("lines")) {
+            (Some(people), _) => of_people(people.as_array()?),
+            (None, Some(lines)) if text("kind") == "description" => of_lines(lines.as_array()?),
+            _ => of_estimates(object),
+        };
+        let filled = columns.first().is_some_and(|column| column.cells.len() > 0);
+        filled.then_some(Self { comments, columns })
+    }
+
+    /// Whether a table can be written to a place of this name.
+    ///
+    /// # Errors
+    /// [`IoError::UnknownFormat`].
+    pub fn check(path: &Path) -> Result<(), IoError> {
+        match Markup::of(path) {
+            Some(_) => Ok(()),
+            None => check_table_path(path),
+        }
+    }
+
+    /// Writes it, whole or not at all, in the format that the extension stands for.
+    ///
+    /// # Errors
+    /// Those of [`PaperTable::check`] and of writing.
+    pub fn write(&self, path: &Path) -> Result<(), IoError> {
+        match Markup::of(path) {
+            Some(markup) => {
+                let text = self.text(markup);
+                write_atomically(path, |file| file.write_all(text.as_bytes()))
+            }
+            None => write_table(path, &self.data()),
+        }
+    }
+
+    fn data(&self) -> OutputTable {
+        let mut columns = Vec::new();
+        for Column { name, cells } in &self.columns {
+            let mut add = |name: &str, values| {
+                columns.push(OutputColumn {
+                    name: name.to_owned(),
+                    values,
+                });
+            };
+            let first = |pairs: &[[f64; 2]], place: usize| pairs.iter().map(|pair| pair[place]).collect();
+            match cells {
+                Cells::Text(all) => add(name, ColumnValues::Text(all.clone())),
+                Cells::Number(all) => add(name, ColumnValues::Real(all.clone())),
+                Cells::End(all) => add(name, ColumnValues::Real(first(all, 0))),
+                Cells::Estimate(all, of_error) => {
+                    add(name, ColumnValues::Real(first(all, 0)));
+                    add(of_error, ColumnValues::Real(first(all, 1)));
+                }
+            }
+        }
+        OutputTable {
+            comments: self.comments.clone(),
+            columns,
+        }
+    }
+
+    fn text(&self, markup: Markup) -> String {
+        let shown: Vec<&Column> = self
+            .columns
+            .iter()
+            .filter(|column| column.cells.says_something())
+            .collect();
+        let rows = self.columns.first().map_or(0, |column| column.cells.len());
+        let headings = shown.iter().map(|column| markup.name(&column.name)).collect();
+        let body = (0..rows).map(|row| shown.iter().map(|column| column.cells.cell(row, markup)).collect());
+        let right: Vec<bool> = shown
+            .iter()
+            .map(|column| !matches!(column.cells, Cells::Text(_)))
+            .collect();
+        markup.table(&self.comments, &right, headings, body.collect())
+    }
+}
+
+impl Cells {
+    fn len(&self) -> usize {
+        match self {
+            Self::Text(all) => all.len(),
+            Self::Number(all) => all.len(),
+            Self::Estimate(all, _) | Self::End(all) => all.len(),
+        }
+    }
+
+    /// A column in which every cell is empty is left out of a text.
+    fn says_something(&self) -> bool {
+        match self {
+            Self::Text(all) => all.iter().any(|text| !text.is_empty()),
+            Self::Number(all) => all.iter().any(|v| v.is_finite()),
+            Self::Estimate(all, _) | Self::End(all) => all.iter().any(|pair| pair[0].is_finite()),
+        }
+    }
+
+    fn cell(&self, row: usize, markup: Markup) -> String {
+        match self {
+            Self::Text(all) => markup.name(&all[row]),
+            Self::Number(all) => markup.number(&plain(all[row]), DASH),
+            Self::End(all) => markup.number(&with_uncertainty(all[row][0], Some(all[row][1])).0, DASH),
+            Self::Estimate(all, _) => {
+                let (value, error) = with_uncertainty(all[row][0], Some(all[row][1]));
+                markup.number(&value, &error)
+            }
+        }
+    }
+}
+
+fn column(name: &str, cells: Cells) -> Column {
+    Column {
+        name: name.to_owned(),
+        cells,
+    }
+}
+
+/// A number of the object; what is null is none.
+fn number(value: &Value) -> f64 {
+    value.as_f64().unwrap_or(f64::NAN)
+}
+
+/// Parameters, those of the operator where they stand apart, and the loop.
+fn of_estimates(object: &Map<String, Value>) -> Vec<Column> {
+    let none = Value::Null;
+    let at = |object: &Map<String, Value>, key: &str| object.get(key).cloned().unwrap_or_default();
+    let worth = &object.get("verdict").unwrap_or(&none)["of"];
+    // A trace is known by its last row.
+    let last = object
+        .get("kind")
+        .filter(|kind| *kind == "trace")
+        .and(object.get("last"));
+    let of = last.and_then(Value::as_object).unwrap_or(object);
+    let mut rows: Vec<Row> = Vec::new();
+    for p in at(of, "parameters").as_array().into_iter().flatten() {
+        rows.push(row(p["name"].as_str().unwrap_or_default(), p, worth));
+    }
+    let known = |rows: &[Row], name: &str| rows.iter().any(|row| row.quantity == name);
+    for (name, p) in at(of, "operator").as_object().into_iter().flatten() {
+        if p["value"].is_number() && !known(&rows, name) && object.get("form").is_none() {
+            rows.push(row(name, p, worth));
+        }
+    }
+    for (name, p) in at(of, "open_loop").as_object().into_iter().flatten() {
+        if p["value"].is_number() {
+            rows.push(row(name, p, worth));
+        }
+    }
+    let pairs = |of: &dyn Fn(&Row) -> f64| rows.iter().map(|row| [of(row), row.error]).collect();
+    let texts = |of: &dyn Fn(&Row) -> &String| Cells::Text(rows.iter().map(|row| of(row).clone()).collect());
+    vec![
+        column("quantity", texts(&|row| &row.quantity)),
+        column(
+            "value",
+            Cells::Estimate(pairs(&|row| row.value), "standard_error".to_owned()),
+        ),
+        column("low", Cells::End(pairs(&|row| row.interval[0]))),
+        column("high", Cells::End(pairs(&|row| row.interval[1]))),
+        column("unit", texts(&|row| &row.unit)),
+        column("verdict", texts(&|row| &row.worth)),
+    ]
+}
+
+fn row(name: &str, p: &Value, worth: &Value) -> Row {
+    let (value, error) = (number(&p["value"]), number(&p["standard_error"]));
+    let interval = match p["interval"].as_array().map(Vec::as_slice) {
+        Some([low, high]) => [number(low), number(high)],
+        _ => [value - Z_95 * error, value + Z_95 * error],
+    };
+    let (quantity, of_name) = match name {
+        "crossover_rad_s" => ("crossover", "rad/s"),
+        "phase_crossover_rad_s" => ("phase_crossover", "rad/s"),
+        "phase_margin_deg" => ("phase_margin", "deg"),
+        "smallest_phase_margin_deg" => ("smallest_phase_margin", "deg"),
+        "gain_margin_db" => ("gain_margin", "dB"),
+        "T_L" | "tau_e" | "T_I" => (name, "s"),
+        "omega_nm" => (name, "rad/s"),
+        other => (other, ""),
+    };
+    let is_open = p["determined"] == false;
+    Row {
+        quantity: quantity.to_owned(),
+        value,
+        error,
+        interval,
+        unit: p["unit"].as_str().unwrap_or(of_name).to_owned(),
+        worth: match worth[quantity]["level"].as_str() {
+            _ if is_open => "not determined".to_owned(),
+            level => level.unwrap_or_default().replace('-', " "),
+        },
+    }
+}
+
+/// The lines of a describing function.
+fn of_lines(lines: &[Value]) -> Vec<Column> {
+    let all = |key: &str| lines.iter().map(|line| number(&line[key])).collect::<Vec<f64>>();
+    let both = |value: &str, error: &str| {
+        let pairs = all(value).into_iter().zip(all(error)).map(|(v, e)| [v, e]);
+        Cells::Estimate(pairs.collect(), error.to_owned())
+    };
+    vec![
+        column("omega_rad_s", Cells::Number(all("omega_rad_s"))),
+        column("gain_db", both("gain_db", "gain_se_db")),
+        column("phase_deg", both("phase_deg", "phase_se_deg")),
+        column("coherence", Cells::Number(all("coherence"))),
+    ]
+}
+
+/// The people of a group, one a row.
+fn of_people(people: &[Value]) -> Vec<Column> {
+    let text =
+        |of: &dyn Fn(&Value) -> Option<String>| Cells::Text(people.iter().map(|p| of(p).unwrap_or_default()).collect());
+    let key = |name: &'static str| move |p: &Value| p[name].as_str().map(str::to_owned);
+    let mut columns: Vec<Column> = ["subject", "condition", "run", "form"]
+        .into_iter()
+        .map(|name| column(name, text(&key(name))))
+        .collect();
+    let mut estimate = |name: &str, of: &dyn Fn(&Value) -> Value| {
+        let pairs = people.iter().map(|p| {
+            let found = of(p);
+            [number(&found["value"]), number(&found["standard_error"])]
+        });
+        columns.push(column(name, Cells::Estimate(pairs.collect(), format!("{name}_se"))));
+    };
+    let mut names: Vec<&String> = Vec::new();
+    for name in people
+        .iter()
+        .filter_map(|p| p["parameters"].as_object())
+        .flat_map(Map::keys)
+    {
+        if !names.contains(&name) {
+            names.push(name);
+        }
+    }
+    for name in names {
+        estimate(name, &|p| match &p["parameters"][name] {
+            open if open["determined"] == false => Value::Null,
+            found => found.clone(),
+        });
+    }
+    for name in ["crossover_rad_s", "phase_margin_deg"] {
+        estimate(name, &|p| p["open_loop"][name].clone());
+    }
+    let level = |p: &Value| {
+        p["verdict"]["level"]
+            .as_str()
+            .or(p["status"].as_str())
+            .map(|level| level.replace('-', " "))
+    };
+    columns.push(column("verdict", text(&level)));
+    columns
+}
+
+/// How a table is written as a text.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Markup {
+    Latex,
+    Markdown,
+}
+
+impl Markup {
+    fn of(path: &Path) -> Option<Self> {
+        let extension = path.extension()?.to_str()?.to_ascii_lowercase();
+        match extension.as_str() {
+            "tex" => Some(Self::Latex),
+            "md" => Some(Self::Markdown),
+            _ => None,
+        }
+    }
+
+    /// A name or a word; of a parameter its symbol.
+    fn name(self, text: &str) -> String {
+        let text = match text {
+            "low" => "95 % from",
+            "high" => "to",
+            other => other,
+        };
+        if self == Self::Markdown {
+            return text.replace('|', "\\|");
+        }
+        let symbol = match text {
+            "omega_rad_s" => "$\\omega$ (rad/s)",
+            "omega_nm" => "$\\omega_\\mathrm{nm}$",
+            "zeta_nm" => "$\\zeta_\\mathrm{nm}$",
+            "tau_e" => "$\\tau_\\mathrm{e}$",
+            "K_e_dot" => "$K_{\\dot e}$",
+            "K_over_T_I" => "$K/T_\\mathrm{I}$",
+            "K_e" => "$K_\\mathrm{e}$",
+            "T_L" => "$T_\\mathrm{L}$",
+            "T_I" => "$T_\\mathrm{I}$",
+            "crossover" => "$\\omega_\\mathrm{c}$",
+            "crossover_rad_s" => "$\\omega_\\mathrm{c}$ (rad/s)",
+            "phase_margin" => "$\\varphi_\\mathrm{m}$",
+            "phase_margin_deg" => "$\\varphi_\\mathrm{m}$ (deg)",
+            "gain_db" => "gain (dB)",
+            "phase_deg" => "phase (deg)",
+            _ => return text.chars().fold(String::new(), |all, c| all + &escaped(c)),
+        };
+        symbol.to_owned()
+    }
+
+    fn number(self, value: &str, error: &str) -> String {
+        match (self, error) {
+            (_, _) if value == DASH => DASH.to_owned(),
+            (Self::Markdown, DASH) => value.to_owned(),
+            (Self::Markdown, _) => format!("{value} ± {error}"),
+            (Self::Latex, DASH) => format!("${}$", power(value)),
+            (Self::Latex, _) => format!("${} \\pm {}$", power(value), power(error)),
+        }
+    }
+
+    fn table(self, comments: &[String], right: &[bool], headings: Vec<String>, rows: Vec<Vec<String>>) -> String {
+        let mut text = String::new();
+        match self {
+            Self::Latex => {
+                for comment in comments {
+                    text.push_str(&format!("% {comment}; needs \\usepackage{{booktabs}}\n"));
+                }
+                let places: String = right.iter().map(|right| if *right { 'r' } else { 'l' }).collect();
+                text.push_str(&format!("\\begin{{tabular}}{{{places}}}\n\\toprule\n"));
+                text.push_str(&format!("{} \\\\\n\\midrule\n", headings.join(" & ")));
+                for row in rows {
+                    text.push_str(&format!("{} \\\\\n", row.join(" & ").replace(DASH, "--")));
+                }
+                text.push_str("\\bottomrule\n\\end{tabular}\n");
+            }
+            Self::Markdown => {
+                for comment in comments {
+                    text.push_str(&format!("<!-- {comment} -->\n"));
+                }
+                let rule: Vec<&str> = right.iter().map(|right| if *right { "---:" } else { "---" }).collect();
+                text.push_str(&format!("| {} |\n| {} |\n", headings.join(" | "), rule.join(" | ")));
+                for row in rows {
+                    text.push_str(&format!("| {} |\n", row.join(" | ")));
+                }
+            }
+        }
+        text
+    }
+}
+
+/// A letter that LaTeX takes for itself.
+fn escaped(c: char) -> String {
+    match c {
+        '\\' => "\\textbackslash{}".to_owned(),
+        '~' => "\\textasciitilde{}".to_owned(),
+        '^' => "\\textasciicircum{}".to_owned(),
+        '&' | '%' | '$' | '#' | '_' | '{' | '}' => format!("\\{c}"),
+        other => other.to_string(),
+    }
+}
+
+/// `1.2e-7` as a power of ten.
+fn power(number: &str) -> String {
+    match number.split_once('e') {
+        Some((mantissa, exponent)) => format!("{mantissa} \\times 10^{{{exponent}}}"),
+        None => number.to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use serde_json::json;
+
+    use super::*;
+
+    fn table(object: Value) -> PaperTable {
+        PaperTable::of(object.as_object().unwrap()).unwrap()
+    }
+
+    fn operator() -> PaperTable {
+        table(json!({
+            "hoid": "0.1", "kind": "operator", "form": "lead",
+            "verdict": {"level": "trustworthy", "of": {"K_e": {"level": "trustworthy"}, "crossover": {"level": "doubtful"}}},
+            "parameters": [
+                {"name": "K_e", "unit": "V/deg", "value": 0.0897, "standard_error": 0.002, "interval": [0.0851, 0.0943]},
+                {"name": "tau_e", "unit": "s", "value": 0.28, "standard_error": null, "determined": false},
+            ],
+            "operator": {"K_e": {"value": 0.0897, "standard_error": 0.002}},
+            "open_loop": {"crossover_rad_s": {"value": 1.58, "standard_error": 0.034}, "stable": true},
+        }))
+    }
+
+    #[test]
+    fn a_result_in_latex_and_markdown() {
+        let latex = operator().text(Markup::Latex);
+        assert_eq!(
+            latex,
+            "% hoid 0.1: operator, trustworthy; needs \\usepackage{booktabs}\n\\begin{tabular}{lrrrll}\n\\toprule\n\
+             quantity & value & 95 \\% from & to & unit & verdict \\\\\n\\midrule\n\
+             $K_\\mathrm{e}$ & $0.0897 \\pm 0.0020$ & $0.0851$ & $0.0943$ & V/deg & trustworthy \\\\\n\
+             $\\tau_\\mathrm{e}$ & $0.28$ & -- & -- & s & not determined \\\\\n\
+             $\\omega_\\mathrm{c}$ & $1.580 \\pm 0.034$ & $1.513$ & $1.647$ & rad/s & doubtful \\\\\n\
+             \\bottomrule\n\\end{tabular}\n"
+        );
+        let markdown = operator().text(Markup::Markdown);
+        assert!(
+            markdown.contains("| K_e | 0.0897 ± 0.0020 | 0.0851 | 0.0943 | V/deg | trustworthy |"),
+            "{markdown}"
+        );
+    }
+
+    #[test]
+    fn as_data_every_number_stands_alone() {
+        let data = operator().data();
+        let names: Vec<&str> = data.columns.iter().map(|column| column.name.as_str()).collect();
+        assert_eq!(
+            names,
+            ["quantity", "value", "standard_error", "low", "high", "unit", "verdict"]
+        );
+        let Some(ColumnValues::Real(low)) = data.column("low") else {
+            panic!("no numbers")
+        };
+        assert!((low[2] - (1.58 - Z_95 * 0.034)).abs() < 1e-12 && low[1].is_nan());
+    }
+
+    #[test]
+    fn people_stand_side_by_side_and_what_is_open_is_left_out() {
+        let person = |subject: &str, lead: bool| {
+            let mut p = json!({
+                "subject": subject, "condition": "C_1", "form": "lead", "verdict": {"level": "not-determined"},
+                "parameters": {"K_e": {"value": 1.0, "standard_error": 0.1, "determined": lead}},
+                "open_loop": {"crossover_rad_s": {"value": 3.0, "standard_error": 0.25}},
+            });
+            if lead {
+                p["parameters"]["T_L"] = json!({"value": 0.4, "standard_error": 0.02, "determined": true});
+            }
+            p
+        };
+        let group = table(json!({"hoid": "0.1", "group": "a", "people": [person("P1", false), person("P2", true)]}));
+        let latex = group.text(Markup::Latex);
+        assert!(
+            latex.contains("P1 & C\\_1 & lead & -- & -- & $3.00 \\pm 0.25$ & not determined"),
+            "{latex}"
+        );
+        assert!(
+            latex.contains("P2 & C\\_1 & lead & $1.00 \\pm 0.10$ & $0.400 \\pm 0.020$ &"),
+            "{latex}"
+        );
+        assert!(PaperTable::of(json!({"kind": "operator"}).as_object().unwrap()).is_none());
+    }
+}
