@@ -8,7 +8,7 @@ use std::{fs, path::Path};
 
 use tempfile::TempDir;
 
-use common::{bad, good, json};
+use common::{bad, good, hoid, json, wave, write};
 
 /// A person on an integrator, recorded as time, r, y and u: two periods of 20 s, begun 3 s before the first and
 /// stopped 1 s after the last.
@@ -232,5 +232,30 @@ fn a_delay_in_seconds_is_nk() {
             code == 2 && (message.contains(says) || message.contains("unexpected")),
             "{message}"
         );
+    }
+}
+
+/// What `info` says of a cell is what a reader makes of it.
+#[test]
+fn a_cell_is_the_same_to_info_and_to_who_reads_it() {
+    let directory = TempDir::new().unwrap();
+    let d = directory.path();
+    for (cell, is_missing) in [("-", true), ("None", true), ("#N/A", true), ("abc", false), ("Inf", false)] {
+        write(d, "cells.csv", "t,e,u", 3000, |k| {
+            let (t, e, u) = wave(k);
+            match k {
+                700 => format!("{t},{cell},{u}"),
+                _ => format!("{t},{e},{u}"),
+            }
+        });
+        let told = good(d, &["info", "cells.csv"]);
+        let fill = ["identify", "cells.csv", "--structure", "arx", "--nk", "5", "--fill", "--json"];
+        let found = hoid(d, &fill);
+        let error = String::from_utf8_lossy(&found.stderr).into_owned();
+        assert_eq!(error.contains("line 702, column e"), !is_missing, "{cell}: {error}");
+        if !is_missing {
+            let said = error.lines().find_map(|line| line.strip_prefix("error: ")).unwrap();
+            assert!(told.contains(said), "{cell}: {said} not in {told}");
+        }
     }
 }

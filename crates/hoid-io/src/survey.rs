@@ -152,6 +152,8 @@ fn of_table(mut table: Table<'_>) -> (Vec<Read>, Vec<String>) {
     let rows = table.rows;
     let commas = decimal_commas(&table);
     table.notes.extend(commas);
+    let unusable = unusable(&table);
+    table.notes.extend(unusable);
     if rows > 1 && table.has_no_number_in(0) {
         let place = table.source.place(0);
         table.notes.push(format!("{place}: {UNITS_ROW}"));
@@ -184,6 +186,19 @@ fn decimal_commas(table: &Table<'_>) -> Vec<String> {
         })
     };
     table.columns.iter().enumerate().filter_map(first_text).collect()
+}
+
+/// Columns of numbers in which some cells are text, or infinite: they are refused when read, and told as they are then.
+fn unusable(table: &Table<'_>) -> Vec<String> {
+    let first = |(at, column): (usize, &Column)| {
+        let numbers = column.values.iter().any(|value| value.is_finite());
+        let row = (0..table.rows)
+            .find(|row| column.values[*row].is_infinite() || column.texts.binary_search(row).is_ok())
+            .filter(|row| numbers && !(*row == 0 && table.has_no_number_in(0)))?;
+        let comma = has_decimal_comma(&table.source.cell(row, at));
+        (!comma).then(|| table.bad_value(at, row, 0..table.rows).to_string())
+    };
+    table.columns.iter().enumerate().filter_map(first).collect()
 }
 
 fn of_arrays(contents: &Contents) -> (Vec<Read>, Vec<String>) {

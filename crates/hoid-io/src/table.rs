@@ -22,20 +22,21 @@ pub(crate) enum Cell {
     Text,
 }
 
+/// How programs write that there is no value: R, pandas, databases, spreadsheets, statistics packages, the C library of
+/// Windows.
+const MISSING: [&str; 16] = [
+    "", "na", "n/a", "null", "none", "<na>", "#n/a", "#na", "-", "--", ".", "?", "1.#ind", "-1.#ind", "1.#qnan",
+    "-1.#qnan",
+];
+
 impl Cell {
-    /// What the text of a cell means: empty, NaN, NA, N/A and null are missing values.
+    /// What the text of a cell means: empty, NaN and the words of [`MISSING`] are missing values.
     pub(crate) fn parse(text: &str) -> Self {
         let text = text.trim();
         match text.parse::<f64>() {
             Ok(value) if value.is_nan() => Self::Missing,
             Ok(value) => Self::Number(value),
-            Err(_)
-                if ["", "na", "n/a", "null"]
-                    .iter()
-                    .any(|word| text.eq_ignore_ascii_case(word)) =>
-            {
-                Self::Missing
-            }
+            Err(_) if MISSING.iter().any(|word| text.eq_ignore_ascii_case(word)) => Self::Missing,
             Err(_) => Self::Text,
         }
     }
@@ -188,7 +189,9 @@ impl Table<'_> {
         let found = self.source.cell(row, column);
         let is_last_cell = column + 1 == self.columns.len();
         let column = named(name);
-        if texts.binary_search(&row).is_ok() {
+        // At the end of a file that is cut a sign or a point is the beginning of a number.
+        let begun = is_last_cell && self.source.is_open(row) && matches!(found.as_str(), "-" | ".");
+        if begun || texts.binary_search(&row).is_ok() {
             let remedy = if has_decimal_comma(&found) {
                 DECIMAL_COMMA
             } else if is_moment(&found) {
@@ -331,10 +334,12 @@ mod tests {
 
     #[test]
     fn cells() {
-        for missing in ["", "  ", "NaN", "nan", "NA", "n/a", "NULL", "-NaN"] {
+        for missing in [
+            "", "  ", "NaN", "nan", "NA", "n/a", "NULL", "-NaN", "None", "<NA>", "#N/A", "-", "-1.#IND",
+        ] {
             assert_eq!(Cell::parse(missing), Cell::Missing, "{missing:?}");
         }
-        for text in ["1,5", "abc", "1 2", "--1", "0x10", "1_000"] {
+        for text in ["1,5", "abc", "1 2", "--1", "0x10", "1_000", "-.", "nothing"] {
             assert_eq!(Cell::parse(text), Cell::Text, "{text:?}");
         }
         assert_eq!(Cell::parse(" -1.5e-3 "), Cell::Number(-1.5e-3));

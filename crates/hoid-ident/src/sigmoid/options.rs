@@ -22,7 +22,7 @@ pub struct SigmoidChange {
     pub form: Form,
     /// With the neuromuscular part. Default true.
     pub neuromuscular: bool,
-    /// A level of u in each record, estimated: of recorded data ([`SigmoidFit::level`]). Default false.
+    /// A level of u in each record, estimated: of recorded data ([`SigmoidFit::level`](crate::SigmoidFit::level)). Default false.
     pub level: bool,
     /// What is known of the person before the data; that of T_L counts before and after the change.
     /// Default nothing.
