@@ -240,7 +240,13 @@ fn a_delay_in_seconds_is_nk() {
 fn a_cell_is_the_same_to_info_and_to_who_reads_it() {
     let directory = TempDir::new().unwrap();
     let d = directory.path();
-    for (cell, is_missing) in [("-", true), ("None", true), ("#N/A", true), ("abc", false), ("Inf", false)] {
+    for (cell, is_missing) in [
+        ("-", true),
+        ("None", true),
+        ("#N/A", true),
+        ("abc", false),
+        ("Inf", false),
+    ] {
         write(d, "cells.csv", "t,e,u", 3000, |k| {
             let (t, e, u) = wave(k);
             match k {
@@ -249,7 +255,16 @@ fn a_cell_is_the_same_to_info_and_to_who_reads_it() {
             }
         });
         let told = good(d, &["info", "cells.csv"]);
-        let fill = ["identify", "cells.csv", "--structure", "arx", "--nk", "5", "--fill", "--json"];
+        let fill = [
+            "identify",
+            "cells.csv",
+            "--structure",
+            "arx",
+            "--nk",
+            "5",
+            "--fill",
+            "--json",
+        ];
         let found = hoid(d, &fill);
         let error = String::from_utf8_lossy(&found.stderr).into_owned();
         assert_eq!(error.contains("line 702, column e"), !is_missing, "{cell}: {error}");
