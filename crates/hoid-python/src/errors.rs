@@ -15,6 +15,8 @@ use hoid_study::StudyError;
 use hoid_thesis::ThesisError;
 use pyo3::{PyErr, import_exception};
 
+use crate::in_python::in_python;
+
 import_exception!(pyhoid.errors, Error);
 import_exception!(pyhoid.errors, DataError);
 import_exception!(pyhoid.errors, OptionError);
@@ -46,29 +48,6 @@ impl From<PyErr> for Failure {
 /// A wrong option, in the words of Python.
 pub fn bad_option(message: impl Into<String>) -> Failure {
     Failure(OptionError::new_err(message.into()))
-}
-
-/// `--out-of-range` to `out_of_range`, and options that are switches to `name=True`.
-fn in_python(message: &str) -> String {
-    let mut text = String::with_capacity(message.len());
-    let mut rest = message;
-    while let Some(at) = rest.find("--") {
-        text.push_str(&rest[..at]);
-        rest = &rest[at + 2..];
-        let end = rest
-            .find(|c: char| !(c.is_ascii_lowercase() || c == '-'))
-            .unwrap_or(rest.len());
-        match &rest[..end] {
-            "" => text.push_str("--"),
-            switch @ ("resume" | "fill" | "resample") => text.push_str(&format!("{switch}=True")),
-            "from" => text.push_str("start"),
-            "to" => text.push_str("stop"),
-            other => text.push_str(&other.replace('-', "_")),
-        }
-        rest = &rest[end..];
-    }
-    text.push_str(rest);
-    text
 }
 
 impl From<UnknownName> for Failure {

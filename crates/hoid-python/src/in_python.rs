@@ -1,0 +1,101 @@
+//! Messages of the libraries, which name options as they are typed, in the words of Python.
+//!
+//! `--new-fs 50` is `new_sampling_frequency=50`, `--fill` is `fill=True`, `--trial t=1` is `trial="t=1"`. A word behind an
+//! option is its value where it is a placeholder (`HZ`), an assignment, or one of [`VALUES`]; any other goes on with
+//! the sentence.
+
+use pyo3::pyfunction;
+
+/// Options that have another name as a keyword.
+const NAMES: [(&str, &str); 6] = [
+    ("fs", "sampling_frequency"),
+    ("new-fs", "new_sampling_frequency"),
+    ("from", "start"),
+    ("to", "stop"),
+    ("for", "answers"),
+    ("orders", "na, nb, nc, nd, nf"),
+];
+/// Options without a value.
+const SWITCHES: [&str; 6] = ["drop-repeated", "fill", "resample", "resume", "robust", "stable"];
+/// Options whose assignments are a dictionary.
+const DICTIONARIES: [&str; 4] = ["scale", "offset", "fix", "bound"];
+/// Words that are values of options.
+const VALUES: [&str; 17] = [
+    "t",
+    "yes",
+    "no",
+    "cut",
+    "keep",
+    "gap",
+    "stalled",
+    "saturated",
+    "missing",
+    "mean",
+    "linear",
+    "sigmoid",
+    "lead",
+    "physical",
+    "operator",
+    "bj",
+    "population",
+];
+
+/// The message with keywords in place of options.
+#[pyfunction]
+pub fn in_python(message: &str) -> String {
+    let mut text = String::with_capacity(message.len());
+    let mut rest = message;
+    while let Some(at) = rest.find("--") {
+        text.push_str(&rest[..at]);
+        rest = &rest[at + 2..];
+        let end = rest
+            .find(|c: char| !(c.is_ascii_lowercase() || c == '-'))
+            .unwrap_or(rest.len());
+        let option = &rest[..end];
+        rest = &rest[end..];
+        if option.is_empty() {
+            text.push_str("--");
+            continue;
+        }
+        let renamed = NAMES.iter().find(|(typed, _)| *typed == option);
+        let keyword = renamed.map_or_else(|| option.replace('-', "_"), |(_, keyword)| (*keyword).to_owned());
+        text.push_str(&keyword);
+        if SWITCHES.contains(&option) {
+            text.push_str("=True");
+        } else if let Some((value, behind)) = value_behind(rest) {
+            text.push('=');
+            text.push_str(&written(option, value));
+            rest = behind;
+        }
+    }
+    text.push_str(rest);
+    text
+}
+
+/// The value that follows an option, and what comes after it.
+fn value_behind(rest: &str) -> Option<(&str, &str)> {
+    let word = rest.strip_prefix(' ')?;
+    let end = word.find([' ', ';', ')']).unwrap_or(word.len());
+    let word_end = word[..end].trim_end_matches([',', ':', '.']).len();
+    let (value, behind) = word.split_at(word_end);
+    let placeholder = !value.is_empty() && value.chars().all(|c| c.is_ascii_uppercase());
+    (placeholder || value.contains('=') || VALUES.contains(&value)).then_some((value, behind))
+}
+
+fn written(option: &str, value: &str) -> String {
+    let quoted = |text: &str| match text.parse::<f64>() {
+        Ok(_) => text.to_owned(),
+        Err(_) => format!("\"{text}\""),
+    };
+    if value.chars().all(|c| c.is_ascii_uppercase()) {
+        return value.to_owned();
+    }
+    if !DICTIONARIES.contains(&option) {
+        return quoted(value);
+    }
+    let pairs = value.split(',').filter_map(|pair| pair.split_once('='));
+    let pairs: Vec<String> = pairs
+        .map(|(name, value)| format!("\"{name}\": {}", quoted(value)))
+        .collect();
+    format!("{{{}}}", pairs.join(", "))
+}
