@@ -104,18 +104,19 @@ pub fn delay(usual: &str) -> Setting {
         .bounds(Bounds::NonNegative)
 }
 
-/// The shortest and the longest delay of an operator.
-pub fn delay_range<E: 'static>((low, high): (f64, f64), field: Field<E, (f64, f64)>) -> BatchOption<E> {
-    BatchOption::new(delay(&format!("{low}..{high}")), move |how, option, text| {
+/// The shortest and the longest delay of an operator, and how they are printed.
+pub fn delay_range<E: 'static>(
+    usual: (f64, f64),
+    field: Field<E, (f64, f64)>,
+    of: fn(&E) -> (f64, f64),
+) -> BatchOption<E> {
+    let setting = delay(&usual.text().unwrap_or_default());
+    BatchOption::new(setting, move |how, option, text| {
         let OneOrSpan(low, high) = option.read(text)?;
         *field(how) = (low, high);
         Ok(())
     })
-}
-
-/// A range of the delay in words.
-pub fn delay_words((low, high): (f64, f64)) -> String {
-    format!("{low}..{high}")
+    .printed("delay in s", move |how, _| of(how).text())
 }
 
 /// A range of orders in words.

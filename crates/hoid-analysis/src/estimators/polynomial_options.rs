@@ -58,14 +58,9 @@ impl Polynomials {
     }
 }
 
-/// Whether an option is one of instrumental variables alone.
-pub(super) fn belongs_to_instruments(name: &str) -> bool {
-    by_instruments().iter().any(|option| option.setting.name == name)
-}
-
-/// Whether an option is one of the prediction error method alone.
-pub(super) fn belongs_to_prediction(name: &str) -> bool {
-    by_prediction().iter().any(|option| option.setting.name == name)
+/// The names of the options that the prediction error method alone has, and of those of instrumental variables alone.
+pub(super) fn names_of_methods() -> [Vec<&'static str>; 2] {
+    [by_prediction(), by_instruments()].map(|options| options.iter().map(|option| option.setting.name).collect())
 }
 
 impl BatchOptions for Polynomials {

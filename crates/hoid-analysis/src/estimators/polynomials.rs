@@ -99,24 +99,25 @@ impl BatchEstimator for Polynomials {
     const OF: Of = Of::System;
 
     fn specs() -> Vec<MethodSpec> {
-        let of = |has: fn(&str) -> bool| {
-            let mut settings = known(Self::options_of_analysis());
-            settings.retain(|setting| has(setting.name));
-            settings
+        let [of_prediction, of_instruments] = polynomial_options::names_of_methods();
+        let all = known(Self::options_of_analysis());
+        let without = |others: &[&str]| {
+            let own = all.iter().filter(|setting| !others.contains(&setting.name));
+            own.cloned().collect()
         };
         let pem = MethodSpec {
             name: PEM,
             help: "polynomials by the prediction error method",
             source: "Ljung 1999, chapters 7 and 10; the reference text, section III",
             structures: &Structure::ALL,
-            settings: of(|name| !polynomial_options::belongs_to_instruments(name)),
+            settings: without(&of_instruments),
         };
         let instrumental = IvMethod::ALL.map(|method| MethodSpec {
             name: method.name(),
             help: method.help(),
             source: method.source(),
             structures: method.structures(),
-            settings: of(|name| !polynomial_options::belongs_to_prediction(name)),
+            settings: without(&of_prediction),
         });
         [pem].into_iter().chain(instrumental).collect()
     }

@@ -141,8 +141,11 @@ impl BatchOptions for FamilyEstimator {
                 let (nc, nd) = (shared::range_words(&how.nc), shared::range_words(&how.nd));
                 Some(format!("nc={nc}, nd={nd}, by AIC"))
             }),
-            shared::delay_range(usual.delay_range_s, |how: &mut Self| &mut how.delay_range_s)
-                .printed("delay in s", |how, _| Some(shared::delay_words(how.delay_range_s))),
+            shared::delay_range(
+                usual.delay_range_s,
+                |how: &mut Self| &mut how.delay_range_s,
+                |how| how.delay_range_s,
+            ),
             BatchOption::new(intersample(), |how: &mut Self, option, text| {
                 how.intersample = option.word(text)?;
                 Ok(())

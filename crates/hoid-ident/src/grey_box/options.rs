@@ -70,8 +70,11 @@ impl BatchOptions for GreyBox {
                 let one = how.order.start() == how.order.end();
                 Some(if one { order } else { format!("{order}, by BIC") })
             }),
-            shared::delay_range(usual.delay_range_s, |how: &mut Self| &mut how.delay_range_s)
-                .printed("delay in s", |how, _| Some(shared::delay_words(how.delay_range_s))),
+            shared::delay_range(
+                usual.delay_range_s,
+                |how: &mut Self| &mut how.delay_range_s,
+                |how| how.delay_range_s,
+            ),
             shared::individual(|how: &mut Self, _, names| {
                 how.individual = names;
                 Ok(())

@@ -107,8 +107,11 @@ impl BatchOptions for SigmoidChange {
                 Ok(())
             })
             .printed("orders", |how, _| Some(format!("nd={}", how.nd))),
-            shared::delay_range(usual.delay_range_s, |how: &mut Self| &mut how.delay_range_s)
-                .printed("delay in s", |how, _| Some(shared::delay_words(how.delay_range_s))),
+            shared::delay_range(
+                usual.delay_range_s,
+                |how: &mut Self| &mut how.delay_range_s,
+                |how| how.delay_range_s,
+            ),
             shared::initial_state(|_: &mut Self, option, rule| match rule {
                 None | Some(InitialState::Estimate) => Ok(()),
                 Some(other) => {
