@@ -3,11 +3,13 @@
 //! | finding | where | why |
 //! |---|---|---|
 //! | `stick-at-its-end` | u at an end of its range in more than 5 % of the rows | what the person would have done beyond it is lost: gains and margins are those of the stick |
+//! | `resting-stick` | u comes back to one value, exactly, in 10 % of the samples or more ([`Rest`]) | a dead zone, or control in pulses: a note, as the operator is the linear part of the response |
 //! | `coarse` | e in steps of more than .05, u of more than .15 of its deviation | rounding is no remnant: intervals and bands are too narrow |
 //! | `bridged` | a gap of more than .25 s on a straight line | the line counts as tracking |
 //!
 //! No error bar knows of these.
 
+use hoid_ident::faults::Rest;
 use hoid_io::{QualityIssueKind, Step};
 use hoid_model::{Finding, Record};
 
@@ -19,6 +21,9 @@ const AT_ENDS: f64 = 0.05;
 const COARSE: [f64; 2] = [0.05, 0.15];
 /// Longest gap that may be bridged by a straight line, s.
 const BRIDGED_S: f64 = 0.25;
+
+/// Kind of the note on a stick that rests.
+pub(crate) const RESTING: &str = "resting-stick";
 
 /// Whose record is judged.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -45,6 +50,18 @@ pub(crate) fn findings_of_quality(account: &Account, record: &Record, of: Of) ->
                 "{output} stands at an end of its range in {:.0} % of the rows: what the person would have done beyond it is lost, \
                  and gain and margins are those of the stick",
                 100.0 * at_ends
+            ),
+        ));
+    }
+    if let Some(rest) = Rest::of(record.output()).filter(|_| of == Of::Person) {
+        all.push(Finding::note(
+            RESTING,
+            format!(
+                "{output} rests at {} in {:.0} % of the samples, {} times, as a stick with a dead zone does, or one that is moved in \
+                 pulses; the operator is the linear part of the response",
+                rest.value,
+                100.0 * rest.share,
+                rest.visits
             ),
         ));
     }

@@ -3,7 +3,7 @@
 use hoid_io::{QualityIssue, Step, quality_of_record};
 use hoid_model::{Fault, Finding, Record, Verdict, uncertainty::Estimate};
 
-use crate::reading::Source;
+use crate::{quality::RESTING, reading::Source};
 
 /// What was done to a record, and what is wrong with the sampling of its file.
 #[derive(Debug, Clone, Default)]
@@ -78,21 +78,32 @@ impl Recordings {
         self.records.is_empty()
     }
 
-    /// What was found in all of them, for the verdict of a result of them.
+    /// What was found in all of them, for the verdict of a result of them. One person has one stick: that it rests is
+    /// said once.
     pub fn findings(&self) -> Vec<Finding> {
         let several = self.names.len() > 1;
-        let all = self.names.iter().zip(&self.accounts);
-        all.flat_map(|(name, account)| {
-            account.findings.iter().map(move |finding| Finding {
-                words: if several {
-                    format!("{name}: {}", finding.words)
-                } else {
-                    finding.words.clone()
-                },
-                ..finding.clone()
-            })
-        })
-        .collect()
+        let own = |account: &Account| account.findings.iter().filter(|f| f.kind == RESTING).count();
+        let resting: usize = self.accounts.iter().map(own).sum();
+        let mut said = false;
+        let mut all = Vec::new();
+        for (name, account) in self.names.iter().zip(&self.accounts) {
+            for finding in &account.findings {
+                let of_stick = finding.kind == RESTING && resting > 1;
+                if of_stick && std::mem::replace(&mut said, true) {
+                    continue;
+                }
+                let words = match (several, of_stick) {
+                    (true, true) => format!("{name} and {} more: {}", resting - 1, finding.words),
+                    (true, false) => format!("{name}: {}", finding.words),
+                    (false, _) => finding.words.clone(),
+                };
+                all.push(Finding {
+                    words,
+                    ..finding.clone()
+                });
+            }
+        }
+        all
     }
 
     /// A verdict with what the recordings say: first, since a wrong recording is why a result is wrong.

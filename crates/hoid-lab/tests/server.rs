@@ -7,10 +7,10 @@ use std::{
     path::Path,
     sync::{
         Arc,
-        atomic::{AtomicBool, Ordering},
+        atomic::{AtomicBool, AtomicUsize, Ordering},
     },
     thread,
-    time::Duration,
+    time::{Duration, Instant},
 };
 
 use hoid_lab::{
@@ -352,12 +352,14 @@ fn a_thousand_hostile_connections_do_not_shut_the_page_out() {
     let dir = tempfile::tempdir().unwrap();
     let at = served(dir.path(), Mode::Sessions);
     let over = Arc::new(AtomicBool::new(false));
+    let begun = Arc::new(AtomicUsize::new(0));
     let (strangers, each) = (8, 125);
     let threads: Vec<_> = (0..strangers)
         .map(|stranger| {
-            let (host, over) = (at.host.clone(), Arc::clone(&over));
+            let (host, over, begun) = (at.host.clone(), Arc::clone(&over), Arc::clone(&begun));
             thread::spawn(move || {
                 let begin = |k: usize| -> Option<TcpStream> {
+                    begun.fetch_add(1, Ordering::Relaxed);
                     let mut stream = TcpStream::connect(&host).ok()?;
                     stream.set_nonblocking(true).ok()?;
                     let said: &[u8] = match k % 6 {
@@ -372,7 +374,6 @@ fn a_thousand_hostile_connections_do_not_shut_the_page_out() {
                     Some(stream)
                 };
                 let mut all: Vec<Option<TcpStream>> = (0..each).map(|k| begin(k + stranger)).collect();
-                let mut begun = all.len();
                 while !over.load(Ordering::Relaxed) {
                     for (k, place) in all.iter_mut().enumerate() {
                         let closed = place.as_mut().is_none_or(|stream| {
@@ -384,23 +385,27 @@ fn a_thousand_hostile_connections_do_not_shut_the_page_out() {
                         });
                         if closed {
                             *place = begin(k + stranger);
-                            begun += 1;
                         }
                     }
                     thread::sleep(Duration::from_millis(10));
                 }
-                begun
             })
         })
         .collect();
     thread::sleep(Duration::from_millis(300));
-    for _ in 0..20 {
+    // The page answers all the while, until strangers were turned away and have come again.
+    let start = Instant::now();
+    let mut asked = 0;
+    while asked < 20 || (begun.load(Ordering::Relaxed) <= strangers * each && start.elapsed() < Duration::from_secs(60))
+    {
         let reply = at.get(&format!("/{}/", at.token), "");
         assert_eq!(status(&reply), "200");
+        asked += 1;
         thread::sleep(Duration::from_millis(50));
     }
     over.store(true, Ordering::Relaxed);
-    let begun: usize = threads.into_iter().map(|thread| thread.join().unwrap()).sum();
+    threads.into_iter().for_each(|thread| thread.join().unwrap());
+    let begun = begun.load(Ordering::Relaxed);
     assert!(begun > strangers * each, "{begun} strangers");
 }
 

@@ -125,6 +125,7 @@ impl Chosen<'_, '_> {
             termination: fit.minimum.termination,
             delay: (fit.eta()[of_delay], layout.limits()[of_delay]),
             parameters: &all_parameters,
+            prior: &self.prediction.prior,
             residuals,
             noise_free,
             not_constant: constancy(fit, self.run_to_run, workspace),

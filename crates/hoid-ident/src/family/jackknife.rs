@@ -61,11 +61,12 @@ mod tests {
     #[test]
     fn data_and_prior_together_leave_the_inverse_open() {
         // H = G + P: H^-1 G H^-1 + H^-1 P H^-1 = H^-1.
-        let penalty = |place, logarithmic, weight| Penalty {
+        let penalty = |place, logarithmic, precision| Penalty {
             place,
             logarithmic,
             mean: 0.3,
-            weight,
+            precision,
+            variance: 1.0,
         };
         let (x, prior) = ([0.5, -2.0], [penalty(0, true, 0.75), penalty(1, false, 2.0)]);
         // The logarithm has the slope 2 at 0.5: P = diag(3, 2).

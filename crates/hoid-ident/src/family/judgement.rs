@@ -11,6 +11,7 @@ use super::{
     instrumental::InstrumentalFit,
     line_fit::LineFit,
     parameter::Parameter,
+    prior::OperatorPrior,
     result::{FreeModel, WeighedForm},
 };
 use crate::{Termination, judgement::residuals::ResidualMeasures};
@@ -31,11 +32,15 @@ const SETTLED_WEIGHT: f64 = 0.95;
 /// Ratio of clustered to model-based standard errors that is worth a note.
 const NOTED_ERROR_RATIO: f64 = 1.5;
 
+/// Standard errors from which on what a prior moves a parameter by is reported.
+const NOTED_PULL: f64 = 0.5;
+
 /// What is judged.
 pub(super) struct Judged<'a> {
     pub termination: Termination,
     pub delay: (f64, (f64, f64)),
     pub parameters: &'a [Parameter],
+    pub prior: &'a OperatorPrior,
     pub residuals: ResidualMeasures,
     /// Share of the power of u that is left, where it is no noise.
     pub noise_free: Option<f64>,
@@ -136,6 +141,25 @@ fn at_bound(parameter: &Parameter) -> bool {
     parameter.standard_error.is_none()
 }
 
+/// A parameter that the data determine and the prior moves: from where to where.
+fn pulled(parameter: &Parameter, prior: &OperatorPrior) -> Option<String> {
+    let pull = prior.pull(parameter)?;
+    let errors = pull.abs() * parameter.value / parameter.standard_error?;
+    (parameter.determined && errors > NOTED_PULL).then(|| {
+        let unit = if parameter.unit.is_empty() {
+            String::new()
+        } else {
+            format!(" {}", parameter.unit)
+        };
+        format!(
+            "{} from {:.3} to {:.3}{unit} ({errors:.1} of its standard error)",
+            parameter.name,
+            parameter.value * (-pull).exp(),
+            parameter.value
+        )
+    })
+}
+
 fn determined(judged: &Judged<'_>, all: &mut Vec<Finding>) {
     let find = |name: &str| {
         judged
@@ -207,6 +231,15 @@ fn determined(judged: &Judged<'_>, all: &mut Vec<Finding>) {
         all.push(Finding::note(
             "prior",
             format!("{} {verb} determined by the prior alone", prior_alone.join(" and ")),
+        ));
+    }
+    let pulled: Vec<String> = (judged.parameters.iter())
+        .filter_map(|parameter| pulled(parameter, judged.prior))
+        .collect();
+    if !pulled.is_empty() {
+        all.push(Finding::note(
+            "prior-pull",
+            format!("the prior moves {}; --prior none leaves it out", pulled.join(" and ")),
         ));
     }
     if !open.is_empty() {

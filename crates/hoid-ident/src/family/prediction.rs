@@ -31,7 +31,7 @@ use crate::{
         parametrisation::Parametrisation,
     },
     linalg::least_squares::dot,
-    optimize::{Linearisation, Minimum},
+    optimize::Minimum,
 };
 
 /// Share of the power of u below which what an operator leaves is no noise, but the digits of a file.
@@ -160,7 +160,7 @@ impl<'a> Prediction<'a> {
         let mut weight = start_of_noise.loss;
         let mut found = None;
         for round in 0..ROUNDS {
-            criterion.penalty = scaled(&unit, weight);
+            criterion.penalty = unit.iter().map(|p| p.beside(weight)).collect();
             let mut minimum = criterion
                 .search(eta, &self.search, None, workspace)
                 .ok_or(IdentError::NoFiniteLoss)?;
@@ -254,7 +254,7 @@ impl<'a> Prediction<'a> {
         workspace: &mut Workspace,
     ) -> Result<PredictionFit<'a>, IdentError> {
         let (n, states) = (criterion.residuals(), criterion.states());
-        let penalty = penalty_at(&criterion.penalty, &minimum.theta);
+        let penalty: f64 = criterion.penalty.iter().map(|p| p.at(&minimum.theta)).sum();
         let mut squares = minimum.at.sum_of_squares - penalty;
         if self.noise_free().is_some() {
             squares = squares.max(self.rounding() * n as f64);
@@ -282,24 +282,4 @@ impl<'a> Prediction<'a> {
         fit.inflation = covariances::inflation(&fit).unwrap_or(1.0);
         Ok(fit)
     }
-}
-
-fn scaled(unit: &[Penalty], weight: f64) -> Vec<Penalty> {
-    let of = |p: &Penalty| Penalty {
-        weight: p.weight * weight,
-        ..*p
-    };
-    unit.iter().map(of).collect()
-}
-
-/// What the prior adds to the sum of squares.
-fn penalty_at(penalty: &[Penalty], eta: &[f64]) -> f64 {
-    let p = eta.len();
-    let mut total = Linearisation {
-        sum_of_squares: 0.0,
-        descent: vec![0.0; p],
-        gram: vec![0.0; p * p],
-    };
-    penalty.iter().for_each(|one| one.add_to(eta, &mut total));
-    total.sum_of_squares
 }

@@ -8,7 +8,8 @@
 //! Identification*, 1999, section 7.4).
 //!
 //! How much of a result is prior is the ratio of its variance after the data to that before
-//! ([`prior share`](super::Parameter::prior_share)): one means that the data said nothing.
+//! ([`prior share`](super::Parameter::prior_share)): one means that the data said nothing. By how
+//! much the prior moves the estimate follows from it ([`OperatorPrior::pull`]).
 
 use std::{fmt, str::FromStr};
 
@@ -17,6 +18,7 @@ use hoid_model::{
     uncertainty::Estimate,
 };
 
+use super::Parameter;
 use crate::{IdentError, grey_box::objective::Penalty};
 
 /// Spread of a parameter that is in all but name fixed: refused, as `--fix` says so openly. What
@@ -149,6 +151,17 @@ impl OperatorPrior {
         &self.entries
     }
 
+    /// By how much the prior of a parameter moves the logarithm of its estimate. Two normal measurements
+    /// of x with the shares 1 - w and w of the information have the mean `(1 - w) x_data + w m`, so
+    /// that `x - x_data = w (m - x)/(1 - w)`; other priors stay. `None` where it has none, or nothing else.
+    pub fn pull(&self, parameter: &Parameter) -> Option<f64> {
+        let name = parameter.name.split('[').next();
+        let entry = self.entries.iter().find(|e| Some(e.parameter.as_str()) == name)?;
+        let share = parameter.prior_share;
+        let found = (entry.centre / parameter.value).ln() * share / (1.0 - share);
+        found.is_finite().then_some(found)
+    }
+
     /// The same as measurements of the coordinates of a form, in units of one standard deviation.
     pub(crate) fn penalties(&self, form: Form, neuromuscular: bool) -> Vec<Penalty> {
         let coordinates = form.coordinates(neuromuscular);
@@ -160,7 +173,8 @@ impl OperatorPrior {
                 place,
                 logarithmic: !matches!(coordinate, Coordinate::LogOmega | Coordinate::LogZeta),
                 mean: sign * entry.centre.ln(),
-                weight: 1.0 / (entry.spread * entry.spread),
+                precision: 1.0 / (entry.spread * entry.spread),
+                variance: 1.0,
             })
         };
         self.entries.iter().filter_map(of).collect()
@@ -212,7 +226,10 @@ impl FromStr for OperatorPrior {
 
 #[cfg(test)]
 mod tests {
+    use hoid_sim::people::{Person, Plant, Population, RemnantKind, Task};
+
     use super::*;
+    use crate::family::FamilyEstimator;
 
     #[test]
     fn priors_as_typed() {
@@ -264,5 +281,74 @@ mod tests {
         // ln(1/T_I) is centred at -ln 5.
         assert_eq!((penalty.place, penalty.mean), (2, -(5.0_f64.ln())));
         assert!(lag.penalties(Form::Lead, true).is_empty());
+    }
+
+    #[test]
+    fn the_pull_of_a_prior_leads_back_to_the_fit_without_it() {
+        // By hand: the data at ln 8 with three quarters of the information, the prior at ln 10.5.
+        let (data, prior, share): (f64, f64, f64) = (8.0, 10.5, 0.25);
+        let both = ((1.0 - share) * data.ln() + share * prior.ln()).exp();
+        let found = parameter("omega_nm[2]", both, share);
+        let pull = OperatorPrior::population().pull(&found).unwrap();
+        assert!((both * (-pull).exp() - data).abs() < 1e-12);
+        assert!(pull > 0.0);
+        let none = [
+            parameter("K", 1.0, 0.5),
+            parameter("omega_nm", 8.0, 1.0),
+            parameter("omega_nm", 0.0, 0.5),
+        ];
+        assert!(none.iter().all(|p| OperatorPrior::population().pull(p).is_none()));
+
+        // And of two fits, to first order.
+        let (population, task) = (Population::default(), Task::default());
+        let kind = RemnantKind::BroadBand;
+        let person = Person::draw(
+            &population,
+            &task,
+            Plant::LaggedIntegrator,
+            Some(Form::Lead),
+            kind,
+            31,
+            5,
+        )
+        .unwrap();
+        let records: Vec<_> = (0..4).map(|run| person.run(run).unwrap().record).collect();
+        let fit = |prior: &str| {
+            let estimator = FamilyEstimator {
+                forms: vec![Form::Lead],
+                prior: prior.parse().unwrap(),
+                ..FamilyEstimator::default()
+            };
+            let fit = estimator.fit(&records).unwrap();
+            fit.operators[0]
+                .parameters
+                .iter()
+                .find(|p| p.name == "omega_nm")
+                .unwrap()
+                .clone()
+        };
+        let (with, without) = (fit("omega_nm=10.5:0.1"), fit("none"));
+        let pull = "omega_nm=10.5:0.1"
+            .parse::<OperatorPrior>()
+            .unwrap()
+            .pull(&with)
+            .unwrap();
+        let moved = (with.value / without.value).ln();
+        println!("{with:?} {without:?} {pull} {moved}");
+        assert!((pull / moved - 1.0).abs() < 0.3, "{pull} and {moved}");
+    }
+
+    fn parameter(name: &str, value: f64, prior_share: f64) -> Parameter {
+        Parameter {
+            name: name.to_owned(),
+            unit: "rad/s",
+            value,
+            standard_error: Some(0.1),
+            standard_error_person: None,
+            interval: None,
+            prior_share,
+            determined: true,
+            averaged_over: Vec::new(),
+        }
     }
 }

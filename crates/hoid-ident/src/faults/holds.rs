@@ -4,7 +4,8 @@
 //! largest or smallest value (a rail, which is another matter): [`FROZEN`] equal samples are frozen. A
 //! channel in steps, or a hand that rests, holds by its nature: there a hold is frozen where it is
 //! longer than [`LONGER`] times the length that nine of ten holds do not exceed, [`RESTING_S`] at
-//! least, and e moves meanwhile by half of its deviation or more. A hold that the channel jumps to and
+//! least, and e moves meanwhile by half of its deviation or more. At the [rest](super::rest) of a stick
+//! that is told from the holds there. A hold that the channel jumps to and
 //! back from, by more than it moves from one sample to the next in 999 of 1000, is a dropout.
 //!
 //! *Idle* is a stretch of [`IDLE_S`] or more in which e and u stay both within [`QUIET`] of their
@@ -13,7 +14,10 @@
 
 use std::ops::Range;
 
-use super::robust::{level_and_deviation, quantile, quantum};
+use super::{
+    rest::Rest,
+    robust::{level_and_deviation, quantile, quantum},
+};
 
 /// Equal samples that are frozen, in full precision.
 const FROZEN: usize = 6;
@@ -47,21 +51,23 @@ pub(super) fn frozen(values: &[f64], other: Option<&[f64]>, sample_time_s: f64) 
     }
     let runs = runs(values);
     let in_steps = quantum(values) > 0.0;
-    let mut lengths: Vec<f64> = runs.iter().map(|r| r.len() as f64).collect();
+    let rest = Rest::of(values);
+    let rests = |run: &Range<usize>| rest.is_some_and(|rest| rest.value == values[run.start]);
+    let moving = runs.iter().filter(|run| !rests(run));
+    let mut lengths: Vec<f64> = moving.map(|run| run.len() as f64).collect();
     let usual = quantile(&mut lengths, 0.9);
     let mut changes: Vec<f64> = values.windows(2).map(|w| (w[1] - w[0]).abs()).collect();
     let large = 2.0 * quantile(&mut changes, 0.999);
     let deviation_of_other = other.map(|o| level_and_deviation(o).1);
-    let least = if in_steps {
-        ((RESTING_S / sample_time_s) as usize).max((LONGER * usual) as usize)
-    } else {
-        FROZEN
-    };
+    let longest = |usual: f64| ((RESTING_S / sample_time_s) as usize).max((LONGER * usual) as usize);
+    let in_use = if in_steps { longest(usual) } else { FROZEN };
+    let at_rest = rest.map_or(in_use, |rest| longest(rest.usual_samples));
     let is_fault = |run: &Range<usize>| -> Option<Hold> {
-        if run.len() < least.min(FROZEN) {
+        if run.len() < FROZEN {
             return None;
         }
         let held = values[run.start];
+        let least = if rests(run) { at_rest } else { in_use };
         let step = |t: usize| (values[t] - values[t - 1]).abs();
         let inside = run.start > 0 && run.end < n;
         let jump = (inside && step(run.start) > large && step(run.end) > large)
@@ -81,7 +87,7 @@ pub(super) fn frozen(values: &[f64], other: Option<&[f64]>, sample_time_s: f64) 
 }
 
 /// Runs of equal values, those of one value too.
-fn runs(values: &[f64]) -> Vec<Range<usize>> {
+pub(super) fn runs(values: &[f64]) -> Vec<Range<usize>> {
     let mut all: Vec<Range<usize>> = Vec::new();
     for (t, v) in values.iter().enumerate() {
         match all.last_mut() {
@@ -168,6 +174,28 @@ mod tests {
         let found = frozen(&held, Some(&e), 0.01);
         assert_eq!(found.len(), 1, "{found:?}");
         assert!(found[0].samples.len() >= 900);
+    }
+
+    #[test]
+    fn a_stick_in_its_dead_zone_is_not_frozen() {
+        let e = autoregressive(9000, 1);
+        let zone = |v: &f64| v - v.clamp(-4.0, 4.0);
+        // Slow, as a hand is.
+        let slow = autoregressive(1125, 2).into_iter().flat_map(|v| [zone(&v); 8]);
+        let mut u: Vec<f64> = slow.collect();
+        assert!(frozen(&u, Some(&e), 0.01).is_empty());
+        // Left alone for five seconds, as people do.
+        u[3000..3500].fill(0.0);
+        assert!(frozen(&u, Some(&e), 0.01).is_empty());
+        // Held where no hand holds it, and dead for the better part of a minute.
+        u[1000..1400].fill(2.125);
+        u[3900..8900].fill(0.0);
+        let found = frozen(&u, Some(&e), 0.01);
+        assert_eq!(found.len(), 2, "{found:?}");
+        assert!(
+            found[0].samples == (1000..1400) && found[1].samples.len() >= 5000,
+            "{found:?}"
+        );
     }
 
     #[test]

@@ -14,12 +14,15 @@
 //! person has not answered it away, as they do with a step of the target.
 //!
 //! **Scale.** The deviation from the level in each second, over its median over all seconds, beyond
-//! [`UNITS`]: no person grows by that much from one second to the next. Edges are those samples beyond
+//! [`UNITS`], of a stick with a [rest](super::rest) that of the samples away from it: no person grows by that much from one second to the next. Edges are those samples beyond
 //! [`OUTSIDE`] deviations of the rest.
 
 use std::{f64::consts::PI, ops::Range};
 
-use super::robust::{level_and_deviation, median, quantile};
+use super::{
+    rest::Rest,
+    robust::{level_and_deviation, median, quantile},
+};
 
 const LARGE: f64 = 6.0;
 /// Span beside a step, s.
@@ -126,12 +129,19 @@ pub(super) fn scales(values: &[f64], sample_time_s: f64) -> Vec<(Range<usize>, f
     if n < 5 * block {
         return Vec::new();
     }
-    let level = median(values);
-    let sizes: Vec<f64> = values
-        .chunks(block)
-        .map(|part| median(&part.iter().map(|v| (v - level).abs()).collect::<Vec<_>>()))
+    let rest = Rest::of(values).map(|rest| rest.value);
+    let level = rest.unwrap_or_else(|| median(values));
+    let size = |part: &[f64]| {
+        let moved = part.iter().filter(|v| rest != Some(**v));
+        median(&moved.map(|v| (v - level).abs()).collect::<Vec<_>>())
+    };
+    let sizes: Vec<f64> = values.chunks(block).map(size).collect();
+    let moved: Vec<f64> = sizes
+        .iter()
+        .copied()
+        .filter(|size| rest.is_none() || *size > 0.0)
         .collect();
-    let usual = median(&sizes);
+    let usual = median(&moved);
     if usual <= 0.0 {
         return Vec::new();
     }
@@ -184,6 +194,18 @@ mod tests {
 
     fn channel(seed: u64) -> Vec<f64> {
         autoregressive(6000, seed)
+    }
+
+    #[test]
+    fn seconds_in_a_dead_zone_and_out_of_it_are_in_one_unit() {
+        let zone = |v: &f64| v - v.clamp(-4.0, 4.0);
+        let u: Vec<f64> = channel(4).iter().map(zone).collect();
+        let at_rest = u.iter().filter(|v| **v == 0.0).count();
+        assert!(at_rest > 3500, "{at_rest}");
+        assert_eq!(scales(&u, 0.01), []);
+        let mut other = u;
+        other[2000..2600].iter_mut().for_each(|v| *v *= 1000.0);
+        assert_eq!(scales(&other, 0.01).len(), 1);
     }
 
     #[test]

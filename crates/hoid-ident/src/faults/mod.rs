@@ -7,6 +7,7 @@
 //! | file | fault | statistic |
 //! |---|---|---|
 //! | `levels` | wraps, stretches in other units, steps | changes and deviations against their quantiles |
+//! | `rest` | | the value at which a stick with a dead zone rests, which is no fault |
 //! | `holds` | frozen channels, dropouts, idle stretches | lengths of runs of equal values, ranges |
 //! | `spikes` | spikes | two explanations of a large innovation: fault or push |
 //! | `interpolation` | | the samples that those around them make most likely, and what they explain |
@@ -34,6 +35,7 @@ mod levels;
 mod limits;
 mod mending;
 mod resistant;
+mod rest;
 mod robust;
 mod search;
 mod slow;
@@ -46,4 +48,5 @@ mod tests;
 pub use limits::{BRIDGED_S, MOST_SPIKES, SHORTEST_S};
 pub use mending::{Mended, SLOWEST_S, mend};
 pub use resistant::{held, resistant};
+pub use rest::Rest;
 pub use slow::{PERIOD_S, without_slow};

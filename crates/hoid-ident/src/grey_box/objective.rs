@@ -30,8 +30,8 @@ pub(crate) struct PhysicalCriterion<'a, P> {
     pub penalty: Vec<Penalty>,
 }
 
-/// `weight (g(eta_i) - mean)^2`, added to the sum of squares: a normal prior of g with the standard
-/// deviation s has the weight `sigma^2/s^2`, sigma^2 the innovation variance.
+/// `v (g(eta_i) - mean)^2/s^2`, added to the sum of squares: a normal prior of g with the standard
+/// deviation s, v the variance of an innovation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Penalty {
     /// Place in eta.
@@ -39,10 +39,18 @@ pub(crate) struct Penalty {
     /// True for `g = ln eta_i` of a positive element, false for eta_i itself.
     pub logarithmic: bool,
     pub mean: f64,
-    pub weight: f64,
+    /// `1/s^2`.
+    pub precision: f64,
+    /// v.
+    pub variance: f64,
 }
 
 impl Penalty {
+    /// The same beside innovations of this variance.
+    pub fn beside(self, variance: f64) -> Self {
+        Self { variance, ..self }
+    }
+
     /// `g(eta_i)` and its derivative.
     fn value_and_slope(&self, eta: &[f64]) -> (f64, f64) {
         let x = eta[self.place];
@@ -54,19 +62,29 @@ impl Penalty {
         }
     }
 
-    /// `weight g'(eta_i)^2`, its element of the matrix P that stands beside `psi' psi`.
-    pub fn curvature(&self, eta: &[f64]) -> f64 {
-        let (_, slope) = self.value_and_slope(eta);
-        self.weight * slope * slope
+    /// `v/s^2`.
+    fn weight(&self) -> f64 {
+        self.variance * self.precision
     }
 
-    /// Adds its square and derivatives to a linearisation of p parameters.
+    /// What it adds to the sum of squares.
+    pub fn at(&self, eta: &[f64]) -> f64 {
+        let (value, _) = self.value_and_slope(eta);
+        self.weight() * (self.mean - value).powi(2)
+    }
+
+    /// `v g'(eta_i)^2/s^2`, its element of the matrix P that stands beside `psi' psi`.
+    pub fn curvature(&self, eta: &[f64]) -> f64 {
+        let (_, slope) = self.value_and_slope(eta);
+        self.weight() * slope * slope
+    }
+
+    /// Adds its value and derivatives to a linearisation of p parameters.
     pub fn add_to(&self, eta: &[f64], total: &mut Linearisation) {
         let i = self.place;
         let (value, slope) = self.value_and_slope(eta);
-        let off = self.mean - value;
-        total.sum_of_squares += self.weight * off * off;
-        total.descent[i] += self.weight * off * slope;
+        total.sum_of_squares += self.at(eta);
+        total.descent[i] += self.weight() * (self.mean - value) * slope;
         total.gram[i * eta.len() + i] += self.curvature(eta);
     }
 }

@@ -115,23 +115,13 @@ impl ChangeCriterion<'_> {
 
     /// What the prior adds to the sum of squares.
     pub fn penalty_at(&self, theta: &[f64]) -> f64 {
-        let p = theta.len();
-        let mut total = Linearisation {
-            sum_of_squares: 0.0,
-            descent: vec![0.0; p],
-            gram: vec![0.0; p * p],
-        };
-        self.add_penalty(theta, &mut total);
-        total.sum_of_squares
+        self.penalties().map(|penalty| penalty.at(theta)).sum()
     }
 
-    fn add_penalty(&self, theta: &[f64], total: &mut Linearisation) {
+    /// The prior, without that of a change where there is none.
+    fn penalties(&self) -> impl Iterator<Item = &Penalty> {
         let last = self.layout.of_the_change();
-        for penalty in &self.penalty {
-            if self.changes || !last.contains(&penalty.place) {
-                penalty.add_to(theta, total);
-            }
-        }
+        (self.penalty.iter()).filter(move |penalty| self.changes || !last.contains(&penalty.place))
     }
 
     /// Residuals of one record from [`ChangeCriterion::first`] on, not weighted.
@@ -397,7 +387,7 @@ impl Objective for ChangeCriterion<'_> {
                 }
             }
         }
-        self.add_penalty(theta, &mut total);
+        self.penalties().for_each(|penalty| penalty.add_to(theta, &mut total));
         for i in 0..p {
             // A parameter without any effect here would make the matrix singular; with a diagonal
             // of one it rests.

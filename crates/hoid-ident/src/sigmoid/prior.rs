@@ -47,11 +47,7 @@ pub(super) fn penalties(layout: &Layout, prior: &OperatorPrior) -> Vec<Penalty> 
 
 /// The penalties with the variance of the innovations as their unit.
 pub(super) fn weighted(unit: &[Penalty], variance: f64) -> Vec<Penalty> {
-    let of = |p: &Penalty| Penalty {
-        weight: p.weight * variance,
-        ..*p
-    };
-    unit.iter().map(of).collect()
+    unit.iter().map(|p| p.beside(variance)).collect()
 }
 
 /// Variance of the innovations at a minimum.
@@ -78,11 +74,9 @@ pub(super) fn settled(
     };
     let (mut minimum, mut levels) = levelled(criterion, found)?;
     for _ in 1..ROUNDS {
-        let Some((now, then)) = criterion.penalty.first().zip(unit.first()) else {
-            break;
-        };
+        let Some(now) = criterion.penalty.first() else { break };
         let variance = innovation_variance(criterion, &minimum);
-        if (variance * then.weight / now.weight - 1.0).abs() < SETTLED || variance <= 0.0 {
+        if (variance / now.variance - 1.0).abs() < SETTLED || variance <= 0.0 {
             break;
         }
         criterion.penalty = weighted(unit, variance);

@@ -62,7 +62,8 @@ fn gradient_agrees_with_finite_differences() {
             place: layout.delay,
             logarithmic: true,
             mean: -1.5,
-            weight: 0.3,
+            precision: 30.0,
+            variance: 0.01,
         }];
         let mut ws = Workspace::default();
         let exact = c.linearise(&theta, &mut ws);
@@ -124,7 +125,8 @@ fn without_a_change_only_the_first_state_counts() {
             place,
             logarithmic: true,
             mean: 0.0,
-            weight: 1.0,
+            precision: 1.0,
+            variance: 1.0,
         };
         c.penalty = vec![prior(0), prior(1)];
         let at = c.linearise(&theta(&layout), &mut Workspace::default());

@@ -1,0 +1,92 @@
+//! The value at which a stick rests.
+//!
+//! A stick with a dead zone or breakout gives one value, exactly, as long as a hand pushes little; so
+//! does a hand that works in pulses and lets go between them. Pilots leave it there in half of the
+//! samples and for seconds at a time. That is how they control, and no fault of the recording.
+//!
+//! The rest is the most frequent value, where it makes [`SHARE`] of the samples or more, is come to
+//! [`VISITS`] times or oftener, and is [`ALONE`] times as frequent as any other: levels of a channel
+//! in steps stand side by side, and a channel that has stopped once has stopped once. In the ends of
+//! its range nothing rests.
+
+use super::{holds::runs, robust::quantile};
+
+const SHARE: f64 = 0.1;
+const VISITS: usize = 10;
+const ALONE: f64 = 4.0;
+
+/// Where and how a stick rests.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Rest {
+    /// The value.
+    pub value: f64,
+    /// Part of the samples at it.
+    pub share: f64,
+    /// How often it is come to.
+    pub visits: usize,
+    /// Samples that nine of ten visits do not exceed.
+    pub usual_samples: f64,
+}
+
+impl Rest {
+    /// The rest of a channel; `None` where it has none.
+    pub fn of(values: &[f64]) -> Option<Self> {
+        let mut sorted = values.to_vec();
+        sorted.sort_unstable_by(f64::total_cmp);
+        let mut counts: Vec<(usize, f64)> = (sorted.chunk_by(|a, b| a == b))
+            .map(|equal| (equal.len(), equal[0]))
+            .collect();
+        let ends = [counts.first()?.1, counts.last()?.1];
+        counts.sort_unstable_by_key(|(count, _)| std::cmp::Reverse(*count));
+        let (most, value) = counts[0];
+        let next = counts.get(1).map_or(0, |(count, _)| *count);
+        let share = most as f64 / values.len() as f64;
+        if share < SHARE || (most as f64) < ALONE * next as f64 || ends.contains(&value) {
+            return None;
+        }
+        let mut lengths: Vec<f64> = (runs(values).iter())
+            .filter(|run| values[run.start] == value)
+            .map(|run| run.len() as f64)
+            .collect();
+        let visits = lengths.len();
+        (visits >= VISITS).then(|| Self {
+            value,
+            share,
+            visits,
+            usual_samples: quantile(&mut lengths, 0.9),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{super::test_signals::autoregressive, *};
+
+    #[test]
+    fn a_dead_zone_and_pulses_rest_and_other_channels_do_not() {
+        let u = autoregressive(6000, 3);
+        assert_eq!(Rest::of(&u), None);
+        let zone = |width: f64| -> Vec<f64> { u.iter().map(|v| v - v.clamp(-width, width)).collect() };
+        let rest = Rest::of(&zone(1.5)).unwrap();
+        let at_rest = zone(1.5).iter().filter(|v| **v == 0.0).count();
+        assert_eq!((rest.value, rest.share), (0.0, at_rest as f64 / 6000.0));
+        assert!(rest.visits > 50 && rest.usual_samples > 2.0, "{rest:?}");
+        let pulses: Vec<f64> = u
+            .iter()
+            .map(|v| if v.abs() < 4.0 { 0.7 } else { 0.7 + v.signum() })
+            .collect();
+        assert_eq!(Rest::of(&pulses).map(|r| r.value), Some(0.7));
+        for steps in [0.1, 1.0, 3.0] {
+            let rounded: Vec<f64> = u.iter().map(|v| (v / steps).round()).collect();
+            assert_eq!(Rest::of(&rounded), None, "steps of {steps}");
+        }
+        let mut frozen = u.clone();
+        frozen[1000..3000].fill(0.0);
+        assert_eq!(Rest::of(&frozen), None);
+        let rail: Vec<f64> = u.iter().map(|v| v.max(0.0)).collect();
+        assert_eq!(Rest::of(&rail), None);
+        assert_eq!(Rest::of(&[]), None);
+        assert_eq!(Rest::of(&[f64::NAN; 40]), None);
+        assert_eq!(Rest::of(&[2.0; 40]), None);
+    }
+}
