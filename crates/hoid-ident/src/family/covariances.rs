@@ -14,15 +14,17 @@
 //! **The prior** P is a measurement that no cluster holds: what it leaves open is added,
 //! `kappa sigma^2 H^-1 P H^-1`, H = G + P.
 
-use hoid_model::{Complex64, uncertainty::variance_along};
+use hoid_model::{Complex64, FamilyOperator, uncertainty::variance_along};
 
 use super::{
     clusters::ClusterKind,
     jackknife::{add_open_part, jackknife},
     prediction_fit::PredictionFit,
 };
-use crate::grey_box::parametrisation::Parametrisation;
+use crate::{grey_box::parametrisation::Parametrisation, linalg::least_squares::solve_symmetric};
 
+/// Frequencies at which two responses are compared.
+const POINTS: usize = 24;
 /// Frequencies at which the response is judged, rad/s.
 pub(super) const BAND_RAD_S: [f64; 5] = [0.7, 1.3, 2.4, 4.3, 8.0];
 
@@ -44,10 +46,17 @@ impl Covariances {
     /// are made of is then the mean squared error, variance and squared bias, with d for the bias:
     /// all of it, and not the `d d'/3` of a truth that may lie anywhere between the two, since the
     /// bias is on one side. Elements at a bound stay as they are.
+    ///
+    /// Errors are to first order, and the other estimate may be far along a ridge of the criterion,
+    /// as a gain and a lag that grow together are: `J d`, J the gradient of the response, is then no
+    /// difference of responses. There the [difference](responding) that explains that of the
+    /// responses stands in place of d.
     pub fn add_bias(&mut self, fit: &PredictionFit<'_>, other: &[f64]) {
         let p = fit.parameters();
         let mut difference = vec![0.0; p];
-        for (place, d) in differences(fit, other) {
+        let found = differences(fit, other);
+        let found = responding(fit, other, &found).unwrap_or(found);
+        for (place, d) in found {
             difference[place] = d;
         }
         for i in 0..p {
@@ -87,6 +96,60 @@ fn differences(fit: &PredictionFit<'_>, other: &[f64]) -> Vec<(usize, f64)> {
     let elements = fit.layout().operator_elements();
     let free = fit.free().into_iter().filter(|place| *place < elements);
     free.map(|place| (place, fit.eta()[place] - other[place])).collect()
+}
+
+/// By how much `J d` may exceed the difference of two responses before it stands for none.
+const MOST_OVERSTATED: f64 = 2.0;
+/// Part of its diagonal that makes `J' J` regular.
+const RIDGE: f64 = 1e-9;
+
+/// The least squares solution of `J d = H - H_other` over the band of manual control and an octave beside it,
+/// relative to |H|; `None` where the differences of the elements explain it, or elements belong to single records.
+fn responding(fit: &PredictionFit<'_>, other: &[f64], differences: &[(usize, f64)]) -> Option<Vec<(usize, f64)>> {
+    let layout = fit.layout();
+    let places = &layout.positions(0)[..layout.coordinates()];
+    if layout.operator_elements() != places.len() {
+        return None;
+    }
+    let (here, there) = (layout.operator(fit.eta(), 0).ok()?, layout.operator(other, 0).ok()?);
+    let at = |place: &usize| places.iter().position(|p| p == place);
+    let coordinates: Vec<usize> = differences.iter().filter_map(|(place, _)| at(place)).collect();
+    let d: Vec<f64> = differences.iter().map(|(_, d)| *d).collect();
+    let found = explaining(&here, &there, &coordinates, &d)?;
+    Some(
+        differences
+            .iter()
+            .zip(found)
+            .map(|((place, _), d)| (*place, d))
+            .collect(),
+    )
+}
+
+/// The same of two operators, for these coordinates and their differences.
+fn explaining(here: &FamilyOperator, there: &FamilyOperator, coordinates: &[usize], d: &[f64]) -> Option<Vec<f64>> {
+    let q = coordinates.len();
+    let (mut gram, mut descent) = (vec![0.0; q * q], vec![0.0; q]);
+    let (mut linear, mut actual) = (0.0, 0.0);
+    let (low, high) = (0.5 * BAND_RAD_S[0], 2.0 * BAND_RAD_S[4]);
+    for k in 0..POINTS {
+        let omega = low * (high / low).powf(k as f64 / (POINTS - 1) as f64);
+        let response = here.response_and_gradient(omega);
+        let slopes: Vec<Complex64> = (coordinates.iter())
+            .map(|&i| response.gradient[i] / response.value)
+            .collect();
+        let off = (response.value - there.response(omega)) / response.value;
+        linear += slopes.iter().zip(d).map(|(g, d)| g * d).sum::<Complex64>().norm_sqr();
+        actual += off.norm_sqr();
+        for i in 0..q {
+            descent[i] += (slopes[i].conj() * off).re;
+            (0..q).for_each(|j| gram[i * q + j] += (slopes[i].conj() * slopes[j]).re);
+        }
+    }
+    if linear <= MOST_OVERSTATED * MOST_OVERSTATED * actual {
+        return None;
+    }
+    (0..q).for_each(|i| gram[i * q + i] *= 1.0 + RIDGE);
+    solve_symmetric(&gram, &descent)
 }
 
 /// Inverse of `G + P` by rows, over all elements that were sought.
@@ -178,4 +241,58 @@ pub(super) fn inflation(fit: &PredictionFit<'_>) -> Option<f64> {
     }
     let mean = ratios.iter().sum::<f64>() / ratios.len() as f64;
     mean.is_finite().then(|| mean.max(1.0))
+}
+
+#[cfg(test)]
+mod tests {
+    use hoid_model::{Form, operator_family::Coordinate};
+
+    use super::*;
+
+    #[test]
+    fn a_bias_along_a_ridge_is_that_of_the_responses() {
+        // Two leads and a lag, of which K T_L^2/T_I alone is well known in the band: a pilot on an integrator.
+        let coordinates = Form::Lead2Lag.coordinates(true);
+        let of = |gain: f64, lead_s: f64, lag_rate: f64| {
+            let x: Vec<f64> = (coordinates.iter())
+                .map(|c| match c {
+                    Coordinate::Gain => gain,
+                    Coordinate::Lead => lead_s,
+                    Coordinate::LagRate => lag_rate,
+                    Coordinate::LogOmega => 11.0_f64.ln(),
+                    Coordinate::LogZeta => 0.3_f64.ln(),
+                    _ => 0.25,
+                })
+                .collect();
+            FamilyOperator::new(Form::Lead2Lag, true, &x).unwrap()
+        };
+        let here = of(0.043, 1.27, 0.8);
+        let all: Vec<usize> = (0..coordinates.len()).collect();
+        let d = |there: &FamilyOperator| -> Vec<f64> {
+            (here.coordinates().iter().zip(there.coordinates()))
+                .map(|(a, b)| a - b)
+                .collect()
+        };
+        let there = of(0.0094, 2.72, 0.001);
+        let found = explaining(&here, &there, &all, &d(&there)).unwrap();
+        // Sums of squares over the band, relative to the response: explained, linear and there.
+        let (mut explained, mut linear, mut actual) = (0.0, 0.0, 0.0);
+        for k in 0..200 {
+            let omega = 0.35 * (16.0_f64 / 0.35).powf(f64::from(k) / 199.0);
+            let at = here.response_and_gradient(omega);
+            let along = |d: &[f64]| at.gradient.iter().zip(d).map(|(g, d)| g * d).sum::<Complex64>();
+            let size = at.value.norm_sqr();
+            explained += along(&found).norm_sqr() / size;
+            linear += along(&d(&there)).norm_sqr() / size;
+            actual += (at.value - there.response(omega)).norm_sqr() / size;
+        }
+        assert!(
+            explained <= 1.01 * actual && explained > 0.5 * actual,
+            "{explained} {actual}"
+        );
+        assert!(linear > 25.0 * actual, "{linear} {actual}");
+        // What is near stays as it is.
+        let near = of(0.045, 1.27, 0.8);
+        assert_eq!(explaining(&here, &near, &all, &d(&near)), None);
+    }
 }

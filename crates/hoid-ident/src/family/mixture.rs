@@ -112,7 +112,13 @@ fn interval(components: &[Component], total: f64, clusters: usize) -> Option<(f6
                 high = middle;
             }
         }
-        0.5 * (low + high)
+        let found = 0.5 * (low + high);
+        // An end at zero, as of a time constant at its bound, is zero and not the rounding of it.
+        if found.abs() < 1e-12 * (most - least) {
+            0.0
+        } else {
+            found
+        }
     };
     let low = if share(least - reach) > TAIL {
         f64::NEG_INFINITY
