@@ -96,7 +96,7 @@ pub struct TrackArgs {
         "File for the trace, the estimate at each sample with its standard errors: {}",
         writable_endings()
     ))]
-    pub out: PathBuf,
+    pub out: Option<PathBuf>,
     /// Write a report (HTML) into this directory: parameters over time with bands, innovations,
     /// standard errors
     #[arg(long, value_name = "DIR")]

@@ -17,7 +17,7 @@ const COEFFICIENTS_SHOWN: usize = 6;
 ///
 /// # Errors
 /// Those of the quality of the start fit.
-pub fn page(tracked: &Tracked, out: &str, verbose: bool) -> Result<String, CliError> {
+pub fn page(tracked: &Tracked, out: Option<&str>, verbose: bool) -> Result<String, CliError> {
     let mut page = text::verdict(&tracked.verdict);
     page.push_str(&rows_shown(tracked));
     let errors = tracked.relative_errors();
@@ -45,7 +45,10 @@ pub fn page(tracked: &Tracked, out: &str, verbose: bool) -> Result<String, CliEr
         &tracked.data.accounts,
         verbose,
     ));
-    page.push_str(&format!("Trace: {}\n", out));
+    match out {
+        Some(out) => page.push_str(&format!("Trace: {out}\n")),
+        None => page.push_str("Every row with its standard errors: --out TRACE.csv\n"),
+    }
     if verbose {
         page.push_str(&details(tracked)?);
     } else {

@@ -14,7 +14,9 @@ use crate::{
 };
 
 pub fn run(args: &TrackArgs) -> Result<(), CliError> {
-    check_table_path(&args.out)?;
+    if let Some(path) = &args.out {
+        check_table_path(path)?;
+    }
     let given = |name: &str| args.recursion.settings.given().any(|(option, _)| option == name);
     if args.validate.is_some() && !args.update_covariance && given("covariance") {
         return Err(CliError::Usage(
@@ -40,7 +42,7 @@ pub fn run(args: &TrackArgs) -> Result<(), CliError> {
     places::check(
         &inputs,
         &[
-            Some(&args.out),
+            args.out.as_deref(),
             args.picture.figure.as_deref(),
             args.show.table.as_deref(),
         ],
@@ -55,18 +57,20 @@ pub fn run(args: &TrackArgs) -> Result<(), CliError> {
     let plan = tracking.plan(&read)?;
     let tracked = recursion::searching(&plan, |each| tracking.run(read, other, each))?;
     let batch = report::batch_fits(args, &tracked)?;
-    write_table(&args.out, &tracked.table())?;
+    if let Some(path) = &args.out {
+        write_table(path, &tracked.table())?;
+    }
     if let Some(page) = report::write(args, &tracked, &batch)? {
         output::notice("", format!("report: {}", page.display()));
     }
-    let out = args.out.display().to_string();
+    let out = args.out.as_ref().map(|path| path.display().to_string());
     paper_table::write(&args.show, || Ok(tracked.json()?))?;
     if args.show.json {
         let mut object = tracked.json()?;
-        object.insert("trace".to_owned(), Value::String(out));
+        object.insert("trace".to_owned(), out.map_or(Value::Null, Value::String));
         json::print(&Value::Object(object))?;
     } else {
-        output::show(&page::page(&tracked, &out, args.show.verbose)?)?;
+        output::show(&page::page(&tracked, out.as_deref(), args.show.verbose)?)?;
     }
     CliError::of_verdict(&tracked.verdict)
 }
