@@ -13,7 +13,7 @@ use hoid_ident::faults::Rest;
 use hoid_io::{QualityIssueKind, Step};
 use hoid_model::{Finding, Record};
 
-use crate::recordings::Account;
+use crate::recordings::{Account, RESTING};
 
 /// Shares of the rows at the ends of the stick, and steps of e and u over their deviations, beyond which a
 /// result is doubtful: what is cut off or rounded is lost.
@@ -21,9 +21,6 @@ const AT_ENDS: f64 = 0.05;
 const COARSE: [f64; 2] = [0.05, 0.15];
 /// Longest gap that may be bridged by a straight line, s.
 const BRIDGED_S: f64 = 0.25;
-
-/// Kind of the note on a stick that rests.
-pub(crate) const RESTING: &str = "resting-stick";
 
 /// Whose record is judged.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

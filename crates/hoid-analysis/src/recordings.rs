@@ -3,7 +3,10 @@
 use hoid_io::{QualityIssue, Step, quality_of_record};
 use hoid_model::{Fault, Finding, Record, Verdict, uncertainty::Estimate};
 
-use crate::{quality::RESTING, reading::Source};
+use crate::reading::Source;
+
+/// Kind of the note on a stick that rests.
+pub(crate) const RESTING: &str = "resting-stick";
 
 /// What was done to a record, and what is wrong with the sampling of its file.
 #[derive(Debug, Clone, Default)]

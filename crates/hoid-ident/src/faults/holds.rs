@@ -15,7 +15,7 @@
 use std::ops::Range;
 
 use super::{
-    rest::Rest,
+    rest::{Rest, runs},
     robust::{level_and_deviation, quantile, quantum},
 };
 
@@ -84,18 +84,6 @@ pub(super) fn frozen(values: &[f64], other: Option<&[f64]>, sample_time_s: f64) 
         })
     };
     runs.iter().filter_map(is_fault).collect()
-}
-
-/// Runs of equal values, those of one value too.
-pub(super) fn runs(values: &[f64]) -> Vec<Range<usize>> {
-    let mut all: Vec<Range<usize>> = Vec::new();
-    for (t, v) in values.iter().enumerate() {
-        match all.last_mut() {
-            Some(run) if values[run.start] == *v => run.end = t + 1,
-            _ => all.push(t..t + 1),
-        }
-    }
-    all
 }
 
 fn range_of(values: &[f64]) -> f64 {

@@ -9,7 +9,9 @@
 //! in steps stand side by side, and a channel that has stopped once has stopped once. In the ends of
 //! its range nothing rests.
 
-use super::{holds::runs, robust::quantile};
+use std::ops::Range;
+
+use super::robust::quantile;
 
 const SHARE: f64 = 0.1;
 const VISITS: usize = 10;
@@ -56,6 +58,18 @@ impl Rest {
             usual_samples: quantile(&mut lengths, 0.9),
         })
     }
+}
+
+/// Runs of equal values, those of one value too.
+pub(super) fn runs(values: &[f64]) -> Vec<Range<usize>> {
+    let mut all: Vec<Range<usize>> = Vec::new();
+    for (t, v) in values.iter().enumerate() {
+        match all.last_mut() {
+            Some(run) if values[run.start] == *v => run.end = t + 1,
+            _ => all.push(t..t + 1),
+        }
+    }
+    all
 }
 
 #[cfg(test)]
