@@ -21,7 +21,9 @@ use super::{
     jackknife::{add_open_part, jackknife},
     prediction_fit::PredictionFit,
 };
-use crate::{grey_box::parametrisation::Parametrisation, linalg::least_squares::solve_symmetric};
+use crate::{
+    grey_box::parametrisation::Parametrisation, linalg::least_squares::solve_symmetric, optimize::Linearisation,
+};
 
 /// Frequencies at which two responses are compared.
 const POINTS: usize = 24;
@@ -128,8 +130,7 @@ fn responding(fit: &PredictionFit<'_>, other: &[f64], differences: &[(usize, f64
 /// The same of two operators, for these coordinates and their differences.
 fn explaining(here: &FamilyOperator, there: &FamilyOperator, coordinates: &[usize], d: &[f64]) -> Option<Vec<f64>> {
     let q = coordinates.len();
-    let (mut gram, mut descent) = (vec![0.0; q * q], vec![0.0; q]);
-    let (mut linear, mut actual) = (0.0, 0.0);
+    let (mut total, mut linear) = (Linearisation::empty(q), 0.0);
     let (low, high) = (0.5 * BAND_RAD_S[0], 2.0 * BAND_RAD_S[4]);
     for k in 0..POINTS {
         let omega = low * (high / low).powf(k as f64 / (POINTS - 1) as f64);
@@ -139,17 +140,13 @@ fn explaining(here: &FamilyOperator, there: &FamilyOperator, coordinates: &[usiz
             .collect();
         let off = (response.value - there.response(omega)) / response.value;
         linear += slopes.iter().zip(d).map(|(g, d)| g * d).sum::<Complex64>().norm_sqr();
-        actual += off.norm_sqr();
-        for i in 0..q {
-            descent[i] += (slopes[i].conj() * off).re;
-            (0..q).for_each(|j| gram[i * q + j] += (slopes[i].conj() * slopes[j]).re);
-        }
+        total.add_complex(1.0, off, &slopes);
     }
-    if linear <= MOST_OVERSTATED * MOST_OVERSTATED * actual {
+    if linear <= MOST_OVERSTATED * MOST_OVERSTATED * total.sum_of_squares {
         return None;
     }
-    (0..q).for_each(|i| gram[i * q + i] *= 1.0 + RIDGE);
-    solve_symmetric(&gram, &descent)
+    (0..q).for_each(|i| total.gram[i * q + i] *= 1.0 + RIDGE);
+    solve_symmetric(&total.gram, &total.descent)
 }
 
 /// Inverse of `G + P` by rows, over all elements that were sought.
