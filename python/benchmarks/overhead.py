@@ -2,7 +2,7 @@
 
 ``python overhead.py [PART]`` makes one PART-th of all runs.
 
-Compare the first lines with those of ``cargo run --release -p hoid --example overhead``, on a
+Compare the first lines with those of ``cargo run --release -p hoid-evidence --example overhead``, on a
 machine at rest, with a release build of the module (``pip install ./python``).
 """
 

@@ -136,9 +136,9 @@ const SLOW: [Slow; 12] = [
         program: Some("hoid-cli"),
         ..slow_of("faults", "hoid", "faults")
     },
-    slow_of("faults-clean", "hoid-ident", "faults_clean"),
-    slow_of("little-noise", "hoid-ident", "little_noise"),
-    slow_of("intersample-coverage", "hoid-ident", "intersample_coverage"),
+    slow_of("faults-clean", "hoid-evidence", "faults_clean"),
+    slow_of("little-noise", "hoid-evidence", "little_noise"),
+    slow_of("intersample-coverage", "hoid-evidence", "intersample_coverage"),
     slow_of("tracker-faults", "hoid", "tracker_faults"),
     Slow {
         profile: "dev",

@@ -11,7 +11,7 @@
 //! on recorded and on simulated runs.
 //!
 //! This crate has no code of its own. The prelude has what most programs use, from the file to the
-//! report:
+//! report (feature `report`):
 //!
 //! ```no_run
 //! use hoid::prelude::*;
@@ -54,11 +54,12 @@
 //! |---|---|---|
 //! | none | [`model`], [`ident`], [`track`], [`sim`]: what estimates | |
 //! | `io` | [`io`]: files; [`analysis`]: from recordings to a result and its verdict | yes |
-//! | `study` | [`study`]: Monte Carlo studies and groups of runs | yes |
-//! | `report` | [`report`]: figures and HTML pages | yes |
-//! | `thesis` | [`thesis`]: the reference text, reproduced | yes |
+//! | `study` | [`study`]: Monte Carlo studies and groups of runs | |
+//! | `report` | [`report`]: figures and HTML pages; with `study` | |
+//! | `thesis` | [`thesis`]: the reference text, reproduced; with `report` | |
+//! | `pdf-png` | figures as PDF and PNG; with `report` | |
 //!
-//! With `default-features = false` nothing that reads files or draws is built.
+//! With `default-features = false` nothing that reads files is built.
 
 #[cfg(feature = "io")]
 pub use hoid_analysis as analysis;

@@ -6,7 +6,7 @@ use std::{collections::BTreeMap, process::Command};
 use serde_json::Value;
 
 /// What each crate may depend on within the workspace.
-const ALLOWED: [(&str, &[&str]); 19] = [
+const ALLOWED: [(&str, &[&str]); 20] = [
     ("hoid-core", &[]),
     ("hoid-embedded", &["hoid-core"]),
     ("hoid-model", &["hoid-core"]),
@@ -35,6 +35,20 @@ const ALLOWED: [(&str, &[&str]); 19] = [
     (
         "hoid-challenge",
         &["hoid-model", "hoid-ident", "hoid-sim", "hoid-track", "hoid-io"],
+    ),
+    (
+        "hoid-evidence",
+        &[
+            "hoid",
+            "hoid-core",
+            "hoid-ident",
+            "hoid-model",
+            "hoid-report",
+            "hoid-sim",
+            "hoid-study",
+            "hoid-thesis",
+            "hoid-track",
+        ],
     ),
     (
         "hoid-study",

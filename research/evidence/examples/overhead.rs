@@ -2,7 +2,7 @@
 //! (`python/benchmarks/overhead.py`): run one after the other on a machine at rest.
 //!
 //! ```sh
-//! cargo run --release -p hoid --example overhead
+//! cargo run --release -p hoid-evidence --example overhead
 //! ```
 #![allow(clippy::print_stdout, clippy::unwrap_used)]
 

@@ -1,6 +1,6 @@
 //! The tables of the page "The survey's methods" of the book:
 //!
-//! `cargo run --release -p hoid-thesis --example survey_methods > survey-methods.md`
+//! `cargo run --release -p hoid-evidence --example survey_methods > survey-methods.md`
 //!
 //! or, of a plan of one's own, `... --example survey_methods -- my-survey.toml`. Method by method it
 //! can be tuned on other runs by another seed in a copy of the plan.

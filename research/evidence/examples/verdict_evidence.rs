@@ -1,6 +1,6 @@
 //! What the verdict of a trace says of runs that are not what they claim, and of clean ones.
 //!
-//! `cargo run --release -p hoid-track --example verdict_evidence -- [--runs N] [--seed S] [--method M] [--element]
+//! `cargo run --release -p hoid-evidence --example verdict_evidence -- [--runs N] [--seed S] [--method M] [--element]
 //! [--kinds]`
 //!
 //! Lead persons on `1/s^2` and `1/(s(s+1))`, gain-like ones on `1/s`, lags on a gain, 82 s at 100 Hz, with remnants of

@@ -1,12 +1,12 @@
 //! The numbers of the page "Evidence" of the book that take too long for a test.
 //!
-//! `cargo run --release -p hoid --example evidence -- coverage|efficiency|starts|delay [RUNS]`
+//! `cargo run --release -p hoid-evidence --example evidence -- coverage|efficiency|starts|delay [RUNS]`
 //!
-//! `cargo run --release -p hoid --example evidence -- speed [RUNS] [PYTHON]` times the Box-Jenkins
+//! `cargo run --release -p hoid-evidence --example evidence -- speed [RUNS] [PYTHON]` times the Box-Jenkins
 //! fit beside SciPy; PYTHON is an interpreter that has numpy and scipy, `python3` by default.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
-#[path = "../tests/common/textbook.rs"]
+#[path = "../../../crates/hoid/tests/common/textbook.rs"]
 mod textbook;
 
 use hoid::{
@@ -302,7 +302,10 @@ fn speed(runs: u64, python: &str) {
     let rows = record[0].input().iter().zip(record[0].output());
     let text: String = rows.map(|(e, u)| format!("{e},{u}\n")).collect();
     std::fs::write(&file, text).unwrap();
-    let script = concat!(env!("CARGO_MANIFEST_DIR"), "/benches/peers/scipy_bj.py");
+    let script = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/../../crates/hoid/benches/peers/scipy_bj.py"
+    );
     let found = std::process::Command::new(python)
         .args([script, file.to_str().unwrap(), &runs.to_string()])
         .envs([("OMP_NUM_THREADS", "1"), ("OPENBLAS_NUM_THREADS", "1")])

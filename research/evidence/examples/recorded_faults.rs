@@ -1,6 +1,6 @@
 //! What the guard tells of recordings: of those as they are, and of faults that are put into them.
 //!
-//! `HOID_PILOT_DATA=DIR cargo run --release -p hoid --no-default-features --features io --example recorded_faults --
+//! `HOID_PILOT_DATA=DIR cargo run --release -p hoid-evidence --example recorded_faults --
 //! [RUNS|all] [METHOD]`
 //!
 //! The folder is that of the example `pilots_evidence`. Of each recording as it is the first line counts what was told,
@@ -9,14 +9,14 @@
 //! it does not have there.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
-#[path = "../tests/common/tracker_faults/faults.rs"]
+#[path = "../../../crates/hoid/tests/common/tracker_faults/faults.rs"]
 mod faults;
-mod pilots;
 
 use std::{collections::BTreeMap, env};
 
 use faults::{Fault, Signal, faults};
 use hoid::model::SampleTime;
+use hoid_evidence::pilots;
 use hoid_track::{GuardEvent, Method, Sample, TrackOptions, Tracker};
 use rayon::prelude::*;
 

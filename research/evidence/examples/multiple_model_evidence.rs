@@ -1,15 +1,12 @@
 //! The numbers of the page "A person who changes" of the book that take too long for a test.
 //!
-//! `cargo run --release -p hoid-track --example multiple_model_evidence -- detection|tune|set|cost [RUNS]`
+//! `cargo run --release -p hoid-evidence --example multiple_model_evidence -- detection|tune|set|cost [RUNS]`
 //! or `-- joined FIRST.csv SECOND.csv ..`, pairs of recordings with the columns t, r, u and y that
 //! are joined in the middle
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
-mod evidence;
-#[path = "evidence/told.rs"]
-mod told;
-
-use evidence::{CHANGE_S, START_S, median, on_all_cores, scenario};
+use hoid_evidence::task::{CHANGE_S, START_S, median, on_all_cores, scenario};
+use hoid_evidence::told::{of_the_text, options};
 use hoid_model::{
     Channel, Record, SampleTime,
     scenario::{Condition, Scenario},
@@ -17,7 +14,6 @@ use hoid_model::{
 };
 use hoid_sim::{RunSeed, Simulator};
 use hoid_track::{ErrorThreshold, Method, Sample, TrackOptions, Tracker};
-use told::{of_the_text, options};
 
 const COLUMNS: [&str; 5] = ["K_e", "T_L", "K_e_dot", "omega_nm", "zeta_nm"];
 const LEVELS: [f64; 4] = [0.01, 0.1, 0.2, 0.3];

@@ -1,7 +1,7 @@
 //! How recorded people are followed: two trials of a person joined, of one controlled element or of
 //! two.
 //!
-//! `HOID_HUMAN_DATA=DIR cargo run --release -p hoid-track --example people_evidence -- [METHOD...]`
+//! `HOID_HUMAN_DATA=DIR cargo run --release -p hoid-evidence --example people_evidence -- [METHOD...]`
 //!
 //! Error: mean of `|dH|/|H|` over seven lines of the disturbance against the describing function of
 //! the person's ten trials of that element, `mean(U/D)/mean(E/D)`. The start span of methods that
@@ -11,17 +11,12 @@
 //! the person after are known, is above 12 within 8 s ([`oracle`]).
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
-#[allow(dead_code, reason = "scenarios are for the other examples")]
-mod evidence;
-#[path = "evidence/oracle.rs"]
-mod oracle;
-
 use std::{env, f64::consts::PI, fs, path::PathBuf};
 
-use evidence::{median, on_all_cores};
+use hoid_evidence::oracle::{self, Rows};
+use hoid_evidence::task::{median, on_all_cores};
 use hoid_model::{Channel, Record, SampleTime};
 use hoid_track::{Method, StartAt, TrackOptions, Tracker};
-use oracle::Rows;
 
 const PEOPLE: [&str; 3] = ["P03", "P05", "P09"];
 const ELEMENTS: [&str; 2] = ["fo", "so"];

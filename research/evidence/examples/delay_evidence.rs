@@ -1,11 +1,9 @@
 //! The numbers of the page "A person who changes" of the book on delays that are tracked.
 //!
-//! `cargo run --release -p hoid-track --example delay_evidence -- [RUNS] [tune]`
+//! `cargo run --release -p hoid-evidence --example delay_evidence -- [RUNS] [tune]`
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
-mod evidence;
-
-use evidence::{CHANGE_S, START_S, median, on_all_cores, scenario};
+use hoid_evidence::task::{CHANGE_S, START_S, median, on_all_cores, scenario};
 use hoid_model::{
     Record,
     scenario::{Condition, Scenario},

@@ -1,9 +1,9 @@
 //! The numbers of recursive identification on the page "Evidence" of the book that take too long
 //! for a test.
 //!
-//! `cargo run --release -p hoid --example recursive_evidence -- table|divergence [RUNS]`
+//! `cargo run --release -p hoid-evidence --example recursive_evidence -- table|divergence [RUNS]`
 //!
-//! `cargo run --release -p hoid --example recursive_evidence -- endurance [SAMPLES]`
+//! `cargo run --release -p hoid-evidence --example recursive_evidence -- endurance [SAMPLES]`
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 use std::collections::BTreeMap;

@@ -1,4 +1,4 @@
-//! Scenarios and runs that the examples with the numbers of the book share.
+//! Scenarios and runs that the studies share.
 
 use hoid_model::{
     remnant_gain::NoiseDefinition,
@@ -6,8 +6,9 @@ use hoid_model::{
 };
 use rayon::prelude::*;
 
-/// End of the start fit, and the change, s.
+/// End of the start fit, s.
 pub const START_S: f64 = 30.72;
+/// The change, s.
 pub const CHANGE_S: f64 = 40.96;
 
 /// A condition with K_c in the output matrix, as in the reference text.

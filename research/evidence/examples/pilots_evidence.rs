@@ -1,7 +1,7 @@
 //! Pilots who adapt while they are recorded (P. M. T. Zaal, *J. Guidance, Control, and Dynamics* 39 (2016), doi
 //! 10.2514/1.G001592): how each method follows them.
 //!
-//! `HOID_PILOT_DATA=DIR cargo run --release -p hoid --example pilots_evidence -- [RUNS|all] [METHOD...]`
+//! `HOID_PILOT_DATA=DIR cargo run --release -p hoid-evidence --example pilots_evidence -- [RUNS|all] [METHOD...]`
 //!
 //! The folder has the recordings `A1_C1_pitch_1.parquet` (t, e, u at 100 Hz), and `reference_h.csv`: logarithm
 //! of the gain and phase of each cell at three frequencies before and after 50 s, by Fourier coefficients over
@@ -11,12 +11,10 @@
 //! the 95 % interval of gain and of phase holds the reference.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
-mod pilots;
-
 use std::{collections::BTreeMap, env, f64::consts::PI, fs, path::Path};
 
+use hoid_evidence::pilots::{self, FROM_S};
 use hoid_track::{Method, Sample, TrackOptions, Tracker};
-use pilots::FROM_S;
 use rayon::prelude::*;
 
 const AT_RAD_S: [f64; 3] = [1.0, 2.5, 4.0];

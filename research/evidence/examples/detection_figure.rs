@@ -1,7 +1,7 @@
 //! Draws the share of changes that are found against false alarms an hour, from the table that
-//! `cargo run --release -p hoid-track --example multiple_model_evidence -- detection 40` prints:
+//! `cargo run --release -p hoid-evidence --example multiple_model_evidence -- detection 40` prints:
 //!
-//! `cargo run -p hoid-report --example detection_figure -- detection.txt > docs/src/images/detection.svg`
+//! `cargo run -p hoid-evidence --example detection_figure -- detection.txt > docs/src/images/detection.svg`
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 use hoid_report::figures::{Curve, CurveGrid, CurvePanel, LineKind, Shade, curves};

@@ -2,7 +2,7 @@
 
 use hoid_track::{Method, StartAt, TrackOptions};
 
-use super::evidence::START_S;
+use crate::task::START_S;
 
 /// Delay of the textbook's operator, samples.
 const NK: usize = 29;

@@ -1,25 +1,21 @@
 //! The default tracker beside what came before it in the conditions of the reference text: errors, coverage
 //! and changes of each cell, and the ratio of the errors to those of the best of the others.
 //!
-//! `cargo run --release -p hoid-track --example conditions_evidence -- [RUNS] [M,..] [LEVEL,..] [METHOD,..] [CONDITION,..]`
+//! `cargo run --release -p hoid-evidence --example conditions_evidence -- [RUNS] [M,..] [LEVEL,..] [METHOD,..] [CONDITION,..]`
 //!
 //! Methods: `adaptive` is told nothing; `multiple-model`, `rls` and `rpem` are told the delay and start from a fit
 //! of the first 30.72 s (RLS and RPEM by the settings of the text). Their first rows are therefore not causal:
 //! the ratios are of the rows from then on, and those of 10 s on stand beside.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
-mod evidence;
-#[path = "evidence/told.rs"]
-mod told;
-
-use evidence::{CHANGE_S, START_S, median, on_all_cores, scenario};
+use hoid_evidence::task::{CHANGE_S, START_S, median, on_all_cores, scenario};
+use hoid_evidence::told::{of_the_text, options};
 use hoid_model::{
     Record,
     scenario::{Condition, Realisation},
 };
 use hoid_sim::{RunSeed, Simulator};
 use hoid_track::{Method, Sample, TrackOptions, Tracker};
-use told::{of_the_text, options};
 
 /// Not a seed on which anything was set.
 const SEED: u64 = 46_000;

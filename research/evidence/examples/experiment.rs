@@ -1,7 +1,7 @@
 //! The experiment of section VI with virtual people: the tables of the page of that name of the
 //! book, and its figures into a directory.
 //!
-//! `cargo run --release -p hoid-thesis --example experiment -- experiment > experiment.md`
+//! `cargo run --release -p hoid-evidence --example experiment -- experiment > experiment.md`
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 use std::path::Path;

@@ -2,7 +2,7 @@
 //! study, as they stand there:
 //!
 //! `hoid study run adaptation --out adaptation` and
-//! `cargo run --release -p hoid-study --example adaptation_tables -- adaptation`
+//! `cargo run --release -p hoid-evidence --example adaptation_tables -- adaptation`
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 use std::path::Path;

@@ -1,0 +1,16 @@
+//! What the studies of this crate share. A study is a file in `examples/`; its head says what it
+//! counts and what its arguments are.
+//!
+//! | module | what it holds |
+//! |---|---|
+//! | [`task`] | the conditions of the reference text, and runs on all cores |
+//! | [`told`] | methods that are told the delay |
+//! | [`oracle`] | what is known at most of a change: both persons are known |
+//! | [`pilots`] | the folder of recorded pilots |
+
+#![allow(clippy::unwrap_used, clippy::print_stdout)]
+
+pub mod oracle;
+pub mod pilots;
+pub mod task;
+pub mod told;
