@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 
-use crate::usual_names::{control_among, error_among};
+use crate::table::{control_among, error_among};
 
 /// A cell in a message is cut to this many characters.
 const SHOWN: usize = 40;
@@ -157,5 +157,11 @@ mod tests {
         assert_eq!(did_you_mean(&["e"], &own), "; did you mean \"Tracking error\"?");
         assert_eq!(did_you_mean(&["Error"], &own), "; did you mean \"Tracking error\"?");
         assert_eq!(did_you_mean(&["u"], &own), "; did you mean \"Stick\"?");
+    }
+
+    #[test]
+    fn long_and_strange_cells_are_shown_short() {
+        let shown = shown(&"\u{1b}[31mé".repeat(1000));
+        assert!(shown.chars().count() < 200 && !shown.contains('\u{1b}'), "{shown}");
     }
 }

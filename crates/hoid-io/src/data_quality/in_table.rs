@@ -6,9 +6,8 @@ use super::issue::{QualityIssue, QualityIssueKind};
 use super::search::{issues_of, names_a_clock};
 use super::signals::{Signal, Signals};
 use crate::IoError;
-use crate::column_expression;
-use crate::read_options::ReadOptions;
-use crate::table::Table;
+use crate::record::ReadOptions;
+use crate::table::{Table, column_expression};
 
 /// What is wrong with the columns that are asked for, within the span.
 ///

@@ -9,9 +9,8 @@
 //! | `timing` | jitter, missing rows, a time that stands or runs back, a clock that is off or drifts |
 //! | `holds` | rows that are there twice, and channels that all hold their values |
 //! | `values` | saturation, quantisation, constants, missing values |
-//! | `search` | all of these, for columns that belong together |
+//! | `search` | all of these, for columns that belong together, and for the channels of a record |
 //! | `in_table` | the same for the columns that a record is made of |
-//! | `of_record` | the same for the channels of a record |
 //!
 //! An operator's channel may be smooth, quiet or constant for good reasons: the rules are made so
 //! that simulated operators without faults give no finding (tested), and say of what they find what
@@ -21,7 +20,6 @@ mod grid;
 mod holds;
 mod in_table;
 mod issue;
-mod of_record;
 mod search;
 mod signals;
 mod timing;
@@ -30,7 +28,7 @@ mod values;
 pub(crate) use grid::Grid;
 pub(crate) use in_table::{issues_of_record, issues_of_signals};
 pub use issue::{Place, QualityIssue, QualityIssueKind};
-pub use of_record::quality_of_record;
+pub use search::quality_of_record;
 pub(crate) use search::{issues_of, names_a_clock};
 pub(crate) use signals::{Signal, Signals};
 pub(crate) use values::{Levels, rails};

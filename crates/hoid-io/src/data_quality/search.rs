@@ -1,8 +1,10 @@
-//! Everything that is wrong with columns that belong together.
+//! Everything that is wrong with columns that belong together, and with the channels of a record.
+
+use hoid_model::Record;
 
 use super::grid::Grid;
 use super::issue::QualityIssue;
-use super::signals::Signals;
+use super::signals::{Signal, Signals};
 use super::values::Levels;
 use super::{holds, timing, values};
 
@@ -24,6 +26,23 @@ pub(crate) fn issues_of(signals: &Signals<'_>) -> Vec<QualityIssue> {
     }
     found.sort_by(|a, b| (a.kind, &a.channel).cmp(&(b.kind, &b.channel)));
     found
+}
+
+/// What is wrong with the values of e and u: saturation, quantisation, constants. Of its time nothing is known
+/// but that it is even.
+pub fn quality_of_record(record: &Record) -> Vec<QualityIssue> {
+    let channels = record.input_channel().into_iter().chain([record.output_channel()]);
+    let columns = channels
+        .map(|channel| Signal {
+            name: &channel.name,
+            values: &channel.values,
+        })
+        .collect();
+    issues_of(&Signals {
+        columns,
+        nominal_hz: Some(1.0 / record.sample_time().s()),
+        ..Signals::default()
+    })
 }
 
 /// Whether a name says that a column counts time.

@@ -3,9 +3,9 @@
 use std::fs;
 use std::path::Path;
 
+use super::format::{Format, Writing};
 use super::{ALL, csv, packed};
 use crate::IoError;
-use crate::format::{Format, Writing};
 
 /// The endings of the files that can be read, for help texts and messages:
 /// `.csv (also as .txt), .tsv, ... or .xdf`.

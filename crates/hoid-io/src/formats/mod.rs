@@ -1,18 +1,26 @@
-//! The file formats, one module each.
+//! The file formats, one module each, and what they share.
 //!
 //! To add one: a module with a [`Format`], here its `mod` line and its line in [`ALL`].
 //!
 //! | module | what it holds |
 //! |---|---|
+//! | `format` | [`Format`]: what a format says of itself, and all that the rest of the crate knows of it |
+//! | `lookup` | the format of a file by its extension; what to do about the formats of others |
 //! | `csv` | text with commas, semicolons or tabs |
 //! | `parquet` | Apache Parquet |
 //! | `npz` | NPZ and NPY of numpy |
 //! | `mat` | variables of MATLAB, HDF5 |
 //! | `xdf` | streams of the Lab Streaming Layer |
 //! | `packed` | text packed by gzip, and tables of BIDS |
-//! | `lookup` | the format of a file by its extension |
+//! | `arrays` | files of named arrays: paths, and the columns among them |
+//! | `budget` | how much memory a file may take |
+//! | `guarded` | panics of foreign readers as errors |
 
+pub(crate) mod arrays;
+mod budget;
 mod csv;
+mod format;
+mod guarded;
 mod lookup;
 mod mat;
 mod npz;
@@ -20,11 +28,11 @@ mod packed;
 mod parquet;
 mod xdf;
 
+pub(crate) use budget::longest_settings;
 pub(crate) use csv::write_record as write_record_as_csv;
+pub(crate) use format::{ColumnsWriter, Format, Reading, RowWriter, Writing};
 pub(crate) use lookup::{bytes_of, format_to_write};
 pub use lookup::{readable_endings, writable_endings};
-
-use crate::format::Format;
 
 /// All formats, in the order in which messages name them. No two have an ending in common.
 const ALL: &[&Format] = &[

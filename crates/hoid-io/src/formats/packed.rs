@@ -10,8 +10,8 @@ use std::path::{Path, PathBuf};
 use flate2::read::MultiGzDecoder;
 use serde::Deserialize;
 
+use super::budget::Budget;
 use crate::IoError;
-use crate::budget::Budget;
 use crate::table::Cell;
 
 /// Bytes that are unpacked together.

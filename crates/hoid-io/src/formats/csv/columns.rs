@@ -5,8 +5,8 @@ use std::io::{self, Write};
 
 use super::text::{as_meant, comments, harmless, is_aside, place, reader, row_start, separator, text};
 use crate::IoError;
-use crate::format::RowWriter;
-use crate::output_table::{ColumnKind, ColumnValues, OutputColumn, OutputTable, TableSchema, Values};
+use crate::formats::format::RowWriter;
+use crate::results::{ColumnKind, ColumnValues, OutputColumn, OutputTable, TableSchema, Values};
 use crate::table::{Cell, check_names};
 use crate::wording::shown;
 

@@ -16,7 +16,7 @@ mod text;
 
 pub(crate) use record::write_with_commas as write_record;
 
-use crate::format::{Format, Reading, Writing};
+use crate::formats::format::{Format, Reading, Writing};
 
 /// Divided by commas where it is written; read with any separator.
 pub(super) const CSV: Format = Format {

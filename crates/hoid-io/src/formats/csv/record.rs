@@ -6,7 +6,7 @@ use std::io::{self, Write};
 use hoid_model::Record;
 
 use super::text::harmless;
-use crate::record_columns::{channels, comments};
+use crate::record::{channels, comments};
 
 /// Writes the record, divided by commas.
 pub(crate) fn write_with_commas(file: &mut dyn Write, record: &Record) -> io::Result<()> {

@@ -20,9 +20,8 @@ use super::text::{
     text,
 };
 use crate::IoError;
-use crate::moment::Moments;
 use crate::table::{Cell, Column, Source, Table, asides, check_names, check_number, with_decimal_point};
-use crate::time_column::is_time;
+use crate::time::{Moments, is_time};
 use crate::wording::{list, shown};
 
 /// The text of the file, asked again when an error needs a line or a cell.

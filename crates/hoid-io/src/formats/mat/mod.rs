@@ -23,8 +23,8 @@ mod version5;
 mod version73;
 mod write;
 
-use crate::arrays::{Contents, Indexing};
-use crate::format::{Format, Reading, Writing};
+use crate::formats::arrays::{Contents, Indexing};
+use crate::formats::format::{Format, Reading, Writing};
 
 pub(super) const MAT: Format = Format {
     name: "MATLAB",

@@ -3,7 +3,7 @@
 //! A name that MATLAB does not take, such as `K e` or `f-y`, is written as the nearest that it
 //! does, and kept beside.
 
-use crate::arrays::{COMMENTS, Entry, Value};
+use crate::formats::arrays::{COMMENTS, Entry, Value};
 
 /// The variable that keeps the names that are no names of variables, each line a variable and the
 /// name it stands for.

@@ -1,6 +1,6 @@
 //! Objects of MATLAB: only MATLAB reads what stands in them, and a line there takes their numbers out.
 
-use crate::arrays::OBJECT;
+use crate::formats::arrays::OBJECT;
 
 /// An object of a class in words, with the line of MATLAB that saves its numbers.
 pub(super) fn object(class: &str) -> String {

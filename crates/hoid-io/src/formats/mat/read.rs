@@ -4,8 +4,8 @@ use super::elements::HEADER;
 use super::names::named;
 use super::{version4, version5, version73};
 use crate::IoError;
-use crate::arrays::{Contents, Indexing};
-use crate::budget::Budget;
+use crate::formats::arrays::{Contents, Indexing};
+use crate::formats::budget::Budget;
 
 /// The first bytes of HDF5.
 const HDF5: &[u8] = b"\x89HDF\r\n\x1a\n";

@@ -2,8 +2,8 @@
 //! numbers each.
 
 use crate::IoError;
-use crate::arrays::{Array, Entry, Kind, Numbers, Value};
-use crate::budget::Budget;
+use crate::formats::arrays::{Array, Entry, Kind, Numbers, Value};
+use crate::formats::budget::Budget;
 
 /// Bytes of the five numbers.
 const HEADER: usize = 20;

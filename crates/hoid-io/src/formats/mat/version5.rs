@@ -8,8 +8,8 @@ use flate2::read::ZlibDecoder;
 use super::elements::{Elements, HEADER, data};
 use super::objects::object;
 use crate::IoError;
-use crate::arrays::{Array, Entry, Kind, Numbers, Value};
-use crate::budget::{Budget, MOST_NESTED};
+use crate::formats::arrays::{Array, Entry, Kind, Numbers, Value};
+use crate::formats::budget::{Budget, MOST_NESTED};
 use crate::wording::{shown, told};
 
 const CELL: u32 = 1;

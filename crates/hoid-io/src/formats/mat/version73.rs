@@ -8,9 +8,9 @@ use hdf5_pure::{AttrValue, DType, Dataset, Error, File, Group, H5Element, Object
 
 use super::objects::object;
 use crate::IoError;
-use crate::arrays::{Array, Entry, Indexing, Kind, Numbers, Value};
-use crate::budget::{Budget, MOST_NESTED};
-use crate::guarded::guarded;
+use crate::formats::arrays::{Array, Entry, Indexing, Kind, Numbers, Value};
+use crate::formats::budget::{Budget, MOST_NESTED};
+use crate::formats::guarded::guarded;
 use crate::wording::told;
 
 /// What the visit of a group or a dataset counts for, bytes: links may lead in circles.

@@ -8,8 +8,8 @@ use flate2::write::ZlibEncoder;
 
 use super::elements::{HEADER, data};
 use super::names::{NAMES, variables};
-use crate::arrays::COMMENTS;
-use crate::output_table::{TableSchema, Values};
+use crate::formats::arrays::COMMENTS;
+use crate::results::{TableSchema, Values};
 
 const CELL: u32 = 1;
 const CHAR: u32 = 4;

@@ -12,10 +12,10 @@ use zip::{CompressionMethod, DateTime, ZipArchive, ZipWriter};
 
 use super::npy::{self, NpyError};
 use crate::IoError;
-use crate::arrays::{COMMENTS, Contents, Entry, Indexing};
-use crate::budget::Budget;
-use crate::guarded::guarded;
-use crate::output_table::{TableSchema, Values};
+use crate::formats::arrays::{COMMENTS, Contents, Entry, Indexing};
+use crate::formats::budget::Budget;
+use crate::formats::guarded::guarded;
+use crate::results::{TableSchema, Values};
 use crate::wording::{shown, told};
 
 /// The arrays in the bytes of a file.

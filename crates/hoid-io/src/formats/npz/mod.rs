@@ -12,7 +12,7 @@ mod header;
 mod npy;
 mod single;
 
-use crate::format::{Format, Reading, Writing};
+use crate::formats::format::{Format, Reading, Writing};
 
 pub(super) const NPZ: Format = Format {
     name: "NPZ",

@@ -3,8 +3,8 @@
 use std::rc::Rc;
 
 use super::header::{self, Descr, Header};
-use crate::arrays::{Array, Entry, Kind, MOMENTS, Numbers, Value};
-use crate::output_table::Values;
+use crate::formats::arrays::{Array, Entry, Kind, MOMENTS, Numbers, Value};
+use crate::results::Values;
 use crate::wording::shown;
 
 const MAGIC: &[u8] = b"\x93NUMPY";

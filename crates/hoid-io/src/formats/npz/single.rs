@@ -2,7 +2,7 @@
 
 use super::npy::{NpyError, entries};
 use crate::IoError;
-use crate::arrays::{Contents, Indexing};
+use crate::formats::arrays::{Contents, Indexing};
 
 /// The one array in an NPY file; it is named as `numpy.savez` names an array without a name. The
 /// fields of a structured array are columns of their own.

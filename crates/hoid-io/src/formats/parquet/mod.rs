@@ -17,7 +17,7 @@ mod record;
 mod results;
 mod write;
 
-use crate::format::{Format, Reading, Writing};
+use crate::formats::format::{Format, Reading, Writing};
 
 pub(super) const PARQUET: Format = Format {
     name: "Parquet",

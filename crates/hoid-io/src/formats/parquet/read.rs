@@ -20,8 +20,8 @@ use super::{
     pages,
 };
 use crate::IoError;
-use crate::budget::Budget;
-use crate::guarded::guarded;
+use crate::formats::budget::Budget;
+use crate::formats::guarded::guarded;
 use crate::table::check_number;
 use crate::wording::{shown, told};
 

@@ -6,9 +6,8 @@
 use super::columns::{Data, ReadColumn};
 use super::read::read;
 use crate::IoError;
-use crate::moment::{Moments, seconds};
 use crate::table::{Cell, Column, Precision, Source, Table, asides, check_names};
-use crate::time_column::is_time;
+use crate::time::{Moments, is_time, seconds};
 use crate::wording::shown;
 
 /// What stood in the cells that are no finite numbers.

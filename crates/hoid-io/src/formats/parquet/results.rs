@@ -3,7 +3,7 @@
 use super::columns::{Data, ReadColumn};
 use super::read::read as read_columns;
 use crate::IoError;
-use crate::output_table::{ColumnValues, OutputColumn, OutputTable};
+use crate::results::{ColumnValues, OutputColumn, OutputTable};
 use crate::wording::shown;
 
 /// The columns of a file, with the kinds that they were written with.

@@ -15,8 +15,8 @@ use parquet::file::writer::SerializedFileWriter;
 use parquet::schema::types::Type;
 
 use super::columns::COMMENTS;
-use crate::format::RowWriter;
-use crate::output_table::{ColumnKind, ColumnSchema, TableSchema, Values};
+use crate::formats::format::RowWriter;
+use crate::results::{ColumnKind, ColumnSchema, TableSchema, Values};
 
 const CREATED_BY: &str = concat!("hoid version ", env!("CARGO_PKG_VERSION"));
 

@@ -7,7 +7,7 @@
 use std::collections::HashMap;
 
 use super::header::{self, Footer, Header};
-use crate::arrays::Kind;
+use crate::formats::arrays::Kind;
 use crate::wording::shown;
 
 const STREAM_HEADER: u16 = 2;

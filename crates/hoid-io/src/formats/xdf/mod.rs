@@ -15,7 +15,7 @@ mod clock;
 mod header;
 mod streams;
 
-use crate::format::{Format, Reading, Writing};
+use crate::formats::format::{Format, Reading, Writing};
 
 pub(super) const XDF: Format = Format {
     name: "XDF",

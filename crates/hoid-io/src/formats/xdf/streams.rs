@@ -6,8 +6,8 @@ use std::rc::Rc;
 use super::chunks::{self, Samples, Stream};
 use super::clock;
 use crate::IoError;
-use crate::arrays::{Array, Contents, Entry, Indexing, Numbers, Value};
-use crate::budget::Budget;
+use crate::formats::arrays::{Array, Contents, Entry, Indexing, Numbers, Value};
+use crate::formats::budget::Budget;
 use crate::wording::shown;
 
 /// What an entry takes, bytes, about.

@@ -1,0 +1,135 @@
+//! Columns of one stream at the times of another: linear interpolation between the neighbours.
+
+use std::ops::Range;
+
+use super::column_path::ColumnPath;
+use super::numbers::Numbers;
+use crate::IoError;
+use crate::wording::shown;
+
+/// A column at the times of another stream.
+pub(super) struct Aligned {
+    pub(super) numbers: Numbers,
+    /// The rows that lie inside of the stream that the column came from.
+    pub(super) rows: Range<usize>,
+    pub(super) note: String,
+}
+
+/// The column `column_path` at the times of the structure `beside`.
+pub(super) fn aligned(
+    column_paths: &[ColumnPath],
+    column_path: &ColumnPath,
+    beside: &str,
+    file: &str,
+) -> Result<Aligned, IoError> {
+    let (from, to) = (
+        times(column_paths, &column_path.parent, file)?,
+        times(column_paths, beside, file)?,
+    );
+    let values = column_path.numbers().map(Numbers::values).unwrap_or_default();
+    let (Some(first), Some(last)) = (from.first(), from.last()) else {
+        return Err(IoError::NoRows { file: file.to_owned() });
+    };
+    let start = to.partition_point(|t| t < first);
+    let end = to.partition_point(|t| t <= last);
+    let mut at = 0;
+    let value = |t: &f64| {
+        while at + 2 < from.len() && from[at + 1] < *t {
+            at += 1;
+        }
+        between(&from[at..], &values[at.min(values.len())..], *t)
+    };
+    let numbers: Vec<f64> = to.iter().map(value).collect();
+    let hz = |t: &[f64]| (t.len().saturating_sub(1)) as f64 / (t[t.len() - 1] - t[0]);
+    let (from_hz, to_hz) = (hz(&from), hz(&to));
+    let mut note = format!(
+        "{} is interpolated linearly from {from_hz:.3} Hz to the {to_hz:.3} Hz of {}, where both have samples",
+        shown(&column_path.path),
+        shown(beside)
+    );
+    if from_hz > 1.5 * to_hz {
+        note.push_str("; no low-pass filter was applied");
+    }
+    Ok(Aligned {
+        numbers: Numbers::from_f64(&numbers),
+        rows: start..end.max(start),
+        note,
+    })
+}
+
+/// The line through the first two of the points.
+fn between(t: &[f64], values: &[f64], at: f64) -> f64 {
+    match (t, values) {
+        ([t0, t1, ..], [v0, v1, ..]) => {
+            let part = (at - t0) / (t1 - t0);
+            // Exact at both ends.
+            if part == 1.0 { *v1 } else { v0 + part * (v1 - v0) }
+        }
+        ([_], [v0]) => *v0,
+        _ => f64::NAN,
+    }
+}
+
+/// The times of a structure, which have to increase.
+fn times(column_paths: &[ColumnPath], place: &str, file: &str) -> Result<Vec<f64>, IoError> {
+    let time = column_paths
+        .iter()
+        .find(|column_path| column_path.parent == place && column_path.name() == "t");
+    let times = time
+        .and_then(ColumnPath::numbers)
+        .map(Numbers::values)
+        .unwrap_or_default();
+    let standing = |pair: &[f64]| pair[1].partial_cmp(&pair[0]) != Some(std::cmp::Ordering::Greater);
+    match times.windows(2).position(standing) {
+        None if times.is_empty() => Err(IoError::NoRows { file: file.to_owned() }),
+        None => Ok(times),
+        Some(at) => Err(IoError::NotIncreasing {
+            file: file.to_owned(),
+            place: format!("stream {}, row {}", shown(place), at + 2),
+            found: times[at + 1],
+            previous: times[at],
+        }),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::formats::arrays::array::Array;
+    use crate::formats::arrays::contents::{Entry, Indexing, Value};
+
+    #[test]
+    fn other_times() {
+        let entry = |parent: &str, name: &str, values: &[f64]| {
+            Entry::field(parent, name, Value::Array(Array::vector(Numbers::from_f64(values))))
+        };
+        let entries = [
+            entry("a", "t", &[0.0, 1.0, 3.0]),
+            entry("a", "x", &[0.0, 10.0, -10.0]),
+            entry("b", "t", &[-1.0, 0.0, 0.5, 1.0, 2.0, 3.0, 3.5]),
+            entry("c", "t", &[0.0, 1.0, 1.0]),
+            entry("d", "t", &[7.0]),
+        ];
+        let column_paths: Vec<ColumnPath> = entries
+            .iter()
+            .flat_map(|entry| entry.column_paths(Indexing::Python))
+            .collect();
+        let found = aligned(&column_paths, &column_paths[1], "b", "f").unwrap();
+        assert_eq!(found.rows, 1..6);
+        assert_eq!(found.numbers.values()[1..6], [0.0, 5.0, 10.0, 0.0, -10.0]);
+        assert!(matches!(
+            aligned(&column_paths, &column_paths[1], "c", "f"),
+            Err(IoError::NotIncreasing { .. })
+        ));
+        assert!(
+            aligned(&column_paths, &column_paths[1], "d", "f")
+                .unwrap()
+                .rows
+                .is_empty()
+        );
+        assert!(matches!(
+            aligned(&column_paths, &column_paths[1], "e", "f"),
+            Err(IoError::NoRows { .. })
+        ));
+    }
+}

@@ -1,0 +1,212 @@
+//! Arrays as columns.
+//!
+//! An array with one long side is a column. Of a matrix, time runs along the longer side, and each
+//! line along it is a column with a path of its own: `x(:,2)` or `x(2,:)` in MATLAB's words,
+//! counted from 1, `x[:,1]` or `x[1,:]` in Python's, counted from 0. Of a square one the first
+//! index is time.
+
+use super::contents::{Contents, Entry, Indexing, OBJECT, Value};
+use super::numbers::Numbers;
+use crate::IoError;
+use crate::wording::shown;
+
+/// A matrix with more lines than this is a picture, not a set of channels.
+const MOST_LINES: usize = 256;
+
+/// One column.
+#[derive(Debug, Clone)]
+pub(crate) struct ColumnPath {
+    pub(crate) path: String,
+    /// The structure that it stands in; empty at top level.
+    pub(crate) parent: String,
+    pub(crate) unit: String,
+    pub(crate) holds: Holds,
+}
+
+/// What a column holds.
+#[derive(Debug, Clone)]
+pub(crate) enum Holds {
+    Numbers(Numbers),
+    Texts(Vec<String>),
+    Unread(String),
+}
+
+impl ColumnPath {
+    /// The number of rows.
+    pub(crate) fn len(&self) -> usize {
+        match &self.holds {
+            Holds::Numbers(numbers) => numbers.len(),
+            Holds::Texts(texts) => texts.len(),
+            Holds::Unread(_) => 0,
+        }
+    }
+
+    /// The numbers, where it holds such.
+    pub(crate) fn numbers(&self) -> Option<&Numbers> {
+        match &self.holds {
+            Holds::Numbers(numbers) => Some(numbers),
+            _ => None,
+        }
+    }
+
+    /// The last part of the path.
+    pub(crate) fn name(&self) -> &str {
+        let name = self.path.strip_prefix(self.parent.as_str()).unwrap_or(&self.path);
+        if self.parent.is_empty() {
+            name
+        } else {
+            name.trim_start_matches('.')
+        }
+    }
+
+    /// Why it is no column of numbers.
+    pub(super) fn refused(&self, file: &str) -> IoError {
+        IoError::Unsupported {
+            file: file.to_owned(),
+            found: format!("{} holds {}", shown(&self.path), self.what()),
+            remedy: "save the column as an array of real numbers",
+        }
+    }
+
+    /// Whether it is an object of MATLAB.
+    pub(super) fn holds_object(&self) -> bool {
+        matches!(&self.holds, Holds::Unread(what) if what.starts_with(OBJECT))
+    }
+
+    /// What it holds, in words.
+    pub(crate) fn what(&self) -> String {
+        match &self.holds {
+            Holds::Numbers(numbers) => numbers.kind().name().to_owned(),
+            Holds::Texts(_) => String::from("text"),
+            Holds::Unread(what) => what.clone(),
+        }
+    }
+}
+
+/// A path without its last part. A point inside of brackets is none between parts.
+pub(crate) fn parent(path: &str) -> &str {
+    let mut depth = 0_usize;
+    for (at, byte) in path.bytes().enumerate().rev() {
+        match byte {
+            b')' | b']' | b'}' => depth += 1,
+            b'(' | b'[' | b'{' => depth = depth.saturating_sub(1),
+            b'.' if depth == 0 => return &path[..at],
+            _ => {}
+        }
+    }
+    ""
+}
+
+impl Contents {
+    /// All columns.
+    pub(crate) fn column_paths(&self) -> Vec<ColumnPath> {
+        self.entries
+            .iter()
+            .flat_map(|entry| entry.column_paths(self.indexing))
+            .collect()
+    }
+}
+
+impl Entry {
+    /// The columns in it.
+    pub(super) fn column_paths(&self, indexing: Indexing) -> Vec<ColumnPath> {
+        let column_path = |path: String, holds| ColumnPath {
+            path,
+            parent: self.parent.clone(),
+            unit: self.unit.clone(),
+            holds,
+        };
+        let one = |holds| vec![column_path(self.path.clone(), holds)];
+        match &self.value {
+            Value::Texts(texts) => one(Holds::Texts(texts.clone())),
+            Value::Unread(what) => one(Holds::Unread(what.clone())),
+            Value::Array(array) => {
+                let sides: Vec<usize> = array.dims.iter().copied().filter(|side| *side != 1).collect();
+                match sides.as_slice() {
+                    [] | [_] => one(Holds::Numbers(array.numbers.clone())),
+                    [..] if sides.contains(&0) => one(Holds::Numbers(array.numbers.clone())),
+                    [rows, columns] if array.dims.len() == 2 && *rows.min(columns) <= MOST_LINES => {
+                        let count = *rows.min(columns);
+                        let along_first = rows >= columns;
+                        let name = |k: usize| match (indexing, along_first) {
+                            (Indexing::Matlab, true) => format!("{}(:,{})", self.path, k + 1),
+                            (Indexing::Matlab, false) => format!("{}({},:)", self.path, k + 1),
+                            (Indexing::Python, true) => format!("{}[:,{k}]", self.path),
+                            (Indexing::Python, false) => format!("{}[{k},:]", self.path),
+                        };
+                        (0..count)
+                            .map(|k| column_path(name(k), Holds::Numbers(array.line(k, along_first))))
+                            .collect()
+                    }
+                    _ => {
+                        let sides: Vec<String> = array.dims.iter().map(usize::to_string).collect();
+                        one(Holds::Unread(format!("an array of {}", sides.join(" x "))))
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::formats::arrays::array::Array;
+
+    fn matrix(dims: &[usize], last_fastest: bool, indexing: Indexing) -> Vec<(String, Vec<f64>)> {
+        let count: usize = dims.iter().product();
+        let numbers: Vec<f64> = (0..count).map(|k| k as f64).collect();
+        let array = Array {
+            numbers: Numbers::from_f64(&numbers),
+            dims: dims.to_vec(),
+            last_fastest,
+        };
+        let column_paths = Entry::new("x", Value::Array(array)).column_paths(indexing);
+        let values = |column_path: ColumnPath| {
+            (
+                column_path.path.clone(),
+                column_path.numbers().map(Numbers::values).unwrap_or_default(),
+            )
+        };
+        column_paths.into_iter().map(values).collect()
+    }
+
+    #[test]
+    fn lines_of_matrices() {
+        let found = matrix(&[3, 2], true, Indexing::Python);
+        assert_eq!(
+            found,
+            [
+                ("x[:,0]".into(), vec![0.0, 2.0, 4.0]),
+                ("x[:,1]".into(), vec![1.0, 3.0, 5.0])
+            ]
+        );
+        let found = matrix(&[3, 2], false, Indexing::Matlab);
+        assert_eq!(
+            found,
+            [
+                ("x(:,1)".into(), vec![0.0, 1.0, 2.0]),
+                ("x(:,2)".into(), vec![3.0, 4.0, 5.0])
+            ]
+        );
+        let found = matrix(&[2, 3], true, Indexing::Python);
+        assert_eq!(found[1], ("x[1,:]".into(), vec![3.0, 4.0, 5.0]));
+        let found = matrix(&[2, 3], false, Indexing::Matlab);
+        assert_eq!(found[1], ("x(2,:)".into(), vec![1.0, 3.0, 5.0]));
+        assert_eq!(
+            matrix(&[1, 3, 1], true, Indexing::Python),
+            [("x".into(), vec![0.0, 1.0, 2.0])]
+        );
+        assert_eq!(matrix(&[2, 2, 2], true, Indexing::Python), [("x".into(), vec![])]);
+        assert_eq!(matrix(&[0, 5], true, Indexing::Python), [("x".into(), vec![])]);
+    }
+
+    #[test]
+    fn parents() {
+        assert_eq!(parent("e"), "");
+        assert_eq!(parent("data.run(3).e"), "data.run(3)");
+        assert_eq!(parent("run(3).x(:,2)"), "run(3)");
+        assert_eq!(parent("c{1}"), "");
+        assert_eq!(parent("c{1.5}"), "");
+    }
+}

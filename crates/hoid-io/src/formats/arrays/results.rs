@@ -1,0 +1,40 @@
+//! All arrays of a file as a table of results.
+
+use super::column_path::Holds;
+use super::contents::Contents;
+use crate::IoError;
+use crate::results::{ColumnValues, OutputColumn, OutputTable};
+use crate::wording::shown;
+
+/// All columns, for a table of results.
+pub(crate) fn output_table_of(contents: Contents, file: &str) -> Result<OutputTable, IoError> {
+    let mut columns: Vec<OutputColumn> = Vec::new();
+    for column_path in contents.column_paths() {
+        let error = || column_path.refused(file);
+        let values = match &column_path.holds {
+            Holds::Texts(texts) => ColumnValues::Text(texts.clone()),
+            Holds::Unread(_) => return Err(error()),
+            Holds::Numbers(numbers) => match numbers.counts() {
+                Some(counts) if numbers.kind().is_whole() => ColumnValues::Whole(counts),
+                _ => ColumnValues::Real(numbers.values()),
+            },
+        };
+        if let Some(first) = columns.first().filter(|first| first.values.len() != values.len()) {
+            return Err(IoError::UnequalColumns {
+                file: file.to_owned(),
+                column: shown(&column_path.path),
+                found: values.len(),
+                other: shown(&first.name),
+                expected: first.values.len(),
+            });
+        }
+        columns.push(OutputColumn {
+            name: column_path.path,
+            values,
+        });
+    }
+    Ok(OutputTable {
+        comments: contents.comments,
+        columns,
+    })
+}

@@ -1,0 +1,263 @@
+//! The columns of a record among all arrays of a file.
+//!
+//! A name is a path (`data.run(3).e`), or its end where only one path ends so (`run(3).e`, or `e`);
+//! a path that is the name wins. `run(1).e` also finds the only element `run.e`. The time is `t`,
+//! or `time`, beside the output or in the next structure around it. The other arrays beside the
+//! output become channels where they are as long.
+
+use std::ops::Range;
+
+use super::clocks;
+use super::column_path::{ColumnPath, parent};
+use super::contents::Contents;
+use super::numbers::Numbers;
+use crate::IoError;
+use crate::record::ReadOptions;
+use crate::table::{Column, ColumnExpression, Precision, Signal, Source, Table, asides};
+use crate::time::is_time;
+use crate::wording::{list, shown};
+
+/// The names of the time, the first that is there.
+pub(crate) const TIMES: [&str; 2] = ["t", "time"];
+
+/// The unit of moments of a clock, in s from the first.
+pub(crate) const MOMENTS: &str = "s from the first";
+
+/// More columns than this are not the channels of a record; the others are left out.
+const MOST_COLUMNS: usize = 1024;
+
+/// Where the rows of a table came from.
+struct ArraySource<'a> {
+    file: &'a str,
+    columns: Vec<Numbers>,
+}
+
+impl Source for ArraySource<'_> {
+    fn file(&self) -> &str {
+        self.file
+    }
+
+    fn place(&self, row: usize) -> String {
+        format!("row {}", row + 1)
+    }
+
+    fn cell(&self, row: usize, column: usize) -> String {
+        self.columns
+            .get(column)
+            .map_or_else(String::new, |numbers| numbers.value(row).to_string())
+    }
+}
+
+/// The table that the options ask for.
+pub(crate) fn table_of<'a>(contents: Contents, options: &ReadOptions, file: &'a str) -> Result<Table<'a>, IoError> {
+    let column_paths = contents.column_paths();
+    let expressions: Vec<&ColumnExpression> = options.input.iter().chain([&options.output]).collect();
+    let named = Named::of(&column_paths, &expressions, file)?;
+    // Input first, output last.
+    let mut used: Vec<usize> = Vec::new();
+    for expression in &expressions {
+        let resolved = expression.resolve(&named.names(), file).map_err(|error| {
+            // Where there is an object, the signals stand in it.
+            let object = column_paths.iter().find(|column_path| column_path.holds_object());
+            object.map_or(error, |object| object.refused(file))
+        });
+        let terms = match resolved? {
+            Signal::Column(a) | Signal::Negative(a) => vec![a],
+            Signal::Difference(a, b) => vec![a, b],
+        };
+        used.extend(terms);
+    }
+    let mut notes = contents.notes;
+    let beside = used.last().map_or("", |at| named.columns[*at].1.parent.as_str());
+    let mut columns: Vec<(String, &ColumnPath, Numbers)> = Vec::new();
+    let mut shared = None;
+    for &at in &used {
+        let (name, column_path) = &named.columns[at];
+        let mut numbers = column_path.numbers().ok_or_else(|| column_path.refused(file))?.clone();
+        if contents.own_clocks && column_path.parent != beside {
+            let aligned = clocks::aligned(&column_paths, column_path, beside, file)?;
+            notes.push(aligned.note);
+            numbers = aligned.numbers;
+            shared = Some(common(shared, aligned.rows));
+        }
+        if let Some((first, _, rows)) = columns.first().filter(|(_, _, rows)| rows.len() != numbers.len()) {
+            return Err(IoError::UnequalColumns {
+                file: file.to_owned(),
+                column: shown(name),
+                found: numbers.len(),
+                other: shown(first),
+                expected: rows.len(),
+            });
+        }
+        if !columns.iter().any(|(known, ..)| known == name) {
+            columns.push((name.clone(), column_path, numbers));
+        }
+    }
+    let rows = columns.first().map_or(0, |(.., numbers)| numbers.len());
+    if rows == 0 {
+        return Err(IoError::NoRows { file: file.to_owned() });
+    }
+    if !columns.iter().any(|(name, ..)| name == "t")
+        && let Some(time) = time_beside(&column_paths, beside, rows)
+    {
+        if time.name() != "t" {
+            notes.push(format!("{} is taken as t", shown(&time.path)));
+        }
+        columns.extend(time.numbers().map(|numbers| (String::from("t"), time, numbers.clone())));
+    }
+    let mut left_out = Vec::new();
+    for column_path in column_paths.iter().filter(|column_path| column_path.parent == beside) {
+        if columns.len() == MOST_COLUMNS {
+            left_out.push(column_path.path.as_str());
+            continue;
+        }
+        let known = columns
+            .iter()
+            .any(|(name, used, _)| used.path == column_path.path || name == column_path.name());
+        match column_path.numbers().filter(|numbers| numbers.len() == rows && !known) {
+            Some(numbers) => columns.push((column_path.name().to_owned(), column_path, numbers.clone())),
+            None if !columns.iter().any(|(_, used, _)| used.path == column_path.path) => {
+                left_out.push(column_path.path.as_str())
+            }
+            None => {}
+        }
+    }
+    if !left_out.is_empty() {
+        notes.push(format!(
+            "left out, for they are no columns of {rows} numbers: {}",
+            list(&left_out)
+        ));
+    }
+    // Where other streams have samples as well.
+    let rows = shared.unwrap_or(0..rows);
+    if rows.is_empty() {
+        return Err(IoError::NoOverlap { file: file.to_owned() });
+    }
+    for (.., numbers) in &mut columns {
+        *numbers = numbers.line(rows.start, 1, rows.len());
+    }
+    let mut read: Vec<Column> = columns
+        .iter()
+        .map(|(name, column_path, numbers)| column(name, column_path, numbers))
+        .collect();
+    let sample_time_s = asides(contents.comments.iter().map(String::as_str), &mut read);
+    let columns = columns.iter().map(|(.., numbers)| numbers.clone()).collect();
+    Ok(Table {
+        columns: read,
+        rows: rows.len(),
+        sample_time_s,
+        source: Box::new(ArraySource { file, columns }),
+        notes,
+    })
+}
+
+fn common(known: Option<Range<usize>>, rows: Range<usize>) -> Range<usize> {
+    match known {
+        Some(known) => known.start.max(rows.start)..known.end.min(rows.end),
+        None => rows,
+    }
+}
+
+fn column(name: &str, column_path: &ColumnPath, numbers: &Numbers) -> Column {
+    let values = numbers.values();
+    Column {
+        name: name.to_owned(),
+        unit: if column_path.unit == MOMENTS {
+            String::from("s")
+        } else {
+            column_path.unit.clone()
+        },
+        precision: if is_time(name) {
+            Precision::of_times(&values, numbers.kind().is_single())
+        } else {
+            Precision::default()
+        },
+        values,
+        texts: Vec::new(),
+        moments: column_path.unit == MOMENTS,
+    }
+}
+
+/// Columns by the names that expressions may use.
+struct Named<'a> {
+    /// The paths, then the names that stand for one of them.
+    columns: Vec<(String, &'a ColumnPath)>,
+}
+
+impl<'a> Named<'a> {
+    fn of(column_paths: &'a [ColumnPath], expressions: &[&ColumnExpression], file: &str) -> Result<Self, IoError> {
+        let paths: Vec<&str> = column_paths
+            .iter()
+            .map(|column_path| column_path.path.as_str())
+            .collect();
+        let mut aliases: Vec<(String, &ColumnPath)> = Vec::new();
+        for expression in expressions {
+            let mut ambiguous = None;
+            for name in expression.terms() {
+                let found = match paths.iter().position(|path| *path == name) {
+                    Some(at) => vec![at],
+                    None => ends(&paths, name),
+                };
+                match found.as_slice() {
+                    [at] => aliases.extend((paths[*at] != name).then(|| (name.to_owned(), &column_paths[*at]))),
+                    [] => {}
+                    several => ambiguous = Some((name, several.iter().map(|at| paths[*at]).collect::<Vec<_>>())),
+                }
+            }
+            if let Some((name, paths)) = ambiguous {
+                return Err(IoError::AmbiguousColumn {
+                    file: file.to_owned(),
+                    asked: shown(name),
+                    found: list(&paths),
+                });
+            }
+        }
+        let paths = column_paths
+            .iter()
+            .map(|column_path| (column_path.path.clone(), column_path));
+        Ok(Self {
+            columns: paths.chain(aliases).collect(),
+        })
+    }
+
+    fn names(&self) -> Vec<&str> {
+        self.columns.iter().map(|(name, _)| name.as_str()).collect()
+    }
+}
+
+/// The paths that end in a name, part by part.
+fn ends(paths: &[&str], name: &str) -> Vec<usize> {
+    let ending = |name: &str| -> Vec<usize> {
+        let ends = |path: &str| {
+            path.strip_suffix(name)
+                .is_some_and(|before| before.is_empty() || before.ends_with('.'))
+        };
+        (0..paths.len()).filter(|at| ends(paths[*at])).collect()
+    };
+    let found = ending(name);
+    // The first of one.
+    if found.is_empty() && name.contains("(1)") {
+        ending(&name.replace("(1)", ""))
+    } else {
+        found
+    }
+}
+
+/// The time in the structure of the output, or in the next around it, that is as long.
+fn time_beside<'a>(column_paths: &'a [ColumnPath], beside: &str, rows: usize) -> Option<&'a ColumnPath> {
+    let mut place = beside;
+    loop {
+        let time = |name: &&str| {
+            let is_time = |column_path: &&ColumnPath| column_path.parent == place && column_path.name() == *name;
+            column_paths
+                .iter()
+                .filter(is_time)
+                .find(|column_path| column_path.numbers().is_some_and(|numbers| numbers.len() == rows))
+        };
+        let found = TIMES.iter().find_map(time);
+        if found.is_some() || place.is_empty() {
+            return found;
+        }
+        place = parent(place);
+    }
+}

@@ -1,0 +1,112 @@
+//! What the rest of the crate knows of a file format: its name, its endings, how it is read and how
+//! it is written.
+//!
+//! A format says all of this in one [`Format`], in its own module of `formats`; reading, writing,
+//! the survey of a file and all messages go through it.
+
+use std::io::{self, Write};
+
+use hoid_model::Record;
+
+use super::arrays::{Contents, output_table_of, table_of};
+use crate::IoError;
+use crate::record::{ReadOptions, trials};
+use crate::results::{OutputTable, TableSchema, Values};
+use crate::table::Table;
+use crate::time::with_time;
+
+/// A file format.
+pub(crate) struct Format {
+    /// Its name for a person.
+    pub(crate) name: &'static str,
+    /// The extensions in lower case that stand for it, the usual one first.
+    pub(super) endings: &'static [&'static str],
+    /// How its bytes are read.
+    pub(crate) reading: Reading,
+    /// How a table of results is written.
+    pub(crate) writing: Writing,
+    /// How a record is written, where that is not as a table of its channels.
+    pub(crate) record: Option<RecordWriter>,
+}
+
+/// The columns that a record is made of; the reader may take the bytes or borrow from them.
+type TableReader = for<'a> fn(&'a mut Vec<u8>, &'a str) -> Result<Table<'a>, IoError>;
+/// The columns of a table of results with their kinds.
+type ResultsReader = fn(Vec<u8>, &str) -> Result<OutputTable, IoError>;
+/// All arrays with their paths.
+type ArraysReader = fn(Vec<u8>, &str) -> Result<Contents, IoError>;
+/// Begins a file of rows.
+type RowsStart = fn(&mut dyn Write, &TableSchema) -> io::Result<Box<dyn RowWriter>>;
+/// Writes columns of one length.
+pub(crate) type ColumnsWriter = fn(&mut dyn Write, &TableSchema, &[Values<'_>]) -> io::Result<()>;
+type RecordWriter = fn(&mut dyn Write, &Record) -> io::Result<()>;
+
+/// What a file of the format is.
+pub(crate) enum Reading {
+    /// One flat table.
+    Table {
+        /// As columns of numbers, for a record.
+        record: TableReader,
+        /// As it was written, for results.
+        results: ResultsReader,
+    },
+    /// Named arrays, among which the columns are chosen.
+    Arrays(ArraysReader),
+}
+
+/// How the format takes columns.
+pub(crate) enum Writing {
+    /// Row by row, in bounded memory.
+    Rows(RowsStart),
+    /// Each column as one array, which says its length first: all rows have to be there.
+    Columns(ColumnsWriter),
+    /// Not at all; what the extension stands for, as in "the format of a recorder".
+    ReadOnly(&'static str),
+}
+
+/// A file between its groups of rows. The file is lent for one call at a time.
+pub(crate) trait RowWriter {
+    /// Writes columns of one length.
+    fn rows(&mut self, file: &mut dyn Write, columns: &[Values<'_>]) -> io::Result<()>;
+    /// Ends the file.
+    fn finish(self: Box<Self>, file: &mut dyn Write) -> io::Result<()>;
+}
+
+impl Format {
+    /// Whether tables and records can be written.
+    pub(super) fn is_written(&self) -> bool {
+        !matches!(self.writing, Writing::ReadOnly(_))
+    }
+
+    /// The columns that a record is made of.
+    pub(crate) fn table<'a>(
+        &self,
+        bytes: &'a mut Vec<u8>,
+        file: &'a str,
+        options: &ReadOptions,
+    ) -> Result<Table<'a>, IoError> {
+        let (table, is_trial) = match self.reading {
+            Reading::Table { record, .. } => (record(bytes, file)?, false),
+            Reading::Arrays(read) => {
+                let contents = read(std::mem::take(bytes), file)?;
+                let (contents, is_trial) = trials::of_contents(contents, options.trial.as_ref(), file)?;
+                (table_of(contents, options, file)?, is_trial)
+            }
+        };
+        let table = with_time(table, options.time.as_ref())?;
+        // Samples that are counted need no time, and one that starts again is none of them.
+        let by_itself = options.trial.is_none() && options.sampling_hz.is_some();
+        if is_trial || by_itself {
+            return Ok(table);
+        }
+        trials::of_table(table, options.trial.as_ref())
+    }
+
+    /// A table of results.
+    pub(crate) fn results(&self, bytes: Vec<u8>, file: &str) -> Result<OutputTable, IoError> {
+        match self.reading {
+            Reading::Table { results, .. } => results(bytes, file),
+            Reading::Arrays(read) => output_table_of(read(bytes, file)?, file),
+        }
+    }
+}

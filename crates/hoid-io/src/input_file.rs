@@ -1,0 +1,76 @@
+//! Files that are no recordings, read whole: texts, settings of a bounded length, bytes; and the names
+//! in a directory.
+
+use std::fs;
+use std::io::{self, Read as _};
+use std::path::Path;
+
+use crate::IoError;
+use crate::formats::longest_settings;
+
+/// The text of a file.
+///
+/// # Errors
+/// [`IoError::Unreadable`] for what the system says.
+pub fn read_text(path: &Path) -> Result<String, IoError> {
+    fs::read_to_string(path).map_err(|source| IoError::Unreadable {
+        file: path.display().to_string(),
+        source,
+    })
+}
+
+/// The text of a file of settings, of a length that can be read in bounded memory.
+///
+/// # Errors
+/// [`IoError::Unreadable`] for what the system says, and for one that is too long.
+pub fn read_settings(path: &Path) -> Result<String, IoError> {
+    settings_text(path).map_err(|source| IoError::Unreadable {
+        file: path.display().to_string(),
+        source,
+    })
+}
+
+/// As [`read_settings`], with what the system would say.
+pub(crate) fn settings_text(path: &Path) -> io::Result<String> {
+    let longest = longest_settings();
+    let mut text = String::new();
+    fs::File::open(path)?.take(longest + 1).read_to_string(&mut text)?;
+    if text.len() as u64 <= longest {
+        return Ok(text);
+    }
+    Err(io::Error::other(format!(
+        "more than {} MB of settings; where it is meant to be so long, set HOID_MAX_UNPACKED_MB in the environment to 32 times \
+         its MB",
+        longest >> 20
+    )))
+}
+
+/// The bytes of a file.
+///
+/// # Errors
+/// [`IoError::Unreadable`] for what the system says.
+pub fn read_bytes(path: &Path) -> Result<Vec<u8>, IoError> {
+    fs::read(path).map_err(|source| IoError::Unreadable {
+        file: path.display().to_string(),
+        source,
+    })
+}
+
+/// Names of the files in a directory, in no order.
+///
+/// # Errors
+/// [`IoError::Unreadable`] for what the system says.
+pub fn file_names(directory: &Path) -> Result<Vec<String>, IoError> {
+    let unreadable = |source| IoError::Unreadable {
+        file: directory.display().to_string(),
+        source,
+    };
+    let mut names = Vec::new();
+    for entry in fs::read_dir(directory).map_err(unreadable)? {
+        let entry = entry.map_err(unreadable)?;
+        if entry.path().is_file() {
+            names.push(entry.file_name().to_string_lossy().into_owned());
+        }
+    }
+    Ok(names)
+}

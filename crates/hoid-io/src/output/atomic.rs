@@ -1,0 +1,180 @@
+//! Files that are whole or not there: written beside their place, then renamed into it.
+
+use std::fs;
+use std::io::{self, BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+use super::part_file::Part;
+use crate::IoError;
+
+/// Writes a file through `write`. A file that exists is replaced only when everything is written
+/// and on the disk; on an error it stays as it was and nothing else is left behind. A pipe or a
+/// device is written into directly.
+///
+/// # Errors
+/// [`IoError::Directory`], [`IoError::Unwritable`] for what the system or `write` says.
+///
+/// ```
+/// let path = std::env::temp_dir().join("hoid-example.txt");
+/// hoid_io::write_atomically(&path, |file| writeln!(file, "done"))?;
+/// assert_eq!(std::fs::read_to_string(&path).unwrap(), "done\n");
+/// # std::fs::remove_file(&path).unwrap();
+/// # Ok::<(), hoid_io::IoError>(())
+/// ```
+pub fn write_atomically(path: &Path, write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<(), IoError> {
+    let mut file = WholeFile::create(path)?;
+    file.write(write)?;
+    file.finish()
+}
+
+/// Makes a directory for results, and those above it, where they are not there yet.
+///
+/// # Errors
+/// [`IoError::Unwritable`] for what the system says.
+pub fn make_directory(path: &Path) -> Result<(), IoError> {
+    fs::create_dir_all(path).map_err(|source| IoError::Unwritable {
+        file: path.display().to_string(),
+        source,
+    })
+}
+
+/// A file on its way: dropped before it is finished, it leaves everything as it was.
+pub(crate) struct WholeFile {
+    buffer: BufWriter<fs::File>,
+    /// As the user named it.
+    name: String,
+    /// Where the file is to be, and what it is until then; none for a pipe or a device.
+    beside: Option<Beside>,
+}
+
+struct Beside {
+    part: Part,
+    place: PathBuf,
+    permissions: Option<fs::Permissions>,
+}
+
+impl WholeFile {
+    pub(crate) fn create(path: &Path) -> Result<Self, IoError> {
+        let name = path.display().to_string();
+        // A link stays a link: the file that it names is replaced.
+        let place = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
+        let known = fs::metadata(&place).ok();
+        let opened = match known {
+            Some(known) if known.is_dir() => return Err(IoError::Directory { file: name }),
+            Some(known) if !known.is_file() => {
+                let direct = fs::OpenOptions::new().write(true).open(&place);
+                direct.map(|file| (file, None))
+            }
+            known => part(place, known.map(|k| k.permissions())).map(|(file, beside)| (file, Some(beside))),
+        };
+        match opened {
+            Ok((file, beside)) => Ok(Self {
+                buffer: BufWriter::with_capacity(1 << 16, file),
+                name,
+                beside,
+            }),
+            Err(source) => Err(IoError::Unwritable { file: name, source }),
+        }
+    }
+
+    /// Writes through `write`, behind what is there.
+    pub(crate) fn write<T>(&mut self, write: impl FnOnce(&mut dyn Write) -> io::Result<T>) -> Result<T, IoError> {
+        write(&mut self.buffer).map_err(|source| IoError::Unwritable {
+            file: self.name.clone(),
+            source,
+        })
+    }
+
+    /// Puts the file in its place, when everything is on the disk.
+    pub(crate) fn finish(self) -> Result<(), IoError> {
+        let Self { buffer, name, beside } = self;
+        let finished = buffer
+            .into_inner()
+            .map_err(io::IntoInnerError::into_error)
+            .and_then(|file| beside.map_or(Ok(()), |beside| beside.persist(file)));
+        finished.map_err(|source| IoError::Unwritable { file: name, source })
+    }
+}
+
+impl Beside {
+    fn persist(self, file: fs::File) -> io::Result<()> {
+        file.sync_all()?;
+        self.part.persist(file, &self.place, self.permissions)
+    }
+}
+
+fn part(place: PathBuf, permissions: Option<fs::Permissions>) -> io::Result<(fs::File, Beside)> {
+    let (file, part) = Part::create_in(&directory_of(&place)?)?;
+    Ok((
+        file,
+        Beside {
+            part,
+            place,
+            permissions,
+        },
+    ))
+}
+
+/// The directory in which a file is to be.
+pub(super) fn directory_of(place: &Path) -> io::Result<PathBuf> {
+    if place.file_name().is_none() {
+        return Err(io::Error::new(io::ErrorKind::InvalidInput, "the path names no file"));
+    }
+    Ok(match place.parent() {
+        Some(parent) if !parent.as_os_str().is_empty() => parent.to_owned(),
+        _ => PathBuf::from("."),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_error_leaves_the_old_file_and_nothing_beside_it() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.csv");
+        write_atomically(&path, |file| file.write_all(b"old")).unwrap();
+        let failed = write_atomically(&path, |file| {
+            file.write_all(&[b'x'; 200_000])?;
+            Err(io::Error::other("the pen broke"))
+        });
+        assert!(failed.unwrap_err().to_string().contains("the pen broke"));
+        assert_eq!(fs::read(&path).unwrap(), b"old");
+        write_atomically(&path, |file| file.write_all(b"new")).unwrap();
+        assert_eq!(fs::read(&path).unwrap(), b"new");
+        assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn places_that_cannot_be_written() {
+        let dir = tempfile::tempdir().unwrap();
+        let write = |path: &Path| write_atomically(path, |_| Ok(())).unwrap_err();
+        assert!(matches!(write(dir.path()), IoError::Directory { .. }));
+        assert!(matches!(
+            write(&dir.path().join("no/such/a.csv")),
+            IoError::Unwritable { .. }
+        ));
+        assert!(matches!(write(Path::new("")), IoError::Unwritable { .. }));
+        assert!(matches!(write(&dir.path().join("no/..")), IoError::Unwritable { .. }));
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn links_and_permissions_stay_what_they_are() {
+        use std::os::unix::fs::PermissionsExt;
+        let dir = tempfile::tempdir().unwrap();
+        let (path, link) = (dir.path().join("a.csv"), dir.path().join("link.csv"));
+        let mode = |path: &Path| fs::metadata(path).unwrap().permissions().mode() & 0o777;
+        write_atomically(&path, |file| file.write_all(b"1")).unwrap();
+        let plain = dir.path().join("plain");
+        fs::write(&plain, b"").unwrap();
+        assert_eq!(mode(&path), mode(&plain));
+        fs::set_permissions(&path, fs::Permissions::from_mode(0o640)).unwrap();
+        std::os::unix::fs::symlink(&path, &link).unwrap();
+        write_atomically(&link, |file| file.write_all(b"2")).unwrap();
+        assert!(fs::symlink_metadata(&link).unwrap().is_symlink());
+        assert_eq!(fs::read(&path).unwrap(), b"2");
+        assert_eq!(mode(&path), 0o640);
+    }
+}

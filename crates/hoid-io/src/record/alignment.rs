@@ -1,0 +1,126 @@
+//! Channels that were recorded late, put beside the others without losing an end of the span.
+//!
+//! A channel that is moved by d samples has no value for d rows at one end of what was read. A span
+//! of whole periods would lose its last period with them. Where the file reaches beyond the span,
+//! as much of it is read as the offsets need, channels are moved, and the span is cut out
+//! afterwards: it keeps its length. Where it does not, or where the rate changes (whose filters cut
+//! more than the offsets do), rows are lost as in any other record.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use hoid_model::Record;
+
+use super::from_table::{ReadRecord, record_of};
+use super::read_options::ReadOptions;
+use crate::IoError;
+use crate::formats::bytes_of;
+use crate::preparation::{NewRate, Offset, Preparation, Step};
+
+/// Rows beyond the span for the interpolation of an offset between samples.
+const FOR_INTERPOLATION: f64 = 64.0;
+
+/// The record in a file, prepared, its output moved earlier by `late_samples` besides.
+///
+/// # Errors
+/// As [`read_prepared`](crate::read_prepared).
+pub fn read_aligned(
+    path: &Path,
+    options: &ReadOptions,
+    preparation: &Preparation,
+    late_samples: f64,
+) -> Result<ReadRecord, IoError> {
+    let drop_repeated = preparation.drop_repeated;
+    let read = read_as_recorded(path, options, drop_repeated)?;
+    let late = Preparation {
+        offset: BTreeMap::from([("u".to_owned(), Offset::Samples(late_samples))]),
+        ..Preparation::default()
+    };
+    let spanned = options.span_s != (None, None);
+    if spanned && preparation.rate == NewRate::Kept && (late_samples != 0.0 || !preparation.offset.is_empty()) {
+        let ts_s = read.record.sample_time().s();
+        let reach_s = ts_s * reach(preparation, late_samples, ts_s);
+        let wider = ReadOptions {
+            span_s: (
+                options.span_s.0.map(|t| t - reach_s),
+                options.span_s.1.map(|t| t + reach_s),
+            ),
+            ..options.clone()
+        };
+        if let Ok(wide) = read_as_recorded(path, &wider, drop_repeated)
+            && let Some((record, steps)) = moved_within(wide.record, &read.record, preparation, &late)
+        {
+            let steps = [read.steps, steps].concat();
+            return Ok(ReadRecord { record, steps, ..read });
+        }
+    }
+    let read = read.prepared(preparation)?;
+    if late_samples == 0.0 {
+        Ok(read)
+    } else {
+        read.prepared(&late)
+    }
+}
+
+/// The record as it stands in the file.
+pub(super) fn read_as_recorded(path: &Path, options: &ReadOptions, drop_repeated: bool) -> Result<ReadRecord, IoError> {
+    let file = path.display().to_string();
+    let (format, mut bytes) = bytes_of(path)?;
+    let table = format.table(&mut bytes, &file, options)?;
+    let label = path.file_stem().map(|stem| stem.to_string_lossy().into_owned());
+    let read = record_of(table, options, drop_repeated)?;
+    Ok(ReadRecord {
+        record: read.record.labelled(label.unwrap_or_default()),
+        ..read
+    })
+}
+
+/// Most samples by which a channel is moved, with what an interpolation needs besides.
+fn reach(preparation: &Preparation, late_samples: f64, ts_s: f64) -> f64 {
+    let samples = |offset: &Offset| match offset {
+        Offset::Samples(samples) => *samples,
+        Offset::Seconds(seconds) => seconds / ts_s,
+    };
+    let offsets: Vec<f64> = preparation.offset.values().map(samples).chain([late_samples]).collect();
+    let most = offsets.iter().map(|d| d.abs()).fold(0.0, f64::max) + late_samples.abs();
+    let between = offsets.iter().any(|d| (d - d.round()).abs() > 1e-6);
+    most.ceil() + if between { 2.0 * FOR_INTERPOLATION } else { 0.0 }
+}
+
+/// Moves the channels of a wide record, cuts out the span of a narrow one, and does what comes
+/// after the offsets; `None` where that is not possible, and the narrow record says why.
+fn moved_within(
+    wide: Record,
+    narrow: &Record,
+    preparation: &Preparation,
+    late: &Preparation,
+) -> Option<(Record, Vec<Step>)> {
+    let first = Preparation {
+        units: preparation.units.clone(),
+        scale: preparation.scale.clone(),
+        offset: preparation.offset.clone(),
+        ..Preparation::default()
+    };
+    let rest = Preparation {
+        run_in_s: preparation.run_in_s,
+        detrend: preparation.detrend,
+        ..Preparation::default()
+    };
+    let ts_s = narrow.sample_time().s();
+    let (begin_s, end_s) = (narrow.time_s(0), narrow.time_s(narrow.len()));
+    let label = narrow.label().to_owned();
+    let (record, mut steps) = first.apply(wide).ok()?;
+    let (record, of_late) = late.apply(record).ok()?;
+    let record = record.span(begin_s, end_s).ok()?.labelled(label);
+    let at_start = ((record.time_s(0) - begin_s) / ts_s).round() as usize;
+    let lost = (at_start, (narrow.len() - at_start).saturating_sub(record.len()));
+    steps.extend(of_late);
+    for step in &mut steps {
+        if let Step::Offset { cut_samples, .. } = step {
+            *cut_samples = lost;
+        }
+    }
+    let (record, of_rest) = rest.apply(record).ok()?;
+    steps.extend(of_rest);
+    Some((record, steps))
+}

@@ -1,0 +1,112 @@
+//! Records from files and into files.
+//!
+//! Reading takes the columns that are asked for, finds the sampling, checks every value in use and
+//! gives a [`Record`], or the error that names the place. Nothing is repaired unless
+//! [`Repair`](crate::Repair) asks for it, and what was repaired is said in the notes. The format
+//! follows from the extension.
+
+use std::io::Write;
+use std::path::Path;
+
+use hoid_model::Record;
+
+use super::alignment::read_aligned;
+use super::channels::{channels, comments};
+use super::from_table::ReadRecord;
+use super::read_options::ReadOptions;
+use crate::IoError;
+use crate::formats::{format_to_write, write_record_as_csv};
+use crate::output::write_atomically;
+use crate::preparation::Preparation;
+use crate::results::{ColumnKind, ColumnSchema, TableSchema, Values, write_values};
+
+/// Reads a record with the defaults of the command line: columns e, u and t, and each other column
+/// of numbers as a channel of its own.
+///
+/// # Errors
+/// As [`read_record`].
+pub fn read(path: impl AsRef<Path>) -> Result<Record, IoError> {
+    Ok(read_record(path.as_ref(), &ReadOptions::default())?.record)
+}
+
+/// Reads a record from a file: input, output, and each other column of numbers as a channel of its
+/// own.
+///
+/// # Errors
+/// [`IoError`], naming the place in the file.
+pub fn read_record(path: &Path, options: &ReadOptions) -> Result<ReadRecord, IoError> {
+    read_prepared(path, options, &Preparation::default())
+}
+
+/// Reads a record and prepares it: the units, the alignment and the rate that the estimator is to
+/// see. A span keeps its length under offsets where the file reaches beyond it.
+///
+/// # Errors
+/// [`IoError`], naming the place in the file or the step of the preparation.
+pub fn read_prepared(path: &Path, options: &ReadOptions, preparation: &Preparation) -> Result<ReadRecord, IoError> {
+    read_aligned(path, options, preparation, 0.0)
+}
+
+/// Writes a record: t, then `f_t` where there is one, input, output, and the other channels in
+/// their order, all with the digits that give the same numbers back. Units and sample time are kept
+/// beside them as comments; the label is not written.
+///
+/// # Errors
+/// [`IoError::UnknownFormat`], [`IoError::ChannelName`] for a channel that could not be read back,
+/// and those of [`write_atomically`].
+pub fn write_record(path: &Path, record: &Record) -> Result<(), IoError> {
+    let format = format_to_write(path)?;
+    check_names(record, || path.display().to_string())?;
+    match format.record {
+        Some(write) => write_atomically(path, |file| write(file, record)),
+        None => write_columns(path, record),
+    }
+}
+
+/// Writes a record as a table of its channels, with the comments of CSV.
+fn write_columns(path: &Path, record: &Record) -> Result<(), IoError> {
+    let channels = channels(record);
+    let t = record.times_s();
+    let names = std::iter::once("t").chain(channels.iter().map(|c| c.name.as_str()));
+    let values = std::iter::once(Values::Real(&t)).chain(channels.iter().map(|c| Values::Real(&c.values)));
+    let schema = TableSchema {
+        comments: comments(record, &channels),
+        columns: names
+            .map(|name| ColumnSchema {
+                name: name.to_owned(),
+                kind: ColumnKind::Real,
+            })
+            .collect(),
+    };
+    write_values(path, schema, &values.collect::<Vec<_>>())
+}
+
+/// Writes a record as CSV into something that is open already, such as standard output.
+///
+/// # Errors
+/// [`IoError::ChannelName`]; [`IoError::Unwritable`] for what `out` says. `name` stands for it in
+/// both.
+pub fn write_record_csv(out: &mut dyn Write, name: &str, record: &Record) -> Result<(), IoError> {
+    check_names(record, || name.to_owned())?;
+    write_record_as_csv(out, record).map_err(|source| IoError::Unwritable {
+        file: name.to_owned(),
+        source,
+    })
+}
+
+fn check_names(record: &Record, file: impl Fn() -> String) -> Result<(), IoError> {
+    for name in record.channels().map(|c| c.name.as_str()) {
+        let reason = match name {
+            "t" => "t is the time of the samples",
+            "" => "it has no name",
+            padded if padded != padded.trim() => "there are blanks around the name",
+            _ => continue,
+        };
+        return Err(IoError::ChannelName {
+            file: file(),
+            name: name.to_owned(),
+            reason,
+        });
+    }
+    Ok(())
+}

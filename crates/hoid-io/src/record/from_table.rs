@@ -1,0 +1,174 @@
+//! From the columns of a file to a record: which rows, on which grid, with which values.
+
+use hoid_model::{Channel, Record};
+
+use super::read_options::ReadOptions;
+use super::repair;
+use super::table_reader::TableReader;
+use super::time_grid::TimeGrid;
+use crate::IoError;
+use crate::data_quality::{QualityIssue, issues_of_signals};
+use crate::preparation::{Preparation, Step};
+use crate::table::{ColumnExpression, Signal, Table};
+use crate::wording::{list, named};
+
+/// A record, what was done to it, and what else a person should know about how it was read.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ReadRecord {
+    /// The record, labelled with the name of the file without extension.
+    pub record: Record,
+    /// What was not read or looks odd, such as columns left out; one sentence each.
+    pub notes: Vec<String>,
+    /// What was done to the numbers of the file, in this order.
+    pub steps: Vec<Step>,
+    /// What is wrong with the input, the output and their time in the file, before anything was
+    /// done; within the span that is read.
+    pub quality_issues: Vec<QualityIssue>,
+}
+
+/// The record in a table, without rows that are there twice where that is asked for.
+pub(super) fn record_of(
+    mut table: Table<'_>,
+    options: &ReadOptions,
+    drop_repeated: bool,
+) -> Result<ReadRecord, IoError> {
+    let file = table.source.file().to_owned();
+    let names = table.names();
+    let resolve = |expression: &ColumnExpression| expression.resolve(&names, &file);
+    let input = options.input.as_ref().map(resolve).transpose()?;
+    let output = resolve(&options.output)?;
+    if input == Some(output) {
+        let asked = options.output.to_string();
+        return Err(IoError::SameColumn { file, asked });
+    }
+    let time = names.iter().position(|name| *name == "t");
+    if time.is_none() && options.sampling_hz.is_none() {
+        let available = list(&names);
+        return Err(IoError::NoSampling { file, available });
+    }
+    let quality_issues = issues_of_signals(&table, time, input.into_iter().chain([output]), options);
+    let mut steps = Vec::new();
+    match (drop_repeated, time) {
+        (true, Some(_)) => {
+            let (kept, step) = repair::drop_repeated(table);
+            table = kept;
+            steps.extend(step);
+        }
+        (true, None) => table.notes.push(String::from(
+            "there is no column t, so that a row written twice cannot be told from a value that holds: no row is dropped",
+        )),
+        _ => {}
+    }
+    let mut reader = TableReader {
+        table,
+        options,
+        file,
+        steps,
+        signals: input.into_iter().chain([output]).flat_map(Signal::columns).collect(),
+    };
+    let grid = reader.time_grid(time)?;
+    let input = input.zip(options.input.as_ref());
+    let read = reader.record(grid, time, input, (output, &options.output))?;
+    Ok(ReadRecord { quality_issues, ..read })
+}
+
+impl ReadRecord {
+    /// The record prepared, and what was done to it behind what was done in reading.
+    pub(super) fn prepared(mut self, preparation: &Preparation) -> Result<Self, IoError> {
+        let (record, steps) = preparation.apply(self.record)?;
+        self.steps.extend(steps);
+        Ok(Self { record, ..self })
+    }
+}
+
+impl TableReader<'_> {
+    fn record(
+        mut self,
+        grid: TimeGrid,
+        time: Option<usize>,
+        input: Option<(Signal, &ColumnExpression)>,
+        output: (Signal, &ColumnExpression),
+    ) -> Result<ReadRecord, IoError> {
+        let signals = || input.into_iter().chain([output]);
+        let used = |column: usize| signals().any(|(signal, _)| signal.columns().any(|used| used == column));
+        let mut columns: Vec<Option<Channel>> = Vec::with_capacity(self.table.columns.len());
+        for column in 0..self.table.columns.len() {
+            let name = self.table.columns[column].name.clone();
+            if !used(column) && (name.is_empty() || Some(column) == time) {
+                columns.push(None);
+                continue;
+            }
+            let unit = self.table.columns[column].unit.clone();
+            let of_time = grid.t.as_ref().filter(|_| Some(column) == time);
+            let values = match of_time {
+                Some(t) => Ok(t.clone()),
+                None => self.values(column, grid.rows.clone(), grid.t.as_deref()),
+            };
+            match values {
+                Ok(values) => {
+                    let values = match grid.t.as_ref().zip(grid.resampled) {
+                        None => values,
+                        Some((t, n)) => repair::resample(t, &values, grid.start_s, grid.sample_time.s(), n),
+                    };
+                    columns.push(Some(Channel::new(name, unit, values)));
+                }
+                Err(error) if used(column) => return Err(error),
+                Err(error) => {
+                    self.table
+                        .notes
+                        .push(format!("column {} is left out: {error}", named(&name)));
+                    columns.push(None);
+                }
+            }
+        }
+        // What is made of columns first: then a column that is a signal by itself can move.
+        let mut made: Vec<Channel> = signals()
+            .map(|(signal, expression)| combine(signal, expression, &columns))
+            .collect();
+        for ((signal, _), made) in signals().zip(&mut made) {
+            if let Signal::Column(column) = signal {
+                *made = columns[column].take().unwrap_or_else(nothing);
+            }
+        }
+        let output = made.pop().unwrap_or_else(nothing);
+        let record = match made.pop() {
+            Some(input) => Record::new(grid.sample_time, input, output),
+            None => Record::of_output(grid.sample_time, output),
+        };
+        let mut record = record.map_err(|source| self.model(source))?.starting_at(grid.start_s);
+        for channel in columns.into_iter().flatten() {
+            record = record.with_channel(channel).map_err(|source| self.model(source))?;
+        }
+        Ok(ReadRecord {
+            record,
+            notes: self.table.notes,
+            steps: self.steps,
+            quality_issues: Vec::new(),
+        })
+    }
+}
+
+/// A channel without samples, which no record takes.
+fn nothing() -> Channel {
+    Channel::new("", "", Vec::new())
+}
+
+/// The signal that an expression makes of columns; nothing where it is a column by itself. Its name
+/// is the expression; a difference has a unit where both terms share it.
+fn combine(signal: Signal, expression: &ColumnExpression, columns: &[Option<Channel>]) -> Channel {
+    let nothing = nothing();
+    let column = |index: usize| columns[index].as_ref().unwrap_or(&nothing);
+    match signal {
+        Signal::Column(_) => nothing,
+        Signal::Negative(a) => {
+            let values = column(a).values.iter().map(|v| -v).collect();
+            Channel::new(expression.to_string(), column(a).unit.clone(), values)
+        }
+        Signal::Difference(a, b) => {
+            let (a, b) = (column(a), column(b));
+            let values = a.values.iter().zip(&b.values).map(|(a, b)| a - b).collect();
+            let unit = if a.unit == b.unit { a.unit.as_str() } else { "" };
+            Channel::new(expression.to_string(), unit, values)
+        }
+    }
+}

@@ -1,0 +1,35 @@
+//! Records out of the columns of a file, and into files.
+//!
+//! A trial is chosen, its rows are put on an even grid, and each value in use is checked; what may be
+//! repaired is repaired only when that is asked for.
+//!
+//! | module | what it holds |
+//! |---|---|
+//! | `file` | [`read_record`], [`read_prepared`], [`write_record`] |
+//! | `read_options` | [`ReadOptions`], [`TrialChoice`]: what is read and how |
+//! | `trials` | the trials of a file |
+//! | `from_table` | [`ReadRecord`]: from the columns of a file to a record |
+//! | `table_reader` | the columns on this way, one by one |
+//! | `time_grid` | the rows of a record, and its even grid |
+//! | `repair` | rows that are there twice, missing values, an uneven time: `--fill` and `--resample` |
+//! | `alignment` | [`read_aligned`]: channels that were recorded late, within a span that keeps its length |
+//! | `segments` | [`read_segments`]: the records between faults of the recording |
+//! | `channels` | the channels of a record as the columns of a file |
+
+mod alignment;
+mod channels;
+mod file;
+mod from_table;
+mod read_options;
+mod repair;
+mod segments;
+mod table_reader;
+mod time_grid;
+pub(crate) mod trials;
+
+pub use alignment::read_aligned;
+pub(crate) use channels::{channels, comments};
+pub use file::{read, read_prepared, read_record, write_record, write_record_csv};
+pub use from_table::ReadRecord;
+pub use read_options::{ReadOptions, Repair, TrialChoice};
+pub use segments::read_segments;

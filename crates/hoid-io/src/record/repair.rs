@@ -1,0 +1,146 @@
+//! The remedies for damaged records, applied only when they are asked for: rows that were written
+//! twice are dropped, straight lines are drawn over missing values, and from an uneven t to an even
+//! grid.
+//!
+//! The lines invent data. Over a gap of one or two samples that does little harm; a long straight
+//! line is seen by every estimator as a person who behaves like that.
+
+use std::ops::Range;
+
+use crate::preparation::Step;
+use crate::table::{Table, kept};
+
+/// Why missing values could not be bridged: nothing stands on one side of them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum OpenEnd {
+    Start,
+    End,
+}
+
+/// What was bridged.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(super) struct Bridged {
+    /// Values in all.
+    pub(super) values: usize,
+    /// Longest run of them.
+    pub(super) longest: usize,
+}
+
+/// Puts the straight line between its neighbours in place of each run of NaN, along `t` where it is
+/// known and else by rows.
+pub(super) fn fill(values: &mut [f64], t: Option<&[f64]>) -> Result<Bridged, OpenEnd> {
+    let mut bridged = Bridged::default();
+    let mut at = 0;
+    while let Some(run) = next_run(values, at) {
+        let (before, behind) = match (run.start.checked_sub(1), values.get(run.end)) {
+            (None, _) => return Err(OpenEnd::Start),
+            (_, None) => return Err(OpenEnd::End),
+            (Some(row), Some(value)) => ((row, values[row]), (run.end, *value)),
+        };
+        let x = |row: usize| t.map_or(row as f64, |t| t[row]);
+        let (from, to) = (x(before.0), x(behind.0));
+        for row in run.clone() {
+            values[row] = line(before.1, behind.1, (x(row) - from) / (to - from));
+        }
+        bridged.values += run.len();
+        bridged.longest = bridged.longest.max(run.len());
+        at = run.end;
+    }
+    Ok(bridged)
+}
+
+/// Drops each row that is in all columns, the time among them, what the row before is.
+pub(super) fn drop_repeated(table: Table<'_>) -> (Table<'_>, Option<Step>) {
+    let same = |row: &usize| {
+        table.columns.iter().enumerate().all(|(index, column)| {
+            let (a, b) = (column.values[row - 1], column.values[*row]);
+            let texts = [row - 1, *row].map(|row| column.texts.binary_search(&row).is_ok());
+            match texts {
+                [false, false] => a == b || a.is_nan() && b.is_nan(),
+                [true, true] => table.source.cell(row - 1, index) == table.source.cell(*row, index),
+                _ => false,
+            }
+        })
+    };
+    let repeated: Vec<usize> = (1..table.rows).filter(same).collect();
+    let Some(first) = repeated.first() else {
+        return (table, None);
+    };
+    let step = Step::DropRepeated {
+        rows: repeated.len(),
+        first_row: first + 1,
+    };
+    let rows: Vec<usize> = (0..table.rows)
+        .filter(|row| repeated.binary_search(row).is_err())
+        .collect();
+    (kept(table, rows), Some(step))
+}
+
+fn next_run(values: &[f64], from: usize) -> Option<Range<usize>> {
+    let start = from + values[from..].iter().position(|v| v.is_nan())?;
+    let end = values[start..]
+        .iter()
+        .position(|v| !v.is_nan())
+        .map_or(values.len(), |n| start + n);
+    Some(start..end)
+}
+
+/// Values at `start + k step`, k = 0 .. n, on the straight lines between `(t, value)`; t increases.
+pub(super) fn resample(t: &[f64], values: &[f64], start: f64, step: f64, n: usize) -> Vec<f64> {
+    let mut left = 0;
+    (0..n)
+        .map(|k| {
+            let time = start + k as f64 * step;
+            while left + 2 < t.len() && t[left + 1] <= time {
+                left += 1;
+            }
+            let share = (time - t[left]) / (t[left + 1] - t[left]);
+            line(values[left], values[left + 1], share.clamp(0.0, 1.0))
+        })
+        .collect()
+}
+
+fn line(a: f64, b: f64, share: f64) -> f64 {
+    // This form gives a and b themselves at the ends and does not overflow between them.
+    a * (1.0 - share) + b * share
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const GONE: f64 = f64::NAN;
+
+    #[test]
+    fn bridges_inside_only() {
+        let mut values = [1.0, GONE, 3.0, 4.0, GONE, GONE, GONE, 0.0];
+        let bridged = fill(&mut values, None).unwrap();
+        assert_eq!(values, [1.0, 2.0, 3.0, 4.0, 3.0, 2.0, 1.0, 0.0]);
+        assert_eq!((bridged.values, bridged.longest), (4, 3));
+        assert_eq!(fill(&mut [GONE, 1.0], None), Err(OpenEnd::Start));
+        assert_eq!(fill(&mut [1.0, GONE], None), Err(OpenEnd::End));
+        assert_eq!(fill(&mut [GONE], None), Err(OpenEnd::Start));
+        assert_eq!(fill(&mut [], None), Ok(Bridged::default()));
+    }
+
+    #[test]
+    fn bridges_along_time() {
+        let mut values = [0.0, GONE, 10.0];
+        fill(&mut values, Some(&[0.0, 0.3, 1.0])).unwrap();
+        assert!((values[1] - 3.0).abs() < 1e-15);
+    }
+
+    #[test]
+    fn a_straight_line_is_resampled_exactly() {
+        let t = [0.0, 0.11, 0.19, 0.3, 0.9, 1.0];
+        let values = t.map(|t| 2.0 - 3.0 * t);
+        let even = resample(&t, &values, 0.0, 0.1, 11);
+        for (k, value) in even.iter().enumerate() {
+            // Two products of numbers of the size of 1: a few units of the last place.
+            assert!((value - (2.0 - 0.3 * k as f64)).abs() < 1e-14, "{k}");
+        }
+        assert_eq!(even[0], 2.0);
+        // A last sample that rounding puts behind the data takes the last value.
+        assert_eq!(resample(&t, &values, 0.0, 1.0 + 1e-12, 2)[1], values[5]);
+    }
+}

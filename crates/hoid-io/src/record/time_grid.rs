@@ -1,0 +1,250 @@
+//! The rows of a table that a record is made of, and the even grid on which its samples stand.
+
+use std::ops::Range;
+
+use hoid_model::SampleTime;
+
+use super::table_reader::TableReader;
+use crate::IoError;
+use crate::preparation::Step;
+use crate::table::Precision;
+use crate::time::sampling::{self, Uneven};
+use crate::wording::list;
+
+/// Resampling makes at most so many samples out of one.
+const LARGEST_FACTOR: usize = 100;
+
+/// Where the samples of the record come from.
+pub(super) struct TimeGrid {
+    /// Rows of the table in use.
+    pub(super) rows: Range<usize>,
+    pub(super) start_s: f64,
+    pub(super) sample_time: SampleTime,
+    /// The number of samples to make out of rows whose t is uneven.
+    pub(super) resampled: Option<usize>,
+    /// The t of the rows where it is known to increase.
+    pub(super) t: Option<Vec<f64>>,
+}
+
+impl TableReader<'_> {
+    pub(super) fn time_grid(&mut self, time: Option<usize>) -> Result<TimeGrid, IoError> {
+        let given = match self.options.sampling_hz {
+            None => None,
+            Some(hz) => match SampleTime::new(1.0 / hz) {
+                Ok(ts) => Some(ts),
+                Err(_) => return Err(IoError::SamplingFrequency { found: hz }),
+            },
+        };
+        match (time, given) {
+            (Some(time), None) => self.grid_of_t(time, None),
+            (Some(time), Some(ts)) if self.options.repair.resample => self.grid_of_t(time, Some(ts)),
+            (time, Some(ts)) => self.counted_grid(time, ts),
+            (None, None) => Err(IoError::NoSampling {
+                file: self.file.clone(),
+                available: list(&self.table.names()),
+            }),
+        }
+    }
+
+    /// Samples counted from the first at a given frequency.
+    fn counted_grid(&mut self, time: Option<usize>, sample_time: SampleTime) -> Result<TimeGrid, IoError> {
+        let first = time.map(|time| self.table.columns[time].values[0]);
+        let start = first.filter(|t| t.is_finite()).unwrap_or(0.0);
+        let ts = sample_time.s();
+        match (time, first) {
+            (None, _) if self.options.repair.resample => {
+                self.table.notes.push(String::from(
+                    "there is no column t to resample along: the samples count as even",
+                ));
+            }
+            (Some(time), Some(first)) if first.is_finite() => {
+                let t = &self.table.columns[time].values;
+                let stated = (t[t.len() - 1] - first) / (t.len() - 1) as f64;
+                // More than one in a hundred is more than a clock is off.
+                if (stated - ts).abs() > 0.01 * ts {
+                    self.table.notes.push(format!(
+                        "the given sampling frequency of {} Hz counts; t gives {:.6} Hz on average",
+                        1.0 / ts,
+                        1.0 / stated
+                    ));
+                }
+            }
+            (Some(_), _) => {
+                let place = self.table.source.place(0);
+                self.table.notes.push(format!(
+                    "t is no number on {place}: the time of the first sample is taken as 0 s"
+                ));
+            }
+            _ => {}
+        }
+        let times: Vec<f64> = (0..self.table.rows).map(|k| start + k as f64 * ts).collect();
+        let rows = self.rows(&times)?;
+        let rows = self.between_values(rows, None);
+        Ok(TimeGrid {
+            start_s: times[rows.start],
+            rows,
+            sample_time,
+            resampled: None,
+            t: None,
+        })
+    }
+
+    /// The sampling of the column t, or the one to resample it to.
+    fn grid_of_t(&mut self, time: usize, given: Option<SampleTime>) -> Result<TimeGrid, IoError> {
+        let rows = self.rows(&self.table.columns[time].values)?;
+        let rows = self.between_values(rows, Some(time));
+        let t = self.values(time, rows.clone(), None)?;
+        let precision = self.table.columns[time].precision;
+        let stated = self.table.sample_time_s;
+        let sampled = match (sampling::even(&t, precision, stated), given) {
+            (Ok(even), Some(given)) if !given.matches(self.sample_time(even.sample_time_s)?) => Ok(given),
+            (Ok(even), _) => {
+                self.table.notes.extend(even.note);
+                return Ok(TimeGrid {
+                    rows,
+                    start_s: t[0],
+                    sample_time: given.map_or_else(|| self.sample_time(even.sample_time_s), Ok)?,
+                    resampled: None,
+                    t: Some(t),
+                });
+            }
+            (Err(Uneven::Gap { .. } | Uneven::Jitter { .. }), Some(given)) => Ok(given),
+            (Err(Uneven::Gap { .. } | Uneven::Jitter { .. }), None) if self.options.repair.resample => {
+                let own = self.own_times(&rows, &t);
+                match sampling::typical(own.as_deref().unwrap_or(&t), precision) {
+                    Ok(ts) => Ok(self.sample_time(ts)?),
+                    Err(uneven) => Err(uneven),
+                }
+            }
+            (Err(uneven), _) => Err(uneven),
+        };
+        let sample_time = sampled.map_err(|uneven| self.uneven(uneven, &rows, &t))?;
+        self.resampled_grid(rows, t, sample_time, precision)
+    }
+
+    fn resampled_grid(
+        &mut self,
+        rows: Range<usize>,
+        t: Vec<f64>,
+        sample_time: SampleTime,
+        precision: Precision,
+    ) -> Result<TimeGrid, IoError> {
+        // A sample alone has no line to stand on.
+        if t.len() < 2 {
+            return Err(self.uneven(Uneven::TooFew, &rows, &t));
+        }
+        let (start_s, end_s, ts) = (t[0], t[t.len() - 1], sample_time.s());
+        // The rounding of the last t does not cost the last sample.
+        let slack = 1e-6 + (precision.unit(end_s) / ts).min(0.5);
+        let samples = ((end_s - start_s) / ts + slack).floor() + 1.0;
+        if samples > (LARGEST_FACTOR * t.len()) as f64 || !samples.is_finite() {
+            return Err(IoError::ResampledTooLong {
+                file: self.file.clone(),
+                start_s,
+                end_s,
+                samples,
+                rows: t.len(),
+                factor: LARGEST_FACTOR,
+            });
+        }
+        let longest = t.windows(2).map(|pair| pair[1] - pair[0]).fold(0.0, f64::max);
+        self.steps.push(Step::Interpolate {
+            from_samples: t.len(),
+            to_samples: samples as usize,
+            to_hz: 1.0 / ts,
+            longest_step_s: longest,
+        });
+        // Half as many samples or fewer: what lies above the new Nyquist frequency folds down.
+        if 2.0 * samples <= t.len() as f64 {
+            self.table.notes.push(String::from(
+                "resampling to the lower frequency applied no low-pass filter: read at the old frequency and give the new one with --new-fs if the recording holds power above half of it",
+            ));
+        }
+        Ok(TimeGrid {
+            rows,
+            start_s,
+            sample_time,
+            resampled: Some(samples as usize),
+            t: Some(t),
+        })
+    }
+
+    fn uneven(&self, uneven: Uneven, rows: &Range<usize>, t: &[f64]) -> IoError {
+        let file = self.file.clone();
+        let place = |row: usize| self.table.source.place(rows.start + row);
+        match uneven {
+            Uneven::TooFew => IoError::TooFewSamples { file, found: t.len() },
+            Uneven::NotIncreasing { row } => IoError::NotIncreasing {
+                file,
+                place: place(row),
+                found: t[row],
+                previous: t[row - 1],
+            },
+            Uneven::Gap {
+                row,
+                missing,
+                gaps,
+                sample_time_s,
+            } => IoError::Gap {
+                file,
+                place: place(row),
+                after_s: t[row],
+                next_s: t[row + 1],
+                missing,
+                gaps,
+                sample_time_s,
+            },
+            Uneven::Jitter {
+                row,
+                deviation_s,
+                tolerance_s,
+                sample_time_s,
+            } => IoError::Jitter {
+                file,
+                place: place(row),
+                found: t[row],
+                deviation_s,
+                tolerance_s,
+                sample_time_s,
+            },
+        }
+    }
+
+    fn sample_time(&self, ts_s: f64) -> Result<SampleTime, IoError> {
+        SampleTime::new(ts_s).map_err(|source| self.model(source))
+    }
+
+    /// The rows inside the span.
+    fn rows(&self, times: &[f64]) -> Result<Range<usize>, IoError> {
+        let (from, to) = self.options.span_s;
+        let mut finite = times.iter().copied().filter(|t| t.is_finite());
+        let (start_s, end_s) = (
+            finite.next().unwrap_or(f64::NAN),
+            finite.next_back().unwrap_or(f64::NAN),
+        );
+        // A bound that falls on a sample, up to rounding, takes that sample.
+        let slack = ((end_s - start_s).abs() / times.len() as f64 * 1e-6).min(1e-6);
+        let slack = if slack.is_finite() { slack } else { 0.0 };
+        let start = match from {
+            None => Some(0),
+            Some(from) => times.iter().position(|t| *t >= from - slack),
+        };
+        let rows = start.map(|start| {
+            let length = to.and_then(|to| times[start..].iter().position(|t| *t >= to - slack));
+            start..length.map_or(times.len(), |length| start + length)
+        });
+        let whole = [from, to].iter().flatten().all(|bound| !bound.is_nan());
+        match rows {
+            Some(rows) if whole && !rows.is_empty() => Ok(rows),
+            _ => {
+                let bound = |value: Option<f64>, open: &str| value.map_or(open.to_owned(), |v| format!("{v} s"));
+                Err(IoError::EmptySpan {
+                    file: self.file.clone(),
+                    span: format!("from {} to {}", bound(from, "the start"), bound(to, "the end")),
+                    start_s,
+                    end_s,
+                })
+            }
+        }
+    }
+}

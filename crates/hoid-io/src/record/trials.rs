@@ -1,0 +1,218 @@
+//! Trials in one file: a column that counts them, a time that starts again, or an array of
+//! structures in MATLAB.
+//!
+//! Each trial is a record of its own, with initial states of its own; one record over all of them
+//! would answer at each seam to what was never seen. A part begins where the value of the column
+//! changes or where t falls. Without `--trial` parts are only looked for where t falls: each must
+//! have [`SHORTEST`] rows, and t must fall by half of what it rose at least, which no clock does that
+//! is set. The column that steps with the parts, if there is one, gives them their names.
+
+use std::ops::Range;
+
+use super::read_options::TrialChoice;
+use crate::IoError;
+use crate::formats::arrays::Contents;
+use crate::table::{Column, Table, kept};
+use crate::wording::{did_you_mean, list, shown};
+
+/// Rows of the shortest part that is taken for a trial unasked.
+const SHORTEST: usize = 8;
+
+/// Trials that were found: their names and rows.
+type Parts = Vec<(String, Range<usize>)>;
+
+/// The trial of a table that was asked for; the table itself where it holds one only.
+pub(crate) fn of_table<'a>(table: Table<'a>, choice: Option<&TrialChoice>) -> Result<Table<'a>, IoError> {
+    let file = || table.source.file().to_owned();
+    let (by, parts) = match choice {
+        Some(choice) => (choice.column.clone(), parts_by(&table, choice)?),
+        None => match restarts(&table) {
+            Some(found) => found,
+            None => return Ok(table),
+        },
+    };
+    let names: Vec<&str> = parts.iter().map(|(name, _)| name.as_str()).collect();
+    let rows = match choice.and_then(|choice| choice.value.as_deref()) {
+        Some(value) => match parts.iter().find(|(name, _)| name == value) {
+            Some((_, rows)) => rows.clone(),
+            None => {
+                return Err(IoError::NoSuchTrial {
+                    file: file(),
+                    asked: format!("{by}={value}"),
+                    available: list(&names),
+                });
+            }
+        },
+        None if parts.len() == 1 => parts[0].1.clone(),
+        None if parts.is_empty() => return Err(IoError::NoRows { file: file() }),
+        None => return Err(several(file(), &by, names)),
+    };
+    Ok(kept(table, rows.collect()))
+}
+
+fn several(file: String, by: &str, names: Vec<&str>) -> IoError {
+    IoError::SeveralTrials {
+        file,
+        by: by.to_owned(),
+        trials: names.into_iter().map(str::to_owned).collect(),
+    }
+}
+
+/// Where t falls.
+fn falls(table: &Table<'_>) -> Vec<usize> {
+    let time = table.columns.iter().find(|column| column.name == "t");
+    let falls = |t: &Column| {
+        (1..t.values.len())
+            .filter(|row| t.values[*row] < t.values[row - 1])
+            .collect()
+    };
+    time.map_or_else(Vec::new, falls)
+}
+
+/// The rows between the places at which something begins.
+fn between(begins: &[usize], rows: usize) -> Vec<Range<usize>> {
+    let from = std::iter::once(0).chain(begins.iter().copied());
+    let to = begins.iter().copied().chain([rows]);
+    from.zip(to).map(|(from, to)| from..to).collect()
+}
+
+/// What a cell says; nothing where it is empty.
+fn cell(table: &Table<'_>, at: usize, row: usize) -> Option<String> {
+    let value = table.columns[at].values[row];
+    if value.is_finite() {
+        return Some(value.to_string());
+    }
+    let is_text = table.columns[at].texts.binary_search(&row).is_ok();
+    is_text.then(|| table.source.cell(row, at))
+}
+
+/// The parts by a column, or by t alone.
+fn parts_by(table: &Table<'_>, choice: &TrialChoice) -> Result<Parts, IoError> {
+    let mut begins = falls(table);
+    if choice.column == "t" {
+        let counted = between(&begins, table.rows).into_iter().enumerate();
+        return Ok(counted.map(|(at, rows)| ((at + 1).to_string(), rows)).collect());
+    }
+    let names = table.names();
+    let Some(at) = names.iter().position(|name| *name == choice.column) else {
+        return Err(IoError::NoSuchColumn {
+            file: table.source.file().to_owned(),
+            missing: format!("\"{}\"", choice.column),
+            meant: did_you_mean(&[&choice.column], &names),
+            asked: choice.to_string(),
+            available: list(&names),
+        });
+    };
+    let labels: Vec<Option<String>> = (0..table.rows).map(|row| cell(table, at, row)).collect();
+    begins.extend((1..table.rows).filter(|row| labels[*row] != labels[row - 1]));
+    begins.sort_unstable();
+    begins.dedup();
+    Ok(named(between(&begins, table.rows), |row| labels[row].clone()))
+}
+
+/// Parts by the value in their first row, without those that have none; a value that comes again is
+/// counted.
+fn named(parts: Vec<Range<usize>>, label: impl Fn(usize) -> Option<String>) -> Parts {
+    let mut found: Vec<(String, usize, Range<usize>)> = Vec::new();
+    for rows in parts {
+        let Some(value) = label(rows.start) else { continue };
+        let before = found.iter().filter(|(known, ..)| *known == value).count();
+        found.push((value, before, rows));
+    }
+    let name = |(value, before, rows)| match before {
+        0 => (value, rows),
+        before => (format!("{value} ({})", before + 1), rows),
+    };
+    found.into_iter().map(name).collect()
+}
+
+/// The parts between the places where t starts again, and the column that counts them; `t` where
+/// there is none.
+fn restarts(table: &Table<'_>) -> Option<(String, Parts)> {
+    let begins = falls(table);
+    let t = &table.columns.iter().find(|column| column.name == "t")?.values;
+    let parts = between(&begins, table.rows);
+    let starts_again = parts.windows(2).all(|pair| {
+        let (first, last) = (t[pair[0].start], t[pair[0].end - 1]);
+        last - t[pair[1].start] >= 0.5 * (last - first)
+    });
+    if begins.is_empty() || !starts_again || parts.iter().any(|rows| rows.len() < SHORTEST) {
+        return None;
+    }
+    let counts = |at: &usize| {
+        let same = |rows: &Range<usize>| {
+            let first = cell(table, *at, rows.start);
+            first.is_some() && rows.clone().all(|row| cell(table, *at, row) == first)
+        };
+        let steps = |row: &usize| cell(table, *at, *row) != cell(table, *at, row - 1);
+        // The steps first: they are few.
+        begins.iter().all(steps) && parts.iter().all(same)
+    };
+    let is_named = |at: &usize| !table.columns[*at].name.is_empty() && table.columns[*at].name != "t";
+    Some(match (0..table.columns.len()).filter(is_named).find(counts) {
+        Some(at) => (table.columns[at].name.clone(), named(parts, |row| cell(table, at, row))),
+        None => (
+            String::from("t"),
+            parts
+                .into_iter()
+                .enumerate()
+                .map(|(at, rows)| ((at + 1).to_string(), rows))
+                .collect(),
+        ),
+    })
+}
+
+/// The trial of an array of structures, `trial(3).e`, and whether that was what was asked for.
+pub(crate) fn of_contents(
+    mut contents: Contents,
+    choice: Option<&TrialChoice>,
+    file: &str,
+) -> Result<(Contents, bool), IoError> {
+    // The array and the number of a structure in it.
+    let element = |parent: &str| -> Option<(String, String)> {
+        let (array, rest) = parent.split_once('(')?;
+        let (number, _) = rest.split_once(')')?;
+        number
+            .parse::<usize>()
+            .ok()
+            .map(|_| (array.to_owned(), number.to_owned()))
+    };
+    let elements: Vec<Option<(String, String)>> = contents.entries.iter().map(|entry| element(&entry.parent)).collect();
+    let asked = choice.map(|choice| choice.column.as_str());
+    let array = match elements.first() {
+        Some(Some((array, _)))
+            if asked.is_none() && elements.iter().all(|e| e.as_ref().is_some_and(|e| e.0 == *array)) =>
+        {
+            array.clone()
+        }
+        _ => match asked.filter(|asked| elements.iter().flatten().any(|(array, _)| array == asked)) {
+            Some(asked) => asked.to_owned(),
+            None => return Ok((contents, false)),
+        },
+    };
+    let mut numbers: Vec<&str> = Vec::new();
+    for (_, number) in elements.iter().flatten().filter(|(of, _)| *of == array) {
+        if !numbers.contains(&number.as_str()) {
+            numbers.push(number);
+        }
+    }
+    let number = match choice.and_then(|choice| choice.value.as_deref()) {
+        Some(value) if numbers.contains(&value) => value.to_owned(),
+        Some(value) => {
+            return Err(IoError::NoSuchTrial {
+                file: file.to_owned(),
+                asked: shown(&format!("{array}={value}")),
+                available: list(&numbers),
+            });
+        }
+        // Of one array the paths are as clear as without a choice.
+        None if numbers.len() < 2 => return Ok((contents, asked.is_some())),
+        None => return Err(several(file.to_owned(), &array, numbers)),
+    };
+    let mut at = elements.iter();
+    contents.entries.retain(|_| match at.next() {
+        Some(Some((of, this))) => *of != array || *this == number,
+        _ => true,
+    });
+    Ok((contents, true))
+}

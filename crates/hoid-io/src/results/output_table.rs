@@ -1,0 +1,210 @@
+//! Columns of results, as they go into files and come out of them.
+//!
+//! | | CSV | Parquet |
+//! |---|---|---|
+//! | real | the fewest digits that give the number back, always with a point or an exponent; empty for NaN | DOUBLE, null for NaN |
+//! | whole | digits | INT64 without sign |
+//! | text | quoted where that is needed | BYTE_ARRAY in UTF-8 |
+//! | comments | lines above the header, behind `# ` | lines under the key `hoid.comments` |
+//!
+//! Parquet gives back what was written. CSV keeps no types: a column is whole where each cell is,
+//! real where each cell is a number or empty, else text. What hoid writes comes back the same but
+//! for a column of text that looks like numbers, and one of no rows.
+
+use std::ops::Range;
+
+use crate::IoError;
+
+/// Columns to be written.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct OutputTable {
+    /// What to know about the table, a line each.
+    pub comments: Vec<String>,
+    /// The columns, all of one length.
+    pub columns: Vec<OutputColumn>,
+}
+
+/// One column of a table.
+#[derive(Debug, Clone, PartialEq)]
+pub struct OutputColumn {
+    /// Its name, of which there is one in a table.
+    pub name: String,
+    /// One value a row.
+    pub values: ColumnValues,
+}
+
+/// Values of one kind.
+#[derive(Debug, Clone, PartialEq)]
+pub enum ColumnValues {
+    /// NaN is an empty cell.
+    Real(Vec<f64>),
+    /// Counts and flags.
+    Whole(Vec<u64>),
+    /// Names.
+    Text(Vec<String>),
+}
+
+/// What a column holds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ColumnKind {
+    /// Real numbers.
+    Real,
+    /// Whole numbers.
+    Whole,
+    /// Texts.
+    Text,
+}
+
+/// A table without its rows.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct TableSchema {
+    /// What to know about the table, a line each.
+    pub comments: Vec<String>,
+    /// The columns.
+    pub columns: Vec<ColumnSchema>,
+}
+
+/// Name and kind of a column.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ColumnSchema {
+    /// Its name.
+    pub name: String,
+    /// What it holds.
+    pub kind: ColumnKind,
+}
+
+impl OutputTable {
+    /// The table without its rows.
+    #[must_use]
+    pub fn schema(&self) -> TableSchema {
+        let column = |column: &OutputColumn| ColumnSchema {
+            name: column.name.clone(),
+            kind: column.values.kind(),
+        };
+        TableSchema {
+            comments: self.comments.clone(),
+            columns: self.columns.iter().map(column).collect(),
+        }
+    }
+
+    /// The values of a column.
+    #[must_use]
+    pub fn column(&self, name: &str) -> Option<&ColumnValues> {
+        self.columns.iter().find(|c| c.name == name).map(|c| &c.values)
+    }
+
+    /// The rows of all columns.
+    pub(super) fn rows(&self, file: &str) -> Result<usize, IoError> {
+        let expected = self.columns.first().map_or(0, |column| column.values.len());
+        match self.columns.iter().find(|column| column.values.len() != expected) {
+            None => Ok(expected),
+            Some(column) => Err(IoError::ColumnLength {
+                file: file.to_owned(),
+                column: column.name.clone(),
+                found: column.values.len(),
+                expected,
+            }),
+        }
+    }
+
+    pub(super) fn values(&self) -> Vec<Values<'_>> {
+        self.columns.iter().map(|column| column.values.all()).collect()
+    }
+}
+
+impl ColumnValues {
+    /// The number of rows.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.all().len()
+    }
+
+    /// Whether there are no rows.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// What the values are.
+    #[must_use]
+    pub fn kind(&self) -> ColumnKind {
+        match self {
+            Self::Real(_) => ColumnKind::Real,
+            Self::Whole(_) => ColumnKind::Whole,
+            Self::Text(_) => ColumnKind::Text,
+        }
+    }
+
+    pub(super) fn all(&self) -> Values<'_> {
+        match self {
+            Self::Real(values) => Values::Real(values),
+            Self::Whole(values) => Values::Whole(values),
+            Self::Text(values) => Values::Text(values),
+        }
+    }
+}
+
+impl TableSchema {
+    /// The schema as it can be written: each comment one line, each name one that is found again.
+    pub(super) fn checked(self, file: &str) -> Result<Self, IoError> {
+        if self.columns.is_empty() {
+            return Err(IoError::NoColumns { file: file.to_owned() });
+        }
+        for (second, column) in self.columns.iter().enumerate() {
+            let name = &column.name;
+            let reason = if name.is_empty() {
+                Some("it has no name")
+            } else if name != name.trim() {
+                Some("there are blanks around the name")
+            } else {
+                None
+            };
+            if let Some(reason) = reason {
+                return Err(IoError::ChannelName {
+                    file: file.to_owned(),
+                    name: name.clone(),
+                    reason,
+                });
+            }
+            if let Some(first) = self.columns[..second].iter().position(|other| other.name == *name) {
+                return Err(IoError::DuplicateColumn {
+                    file: file.to_owned(),
+                    name: name.clone(),
+                    first: first + 1,
+                    second: second + 1,
+                });
+            }
+        }
+        let lines = self.comments.iter().flat_map(|comment| comment.split(['\n', '\r']));
+        Ok(Self {
+            comments: lines.map(str::to_owned).collect(),
+            columns: self.columns,
+        })
+    }
+}
+
+/// Values of a column, borrowed.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Values<'a> {
+    Real(&'a [f64]),
+    Whole(&'a [u64]),
+    Text(&'a [String]),
+}
+
+impl Values<'_> {
+    pub(crate) fn len(&self) -> usize {
+        match self {
+            Self::Real(values) => values.len(),
+            Self::Whole(values) => values.len(),
+            Self::Text(values) => values.len(),
+        }
+    }
+
+    pub(crate) fn part(&self, rows: Range<usize>) -> Self {
+        match self {
+            Self::Real(values) => Self::Real(&values[rows]),
+            Self::Whole(values) => Self::Whole(&values[rows]),
+            Self::Text(values) => Self::Text(&values[rows]),
+        }
+    }
+}

@@ -1,0 +1,57 @@
+//! Tables of results into files and out of them, in the format that the extension stands for.
+
+use std::path::Path;
+
+use super::output_table::OutputTable;
+use super::table_writer::write_values;
+use crate::IoError;
+use crate::formats::{bytes_of, format_to_write};
+
+/// Whether a table can be written to a place of this name; to be asked before long work.
+///
+/// # Errors
+/// [`IoError::UnknownFormat`] for an extension that stands for no format, [`IoError::Directory`].
+pub fn check_table_path(path: &Path) -> Result<(), IoError> {
+    format_to_write(path).map(drop)
+}
+
+/// Writes a table, whole or not at all: as CSV (`.csv`, `.txt`, with tabs `.tsv`), Parquet
+/// (`.parquet`, `.pq`), NPZ (`.npz`) or for MATLAB (`.mat`). The same table gives the same bytes.
+///
+/// # Errors
+/// Those of [`check_table_path`]; [`IoError::ColumnLength`], [`IoError::NoColumns`],
+/// [`IoError::DuplicateColumn`] or [`IoError::ChannelName`] for what cannot be written; those of
+/// [`write_atomically`](crate::write_atomically).
+///
+/// ```
+/// use hoid_io::{ColumnValues, OutputColumn, OutputTable, read_table, write_table};
+/// let column = |name: &str, values| OutputColumn { name: name.into(), values };
+/// let table = OutputTable {
+///     comments: vec!["method: rpem".into()],
+///     columns: vec![
+///         column("t", ColumnValues::Real(vec![0.0, 0.01])),
+///         column("convertible", ColumnValues::Whole(vec![0, 1])),
+///     ],
+/// };
+/// let path = std::env::temp_dir().join("hoid-example.parquet");
+/// write_table(&path, &table)?;
+/// assert_eq!(read_table(&path)?, table);
+/// # std::fs::remove_file(&path).unwrap();
+/// # Ok::<(), hoid_io::IoError>(())
+/// ```
+pub fn write_table(path: &Path, table: &OutputTable) -> Result<(), IoError> {
+    table.rows(&path.display().to_string())?;
+    write_values(path, table.schema(), &table.values())
+}
+
+/// Reads a table back, with the kinds that it was written with; see the table of this module for
+/// those of CSV. A column of integers in a Parquet file of other origin is whole where no value is
+/// missing or negative, else real.
+///
+/// # Errors
+/// [`IoError`], naming the place in the file.
+pub fn read_table(path: &Path) -> Result<OutputTable, IoError> {
+    let file = path.display().to_string();
+    let (format, bytes) = bytes_of(path)?;
+    format.results(bytes, &file)
+}

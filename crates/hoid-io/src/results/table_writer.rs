@@ -1,0 +1,222 @@
+//! Tables that are written while they grow: CSV and Parquet in bounded memory, the formats of whole
+//! arrays once all rows are there.
+
+use std::io::{self, Write};
+use std::path::Path;
+
+use super::output_table::{ColumnKind, ColumnSchema, ColumnValues, OutputTable, TableSchema, Values};
+use crate::IoError;
+use crate::formats::{ColumnsWriter, Format, RowWriter, Writing, format_to_write};
+use crate::output::{WholeFile, write_atomically};
+
+/// Rows that are written together. The file depends on the rows, not on how they came.
+const GROUP: usize = 1 << 16;
+
+/// A file between its groups of rows.
+enum Sink {
+    Rows(Box<dyn RowWriter>),
+    Columns(WaitingColumns),
+}
+
+/// Columns that wait for their end, since an array says its length first.
+struct WaitingColumns {
+    write: ColumnsWriter,
+    schema: TableSchema,
+    columns: Vec<ColumnValues>,
+}
+
+impl Sink {
+    fn start(format: &Format, file: &mut dyn Write, schema: TableSchema) -> io::Result<Self> {
+        match format.writing {
+            Writing::Rows(start) => start(file, &schema).map(Self::Rows),
+            Writing::Columns(write) => Ok(Self::Columns(WaitingColumns {
+                write,
+                columns: schema.columns.iter().map(|column| none(column.kind)).collect(),
+                schema,
+            })),
+            Writing::ReadOnly(what) => Err(io::Error::other(what)),
+        }
+    }
+
+    fn group(&mut self, file: &mut dyn Write, values: &[Values<'_>]) -> io::Result<()> {
+        match self {
+            Self::Rows(rows) => rows.rows(file, values),
+            Self::Columns(waiting) => {
+                for (column, values) in waiting.columns.iter_mut().zip(values) {
+                    extend(column, *values);
+                }
+                Ok(())
+            }
+        }
+    }
+
+    fn finish(self, file: &mut dyn Write) -> io::Result<()> {
+        match self {
+            Self::Rows(rows) => rows.finish(file),
+            Self::Columns(WaitingColumns { write, schema, columns }) => {
+                let values: Vec<Values<'_>> = columns.iter().map(ColumnValues::all).collect();
+                write(file, &schema, &values)
+            }
+        }
+    }
+}
+
+/// Writes columns of one length.
+pub(crate) fn write_values(path: &Path, schema: TableSchema, values: &[Values<'_>]) -> Result<(), IoError> {
+    let format = format_to_write(path)?;
+    let schema = schema.checked(&path.display().to_string())?;
+    let rows = values.first().map_or(0, Values::len);
+    if let Writing::Columns(write) = format.writing {
+        return write_atomically(path, |file| write(file, &schema, values));
+    }
+    write_atomically(path, |file| {
+        let mut sink = Sink::start(format, file, schema)?;
+        for start in (0..rows).step_by(GROUP) {
+            let end = rows.min(start + GROUP);
+            let group: Vec<Values<'_>> = values.iter().map(|values| values.part(start..end)).collect();
+            sink.group(file, &group)?;
+        }
+        sink.finish(file)
+    })
+}
+
+/// A table that is written as it grows, for studies that are larger than memory; NPZ and .mat keep
+/// their rows in memory until the end. The file is in its place once [`finish`](Self::finish) is
+/// done; a writer that is dropped before leaves everything as it was. The bytes are those that
+/// [`write_table`](crate::write_table) gives for all rows at once.
+pub struct TableWriter {
+    file: WholeFile,
+    name: String,
+    columns: Vec<ColumnSchema>,
+    /// None after an error of the system: half a group may stand in the file then.
+    sink: Option<Sink>,
+    /// Rows that do not yet make a group.
+    waiting: Vec<ColumnValues>,
+}
+
+impl std::fmt::Debug for TableWriter {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("TableWriter")
+            .field("file", &self.name)
+            .finish_non_exhaustive()
+    }
+}
+
+impl TableWriter {
+    /// Begins a file of a format by its extension, as in [`write_table`](crate::write_table).
+    ///
+    /// # Errors
+    /// [`IoError::UnknownFormat`]; [`IoError::NoColumns`], [`IoError::DuplicateColumn`] or
+    /// [`IoError::ChannelName`] for a schema that cannot be written; [`IoError::Unwritable`] for
+    /// what the system says.
+    pub fn create(path: &Path, schema: &TableSchema) -> Result<Self, IoError> {
+        let format = format_to_write(path)?;
+        let name = path.display().to_string();
+        let schema = schema.clone().checked(&name)?;
+        let columns = schema.columns.clone();
+        let mut file = WholeFile::create(path)?;
+        let sink = file.write(|file| Sink::start(format, file, schema))?;
+        Ok(Self {
+            file,
+            name,
+            waiting: columns.iter().map(|column| none(column.kind)).collect(),
+            columns,
+            sink: Some(sink),
+        })
+    }
+
+    /// Appends the rows of a table of the same columns; its comments are not looked at.
+    ///
+    /// # Errors
+    /// [`IoError::ColumnsDiffer`] and [`IoError::ColumnLength`], after which other rows may be
+    /// appended; [`IoError::Unwritable`], after which nothing can.
+    pub fn append(&mut self, table: &OutputTable) -> Result<(), IoError> {
+        let schema = table.schema();
+        if schema.columns != self.columns {
+            return Err(IoError::ColumnsDiffer {
+                file: self.name.clone(),
+                found: listed(&schema.columns),
+                expected: listed(&self.columns),
+            });
+        }
+        let rows = table.rows(&self.name)?;
+        let values = table.values();
+        let mut start = 0;
+        while start < rows {
+            let room = GROUP - self.waiting.first().map_or(0, ColumnValues::len);
+            let end = rows.min(start + room);
+            for (waiting, values) in self.waiting.iter_mut().zip(&values) {
+                extend(waiting, values.part(start..end));
+            }
+            if end - start == room {
+                self.group()?;
+            }
+            start = end;
+        }
+        Ok(())
+    }
+
+    /// Ends the file and puts it in its place.
+    ///
+    /// # Errors
+    /// [`IoError::Unwritable`] for what the system says.
+    pub fn finish(mut self) -> Result<(), IoError> {
+        if self.waiting.iter().any(|waiting| !waiting.is_empty()) {
+            self.group()?;
+        }
+        let sink = self.sink.take().ok_or_else(|| broken(&self.name))?;
+        self.file.write(|file| sink.finish(file))?;
+        self.file.finish()
+    }
+
+    fn group(&mut self) -> Result<(), IoError> {
+        let mut sink = self.sink.take().ok_or_else(|| broken(&self.name))?;
+        let values: Vec<Values<'_>> = self.waiting.iter().map(ColumnValues::all).collect();
+        self.file.write(|file| sink.group(file, &values))?;
+        self.sink = Some(sink);
+        for (waiting, column) in self.waiting.iter_mut().zip(&self.columns) {
+            *waiting = none(column.kind);
+        }
+        Ok(())
+    }
+}
+
+fn broken(name: &str) -> IoError {
+    IoError::Unwritable {
+        file: name.to_owned(),
+        source: io::Error::other("writing it failed before"),
+    }
+}
+
+fn none(kind: ColumnKind) -> ColumnValues {
+    match kind {
+        ColumnKind::Real => ColumnValues::Real(Vec::new()),
+        ColumnKind::Whole => ColumnValues::Whole(Vec::new()),
+        ColumnKind::Text => ColumnValues::Text(Vec::new()),
+    }
+}
+
+fn extend(column: &mut ColumnValues, values: Values<'_>) {
+    match (column, values) {
+        (ColumnValues::Real(column), Values::Real(values)) => column.extend_from_slice(values),
+        (ColumnValues::Whole(column), Values::Whole(values)) => column.extend_from_slice(values),
+        (ColumnValues::Text(column), Values::Text(values)) => column.extend_from_slice(values),
+        // The kinds were compared before.
+        _ => debug_assert!(false, "values of two kinds in one column"),
+    }
+}
+
+fn listed(columns: &[ColumnSchema]) -> String {
+    let column = |column: &ColumnSchema| {
+        let kind = match column.kind {
+            ColumnKind::Real => "real",
+            ColumnKind::Whole => "whole",
+            ColumnKind::Text => "text",
+        };
+        format!("{} ({kind})", column.name)
+    };
+    if columns.is_empty() {
+        return String::from("no columns");
+    }
+    columns.iter().map(column).collect::<Vec<_>>().join(", ")
+}

@@ -1,0 +1,240 @@
+//! From the keys to a scenario, with what they leave out as in its condition.
+
+use std::f64::consts::TAU;
+
+use hoid_model::{
+    SampleTime,
+    forcing::{ForcingFunction, Sinusoid},
+    remnant_gain::NoiseDefinition,
+    scenario::{Condition, OperatingState, Realisation, RemnantStrength, Scenario},
+    schedule::Schedule,
+};
+
+use super::error::ScenarioFileError;
+use super::keys::{DefinitionKey, File, RealisationKey, RemnantTable, ScheduleTable, SinusoidTable, StateTable};
+use super::values::{Limits, Source};
+
+/// Most lines of a forcing function.
+pub(super) const MOST_LINES: usize = 10_000;
+
+impl Source<'_> {
+    pub(super) fn scenario(&self, file: File, name: &str) -> Result<Scenario, ScenarioFileError> {
+        let condition = match &file.condition {
+            None => None,
+            Some(given) => Some(given.get_ref().parse::<Condition>().map_err(|_| {
+                self.value(
+                    "condition",
+                    given.span().start,
+                    given.get_ref(),
+                    "C1, C2, C3, C4, C5 or C6",
+                )
+            })?),
+        };
+        if condition.is_none() {
+            self.require_all(&file)?;
+        }
+        let mut scenario = Scenario::condition(condition.unwrap_or(Condition::C1));
+        scenario.name = file.name.unwrap_or_else(|| name.to_owned());
+        if let Some(ts) = self.limited("sample_time_s", file.sample_time_s, Limits::SAMPLE_TIME_S)? {
+            scenario.sample_time = SampleTime::new(ts).map_err(|error| self.model(error))?;
+        }
+        let ts = scenario.sample_time;
+        let tau_e_s = self.whole("tau_e_s", file.tau_e_s, scenario.initial.operator.tau_e_s, ts, 0.0)?;
+        for state in [&mut scenario.initial, &mut scenario.last] {
+            state.operator.tau_e_s = tau_e_s;
+        }
+        scenario.measurement_s = self.whole("measurement_s", file.measurement_s, scenario.measurement_s, ts, 1.0)?;
+        scenario.run_in_s = self.whole("run_in_s", file.run_in_s, scenario.run_in_s, ts, 0.0)?;
+        match file.realisation {
+            Some(RealisationKey::Input) => scenario.realisation = Realisation::Input,
+            Some(RealisationKey::Output) => scenario.realisation = Realisation::Output,
+            None => {}
+        }
+
+        self.change(&mut scenario.initial, "initial", file.initial, ts)?;
+        if scenario.schedule == Schedule::Constant {
+            scenario.last = scenario.initial;
+        }
+        let changes_last = file.last.is_some();
+        if let Some(table) = file.last {
+            self.change(&mut scenario.last, "last", table, ts)?;
+        }
+        scenario.schedule = self.schedule(file.schedule, scenario.schedule)?;
+        if scenario.schedule == Schedule::Constant && changes_last {
+            return Err(
+                self.keys("[last] is given, but nothing changes: add [schedule] with rate_per_s and midpoint_s")
+            );
+        }
+        if scenario.schedule != Schedule::Constant && scenario.initial == scenario.last {
+            return Err(self.keys("[schedule] is given, but both states are the same: add [last] with what changes"));
+        }
+        self.remnant(&mut scenario, file.remnant)?;
+        if let Some(tables) = file.forcing {
+            scenario.forcing = self.forcing(tables, scenario.measurement_s)?;
+        }
+        Ok(scenario)
+    }
+
+    fn require_all(&self, file: &File) -> Result<(), ScenarioFileError> {
+        let i = &file.initial;
+        let missing: Vec<&str> = [
+            ("tau_e_s", if i.tau_e_s.is_some() { &i.tau_e_s } else { &file.tau_e_s }),
+            ("initial.K_e", &i.k_e),
+            ("initial.T_L_s", &i.t_l_s),
+            ("initial.omega_nm_rad_s", &i.omega_nm_rad_s),
+            ("initial.zeta_nm", &i.zeta_nm),
+            ("initial.K_c", &i.k_c),
+            ("initial.omega_b_rad_s", &i.omega_b_rad_s),
+        ]
+        .into_iter()
+        .filter_map(|(key, value)| value.is_none().then_some(key))
+        .collect();
+        if missing.is_empty() {
+            return Ok(());
+        }
+        Err(self.keys(&format!(
+            "missing {}: give them, or start from a condition such as condition = \"C1\"",
+            missing.join(", ")
+        )))
+    }
+
+    fn change(
+        &self,
+        state: &mut OperatingState,
+        table: &str,
+        given: StateTable,
+        sample_time: SampleTime,
+    ) -> Result<(), ScenarioFileError> {
+        let key = |name: &str| format!("{table}.{name}");
+        let OperatingState {
+            operator,
+            controlled_element,
+        } = state;
+        operator.tau_e_s = self.whole(&key("tau_e_s"), given.tau_e_s, operator.tau_e_s, sample_time, 0.0)?;
+        let any = [
+            ("K_e", given.k_e, &mut operator.k_e, Limits::GAIN),
+            ("T_L_s", given.t_l_s, &mut operator.t_l_s, Limits::LEAD_S),
+            ("K_c", given.k_c, &mut controlled_element.k_c, Limits::GAIN),
+            (
+                "omega_b_rad_s",
+                given.omega_b_rad_s,
+                &mut controlled_element.omega_b_rad_s,
+                Limits::BREAK_RAD_S,
+            ),
+            (
+                "omega_nm_rad_s",
+                given.omega_nm_rad_s,
+                &mut operator.omega_nm_rad_s,
+                Limits::FREQUENCY_RAD_S,
+            ),
+            ("zeta_nm", given.zeta_nm, &mut operator.zeta_nm, Limits::DAMPING),
+        ];
+        for (name, value, target, limits) in any {
+            if let Some(value) = self.limited(&key(name), value, limits)? {
+                *target = value;
+            }
+        }
+        Ok(())
+    }
+
+    pub(super) fn schedule(&self, given: Option<ScheduleTable>, base: Schedule) -> Result<Schedule, ScenarioFileError> {
+        let Some(given) = given else { return Ok(base) };
+        let rate = self.limited("schedule.rate_per_s", given.rate_per_s, Limits::CHANGE_PER_S)?;
+        let midpoint = self.limited("schedule.midpoint_s", given.midpoint_s, Limits::INSTANT_S)?;
+        let (of_base, at_base) = (base.rate_per_s(), base.change_s());
+        let missing = |key: &str| self.keys(&format!("[schedule] lacks {key}: there is no change to take it from"));
+        let rate_per_s = rate.or(of_base).ok_or_else(|| missing("rate_per_s"))?;
+        let midpoint_s = midpoint.or(at_base).ok_or_else(|| missing("midpoint_s"))?;
+        Ok(
+            match self.limited("schedule.interval_s", given.interval_s, Limits::INTERVAL_S)? {
+                Some(interval_s) => Schedule::Alternating {
+                    rate_per_s,
+                    midpoint_s,
+                    interval_s,
+                },
+                None => Schedule::Sigmoid { rate_per_s, midpoint_s },
+            },
+        )
+    }
+
+    fn remnant(&self, scenario: &mut Scenario, given: RemnantTable) -> Result<(), ScenarioFileError> {
+        if let Some(order) = given.order {
+            scenario.remnant.order = match usize::try_from(*order.get_ref()) {
+                Ok(m @ 1..=4) => m,
+                _ => return Err(self.value("remnant.order", order.span().start, order.get_ref(), "1, 2, 3 or 4")),
+            };
+        }
+        if let Some(t_n_s) = self.limited("remnant.T_n_s", given.t_n_s, Limits::TIME_CONSTANT_S)? {
+            scenario.remnant.time_constant_s = t_n_s;
+        }
+        let level = self.limited("remnant.noise_level", given.noise_level, Limits::NOISE_LEVEL)?;
+        let definition = given.noise_definition.map(|key| match key {
+            DefinitionKey::Response => NoiseDefinition::Response,
+            DefinitionKey::Remnant => NoiseDefinition::Remnant,
+        });
+        let gains = [
+            self.limited("remnant.K_n_initial_deg", given.k_n_initial_deg, Limits::NOISE_GAIN)?,
+            self.limited("remnant.K_n_last_deg", given.k_n_last_deg, Limits::NOISE_GAIN)?,
+        ];
+        match (gains, &mut scenario.remnant.strength) {
+            (
+                [None, None],
+                RemnantStrength::Level {
+                    level: l,
+                    definition: d,
+                },
+            ) => {
+                *l = level.unwrap_or(*l);
+                *d = definition.unwrap_or(*d);
+            }
+            ([None, None], RemnantStrength::Gain { .. }) => {}
+            _ if level.is_some() || definition.is_some() => {
+                return Err(self.keys("[remnant] has a noise level and a gain K_n: give one of them"));
+            }
+            ([Some(initial), last], strength) => {
+                if last.is_none() && scenario.schedule != Schedule::Constant {
+                    return Err(
+                        self.keys("[remnant] has K_n_initial_deg but no K_n_last_deg for the state after the change")
+                    );
+                }
+                *strength = RemnantStrength::Gain {
+                    initial,
+                    last: last.unwrap_or(initial),
+                };
+            }
+            ([None, Some(_)], _) => {
+                return Err(self.keys("[remnant] has K_n_last_deg but no K_n_initial_deg: give both"));
+            }
+        }
+        Ok(())
+    }
+
+    fn forcing(&self, tables: Vec<SinusoidTable>, measurement_s: f64) -> Result<ForcingFunction, ScenarioFileError> {
+        if tables.len() > MOST_LINES {
+            return Err(self.keys(&format!(
+                "{} tables [[forcing]], expected at most {MOST_LINES}",
+                tables.len()
+            )));
+        }
+        let mut sinusoids = Vec::with_capacity(tables.len());
+        for (k, table) in (1..).zip(tables) {
+            let omega = self.limited("forcing.omega_rad_s", table.omega_rad_s, Limits::FREQUENCY_RAD_S)?;
+            let cycles = self.limited("forcing.cycles", table.cycles, Limits::CYCLES)?;
+            let omega_rad_s = match (omega, cycles) {
+                (Some(omega), None) => omega,
+                (None, Some(cycles)) => cycles * TAU / measurement_s,
+                _ => {
+                    return Err(self.keys(&format!(
+                        "[[forcing]] number {k}: give either omega_rad_s or cycles (periods within measurement_s)"
+                    )));
+                }
+            };
+            sinusoids.push(Sinusoid {
+                amplitude_deg: self.number("forcing.amplitude_deg", &table.amplitude_deg, Limits::GAIN)?,
+                omega_rad_s,
+                phase_rad: self.number("forcing.phase_rad", &table.phase_rad, Limits::PHASE_RAD)?,
+            });
+        }
+        ForcingFunction::new(sinusoids).map_err(|error| self.model(error))
+    }
+}

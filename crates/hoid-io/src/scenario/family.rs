@@ -1,0 +1,390 @@
+//! From the keys to a scenario of the family.
+
+use hoid_model::{
+    ContinuousTransferFunction, FamilyOperator, FamilyScenario, FamilyState, Form, ModelError, SampleTime,
+    family_scenario::{
+        Excitation, Followed, Intermittence, MultiSine, PartStrength, Pulses, RemnantPart, RemnantShape,
+        SignalDependence, Stick,
+    },
+    forcing::{ForcingFunction, Sinusoid},
+    operator_family::Coordinate,
+    scenario::Realisation,
+    schedule::Schedule,
+};
+use toml::Spanned;
+
+use super::condition::MOST_LINES;
+use super::error::ScenarioFileError;
+use super::family_keys::{ExcitationTable, FamilyFile, FamilyStateTable, FollowsKey, PartTable, ShapeKey};
+use super::keys::RealisationKey;
+use super::values::{Limits, Source};
+
+impl Source<'_> {
+    pub(super) fn family_scenario(&self, file: FamilyFile, name: &str) -> Result<FamilyScenario, ScenarioFileError> {
+        let form: Form = file.form.get_ref().parse().map_err(|error: hoid_model::UnknownName| {
+            let expected = error.to_string();
+            self.value("form", file.form.span().start, file.form.get_ref(), &expected)
+        })?;
+        let rate = self.limited("sampling_rate_hz", file.sampling_rate_hz, Limits::RATE_HZ)?;
+        let sample_time = match (
+            self.limited("sample_time_s", file.sample_time_s, Limits::SAMPLE_TIME_S)?,
+            rate,
+        ) {
+            (None, None) => SampleTime::SIXTIETH,
+            (Some(ts), None) => SampleTime::new(ts).map_err(|error| self.model(error))?,
+            (None, Some(rate)) => SampleTime::new(1.0 / rate).map_err(|error| self.model(error))?,
+            (Some(_), Some(_)) => {
+                return Err(self.keys("sample_time_s and sampling_rate_hz say the same: give one of them"));
+            }
+        };
+        let initial = self.family_state(form, file.neuromuscular, "initial", &file.initial)?;
+        let mut scenario = FamilyScenario::new(initial, sample_time);
+        scenario.name = file.name.unwrap_or_else(|| name.to_owned());
+        scenario.measurement_s = self.whole(
+            "measurement_s",
+            file.measurement_s,
+            scenario.measurement_s,
+            sample_time,
+            1.0,
+        )?;
+        scenario.run_in_s = self.whole("run_in_s", file.run_in_s, scenario.run_in_s, sample_time, 0.0)?;
+        if let Some(RealisationKey::Output) = file.realisation {
+            scenario.realisation = Realisation::Output;
+        }
+        scenario.schedule = self.schedule(file.schedule, Schedule::Constant)?;
+        match (&file.last, scenario.schedule) {
+            (None, Schedule::Constant) => {}
+            (Some(_), Schedule::Constant) => {
+                return Err(
+                    self.keys("[last] is given, but nothing changes: add [schedule] with rate_per_s and midpoint_s")
+                );
+            }
+            (None, _) => return Err(self.keys("[schedule] is given, but no [last]: add it with what changes")),
+            (Some(last), _) => {
+                let last = last.over(&file.initial);
+                scenario.last = self.family_state(form, file.neuromuscular, "last", &last)?;
+            }
+        }
+        if let Some(table) = file.target {
+            scenario.target = self.excitation("target", table)?;
+        }
+        if let Some(table) = file.disturbance {
+            scenario.disturbance = self.excitation("disturbance", table)?;
+        }
+        for (k, table) in (1..).zip(file.remnant) {
+            scenario.remnant.push(self.part(k, table)?);
+        }
+        scenario.stick = Stick {
+            bias: file.stick.bias,
+            walk_per_root_s: file.stick.walk_per_root_s,
+            offset_e: file.stick.offset_e,
+            offset_u: file.stick.offset_u,
+        };
+        Ok(scenario)
+    }
+
+    fn family_state(
+        &self,
+        form: Form,
+        neuromuscular: bool,
+        table: &str,
+        given: &FamilyStateTable,
+    ) -> Result<FamilyState, ScenarioFileError> {
+        for (key, value) in given.numbers() {
+            // An infinite lag is an integrator.
+            if let Some(value) = value.filter(|value| !(key == "T_I_s" && value.is_infinite())) {
+                self.checked(&format!("{table}.{key}"), value, limits_of(key))?;
+            }
+        }
+        let need = |key: &str, value: Option<f64>| {
+            value.ok_or_else(|| self.keys(&format!("[{table}] lacks {key} for the form {form}")))
+        };
+        let positive = |key: &str, value: Option<f64>| {
+            let value = need(key, value)?;
+            if value > 0.0 {
+                Ok(value)
+            } else {
+                Err(self.keys(&format!("{table}.{key} is {value}, expected a positive number")))
+            }
+        };
+        let mut used = vec!["tau_e_s"];
+        let mut coordinates = Vec::new();
+        for kind in form.coordinates(neuromuscular) {
+            let (keys, value): (&[&'static str], f64) = match kind {
+                Coordinate::Gain if form.has_lag() => match given.k_over_t_i {
+                    Some(ratio) => (&["K_over_T_I"], ratio),
+                    None => {
+                        let t_i = positive("T_I_s", given.t_i_s)?;
+                        if t_i.is_infinite() {
+                            return Err(self.keys(&format!(
+                                "[{table}] has an infinite T_I_s: give K_over_T_I in place of K"
+                            )));
+                        }
+                        (&["K"], need("K or K_over_T_I", given.k)? / t_i)
+                    }
+                },
+                Coordinate::Gain if form == Form::QuadraticIntegral => (&["K_I"], need("K_I", given.k_i)?),
+                Coordinate::Gain => (&["K"], need("K", given.k)?),
+                Coordinate::Lead => (&["T_L_s"], need("T_L_s", given.t_l_s)?),
+                Coordinate::LagRate => (&["T_I_s"], 1.0 / positive("T_I_s", given.t_i_s)?),
+                Coordinate::Linear => (&["c_1_s"], need("c_1_s", given.c_1_s)?),
+                Coordinate::Quadratic => (&["c_2_s2"], need("c_2_s2", given.c_2_s2)?),
+                Coordinate::Droop => (&["alpha_rad_s"], need("alpha_rad_s", given.alpha_rad_s)?),
+                Coordinate::LogOmega => (
+                    &["omega_nm_rad_s"],
+                    positive("omega_nm_rad_s", given.omega_nm_rad_s)?.ln(),
+                ),
+                Coordinate::LogZeta => (&["zeta_nm"], positive("zeta_nm", given.zeta_nm)?.ln()),
+                Coordinate::Delay => (&["tau_e_s"], need("tau_e_s", given.tau_e_s)?),
+            };
+            used.extend(keys);
+            coordinates.push(value);
+        }
+        if let Some(key) = given
+            .numbers()
+            .iter()
+            .find(|(key, value)| value.is_some() && !used.contains(key))
+        {
+            return Err(self.keys(&format!(
+                "[{table}] has {}, which the form {form} has not, or which says what another key says; it takes {}",
+                key.0,
+                used.join(", ")
+            )));
+        }
+        let Some(element) = &given.controlled_element else {
+            return Err(self.keys(&format!(
+                "[{table}] lacks controlled_element, such as controlled_element = \"1/s\" or \"90/(s(s+6))\""
+            )));
+        };
+        Ok(FamilyState {
+            operator: FamilyOperator::new(form, neuromuscular, &coordinates).map_err(|error| self.model(error))?,
+            controlled_element: self.element(&format!("{table}.controlled_element"), element)?,
+        })
+    }
+
+    /// `90/(s(s+6))`, or `90/1,6,0` by falling powers of s.
+    fn element(&self, key: &str, given: &Spanned<String>) -> Result<ContinuousTransferFunction, ScenarioFileError> {
+        let at = given.span().start;
+        let element: ContinuousTransferFunction = given.get_ref().parse().map_err(|error| match error {
+            ModelError::TransferFunction { expected, .. } => self.value(key, at, given.get_ref(), &expected),
+            other => self.model(other),
+        })?;
+        let mut coefficients = element.num().iter().chain(element.den());
+        if let Some(value) = coefficients.find(|value| !Limits::ANY.hold(**value)) {
+            return Err(self.value(key, at, value, &format!("{} in each coefficient", Limits::ANY)));
+        }
+        Ok(element)
+    }
+
+    fn excitation(&self, name: &str, given: ExcitationTable) -> Result<Excitation, ScenarioFileError> {
+        let Some(lines) = given.lines else {
+            for (key, value, limits) in [
+                ("period_s", given.period_s, Limits::INTERVAL_S),
+                ("rms", given.rms, Limits::NOISE_GAIN),
+            ] {
+                if let Some(value) = value {
+                    self.checked(&format!("{name}.{key}"), value, limits)?;
+                }
+            }
+            let usual = MultiSine::default();
+            let sum = MultiSine {
+                period_s: given.period_s.unwrap_or(usual.period_s),
+                largest: given.largest_multiple.unwrap_or(usual.largest),
+                rms: given.rms.unwrap_or(usual.rms),
+            };
+            let mut excitation = sum.excitation().map_err(|error| self.model(error))?;
+            excitation.random_phases = given.random_phases.unwrap_or(true);
+            return Ok(excitation);
+        };
+        if given.period_s.is_some() || given.largest_multiple.is_some() || given.rms.is_some() {
+            return Err(self.keys(&format!(
+                "[{name}] has lines of its own and keys of a multi-sine: give one of both"
+            )));
+        }
+        if lines.len() > MOST_LINES {
+            return Err(self.keys(&format!(
+                "[{name}] has {} lines, expected at most {MOST_LINES}",
+                lines.len()
+            )));
+        }
+        for line in &lines {
+            self.checked(&format!("{name}.lines.amplitude"), line.amplitude, Limits::GAIN)?;
+            self.checked(
+                &format!("{name}.lines.omega_rad_s"),
+                line.omega_rad_s,
+                Limits::FREQUENCY_RAD_S,
+            )?;
+            self.checked(&format!("{name}.lines.phase_rad"), line.phase_rad, Limits::PHASE_RAD)?;
+        }
+        let line = |line: &super::family_keys::LineTable| Sinusoid {
+            amplitude_deg: line.amplitude,
+            omega_rad_s: line.omega_rad_s,
+            phase_rad: line.phase_rad,
+        };
+        Ok(Excitation {
+            function: ForcingFunction::new(lines.iter().map(line).collect()).map_err(|error| self.model(error))?,
+            random_phases: given.random_phases.unwrap_or(false),
+        })
+    }
+
+    fn part(&self, k: usize, given: PartTable) -> Result<RemnantPart, ScenarioFileError> {
+        let refuse = |reason: String| Err(self.keys(&format!("[[remnant]] number {k}: {reason}")));
+        let numbers = [
+            given.share,
+            given.gain,
+            given.gain_last,
+            given.t_n_s,
+            given.omega_rad_s,
+            given.zeta,
+            given.follows_part,
+            given.follows_memory_s,
+            given.pulses_per_s,
+            given.pulses_part,
+            given.on_s,
+            given.off_s,
+        ];
+        let coefficients = given.coefficients.iter().flatten().copied();
+        if let Some(value) = numbers
+            .into_iter()
+            .flatten()
+            .chain(coefficients)
+            .find(|v| !Limits::GAIN.hold(*v))
+        {
+            return refuse(format!("it has {value}, expected {}", Limits::GAIN));
+        }
+        let strength = match (given.share, given.gain) {
+            (Some(share), None) if given.gain_last.is_none() => PartStrength::Share(share),
+            (None, Some(initial)) => PartStrength::Gain {
+                initial,
+                last: given.gain_last.unwrap_or(initial),
+            },
+            _ => return refuse("give share (of the variance of u) or gain, and gain_last beside gain only".to_owned()),
+        };
+        let mut used = Vec::new();
+        let shape = match given.shape {
+            ShapeKey::White => Some(RemnantShape::White),
+            ShapeKey::Lag => {
+                used.extend(["T_n_s", "order"]);
+                given.t_n_s.map(|time_constant_s| RemnantShape::Lag {
+                    time_constant_s,
+                    order: given.order.unwrap_or(1),
+                })
+            }
+            ShapeKey::Resonance => {
+                used.extend(["omega_rad_s", "zeta"]);
+                let both = given.omega_rad_s.zip(given.zeta);
+                both.map(|(omega_rad_s, zeta)| RemnantShape::Resonance { omega_rad_s, zeta })
+            }
+            ShapeKey::Ar => {
+                used.push("coefficients");
+                let coefficients = given.coefficients.clone();
+                coefficients.map(|coefficients| RemnantShape::Ar { coefficients })
+            }
+        };
+        let takes = if used.is_empty() {
+            "no other key".to_owned()
+        } else {
+            used.join(" and ")
+        };
+        for (key, is_there) in [
+            ("T_n_s", given.t_n_s.is_some()),
+            ("order", given.order.is_some()),
+            ("omega_rad_s", given.omega_rad_s.is_some()),
+            ("zeta", given.zeta.is_some()),
+            ("coefficients", given.coefficients.is_some()),
+        ] {
+            if is_there && !used.contains(&key) {
+                return refuse(format!("its shape has no {key}: it takes {takes}"));
+            }
+        }
+        let Some(shape) = shape else {
+            return refuse(format!("its shape takes {takes}"));
+        };
+        let behind = |owner: &str, is_there: bool, others: bool| {
+            if others && !is_there {
+                return Err(self.keys(&format!("[[remnant]] number {k} lacks {owner}")));
+            }
+            Ok(())
+        };
+        let follows = given.follows_part.is_some() || given.follows_memory_s.is_some();
+        behind("follows", given.follows.is_some(), follows)?;
+        behind(
+            "pulses_per_s",
+            given.pulses_per_s.is_some(),
+            given.pulses_part.is_some(),
+        )?;
+        behind("on_s", given.on_s.is_some(), given.off_s.is_some())?;
+        behind("off_s", given.off_s.is_some(), given.on_s.is_some())?;
+        Ok(RemnantPart {
+            shape,
+            strength,
+            signal_dependence: given.follows.map(|follows| SignalDependence {
+                follows: match follows {
+                    FollowsKey::Control => Followed::Control,
+                    FollowsKey::Rate => Followed::Rate,
+                },
+                part: given.follows_part.unwrap_or(1.0),
+                memory_s: given.follows_memory_s.unwrap_or(1.0),
+            }),
+            pulses: given.pulses_per_s.map(|rate_per_s| Pulses {
+                part: given.pulses_part.unwrap_or(1.0),
+                rate_per_s,
+            }),
+            intermittence: given
+                .on_s
+                .zip(given.off_s)
+                .map(|(on_s, off_s)| Intermittence { on_s, off_s }),
+        })
+    }
+}
+
+/// What a number of an operator may be.
+fn limits_of(key: &str) -> Limits {
+    match key {
+        "T_L_s" | "T_I_s" | "c_1_s" | "c_2_s2" | "tau_e_s" => Limits::LEAD_S,
+        "omega_nm_rad_s" => Limits::FREQUENCY_RAD_S,
+        "zeta_nm" => Limits::DAMPING,
+        _ => Limits::GAIN,
+    }
+}
+
+impl FamilyStateTable {
+    fn numbers(&self) -> [(&'static str, Option<f64>); 11] {
+        [
+            ("K", self.k),
+            ("K_over_T_I", self.k_over_t_i),
+            ("K_I", self.k_i),
+            ("T_L_s", self.t_l_s),
+            ("T_I_s", self.t_i_s),
+            ("c_1_s", self.c_1_s),
+            ("c_2_s2", self.c_2_s2),
+            ("alpha_rad_s", self.alpha_rad_s),
+            ("omega_nm_rad_s", self.omega_nm_rad_s),
+            ("zeta_nm", self.zeta_nm),
+            ("tau_e_s", self.tau_e_s),
+        ]
+    }
+
+    /// What this leaves out is that of `base`. Of two ways to say the gain it is the one said here.
+    fn over(&self, base: &Self) -> Self {
+        let says_gain = self.k.is_some() || self.k_over_t_i.is_some();
+        let gain = |own: Option<f64>, of_base: Option<f64>| if says_gain { own } else { of_base };
+        Self {
+            k: gain(self.k, base.k),
+            k_over_t_i: gain(self.k_over_t_i, base.k_over_t_i),
+            k_i: self.k_i.or(base.k_i),
+            t_l_s: self.t_l_s.or(base.t_l_s),
+            t_i_s: self.t_i_s.or(base.t_i_s),
+            c_1_s: self.c_1_s.or(base.c_1_s),
+            c_2_s2: self.c_2_s2.or(base.c_2_s2),
+            alpha_rad_s: self.alpha_rad_s.or(base.alpha_rad_s),
+            omega_nm_rad_s: self.omega_nm_rad_s.or(base.omega_nm_rad_s),
+            zeta_nm: self.zeta_nm.or(base.zeta_nm),
+            tau_e_s: self.tau_e_s.or(base.tau_e_s),
+            controlled_element: self
+                .controlled_element
+                .clone()
+                .or_else(|| base.controlled_element.clone()),
+        }
+    }
+}

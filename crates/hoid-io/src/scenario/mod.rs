@@ -1,0 +1,65 @@
+//! Scenarios in TOML.
+//!
+//! A file starts from a condition C1-C6 and changes what it names, or describes everything itself.
+//! Units are part of the keys, times count from the start of the measurement, an unknown key is an
+//! error.
+//!
+//! ```toml
+//! condition = "C4"          # without it, tau_e_s and all keys of [initial] are required
+//! realisation = "output"    # or "input"
+//! tau_e_s = 0.3             # of both states
+//!
+//! [last]                    # the state after the change; [initial] has the same keys
+//! K_e = 0.08
+//! T_L_s = 1.0
+//!
+//! [schedule]
+//! rate_per_s = 0.5          # G
+//!
+//! [remnant]
+//! order = 2
+//! noise_level = 0.2
+//! ```
+//!
+//! | table | keys |
+//! |---|---|
+//! | (top) | `condition`, `name`, `sample_time_s`, `measurement_s`, `run_in_s`, `tau_e_s`, `realisation` |
+//! | `[initial]`, `[last]` | `K_e`, `T_L_s`, `omega_nm_rad_s`, `zeta_nm`, `tau_e_s`, `K_c`, `omega_b_rad_s` |
+//! | `[schedule]` | `rate_per_s` (G), `midpoint_s` (t_M), `interval_s` (T, for changes there and back again) |
+//! | `[remnant]` | `order`, `T_n_s`; `noise_level` and `noise_definition` ("response", "remnant"), or `K_n_initial_deg` and `K_n_last_deg` |
+//! | `[[forcing]]` | `amplitude_deg`, `phase_rad`, and `omega_rad_s` or `cycles` (within `measurement_s`); `forcing = []` is a target at rest |
+//!
+//! A file with the key `form` describes an operator of the family around any controlled element
+//! ([`AnyScenario`]); its keys are in `family_keys`.
+//!
+//! What the file leaves out is that of the condition; without one, the parameters of `[last]` are
+//! those of `[initial]`, and all else is as in C1.
+//!
+//! | module | what it holds |
+//! |---|---|
+//! | `reading` | [`read_scenario`]: from a file or its text to a scenario; the schemas of both kinds |
+//! | `keys` | the keys of a scenario |
+//! | `condition` | from the keys to a scenario, what it leaves out from its condition |
+//! | `family_keys` | the keys of a scenario of the family |
+//! | `family` | from the keys to a scenario of the family |
+//! | `values` | numbers and their [`Limits`](values::Limits), with their place in the file |
+//! | `error` | [`ScenarioFileError`] |
+
+mod condition;
+mod error;
+mod family;
+mod family_keys;
+#[cfg(test)]
+mod family_tests;
+mod keys;
+mod reading;
+mod values;
+
+pub use error::ScenarioFileError;
+pub use reading::{
+    AnyScenario, family_scenario_schema, parse_any_scenario, parse_scenario, read_any_scenario, read_scenario,
+    scenario_schema,
+};
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,110 @@
+//! Reading and checking a scenario file.
+
+use std::path::Path;
+
+use hoid_model::{FamilyScenario, scenario::Scenario};
+
+use super::error::ScenarioFileError;
+use super::family_keys::FamilyFile;
+use super::keys::File;
+use super::values::{Source, line_of};
+use crate::wording::printable;
+
+/// What a scenario file describes.
+#[derive(Debug, Clone, PartialEq)]
+pub enum AnyScenario {
+    /// The task of the reference text, or one near it.
+    Reference(Box<Scenario>),
+    /// An operator of the family: a file with the key `form`.
+    Family(Box<FamilyScenario>),
+}
+
+/// Reads and checks a scenario of either kind. Without a `name` it is called as its file.
+///
+/// # Errors
+/// [`ScenarioFileError`], which names the file and where it can the line and the key.
+pub fn read_any_scenario(path: &Path) -> Result<AnyScenario, ScenarioFileError> {
+    let (text, shown, name) = text_of(path)?;
+    parse_any_scenario(&text, &shown, &name)
+}
+
+/// A scenario of either kind from the text of a file; `path` is for messages, `name` for a text that
+/// has none.
+///
+/// # Errors
+/// As [`read_any_scenario`].
+pub fn parse_any_scenario(text: &str, path: &str, name: &str) -> Result<AnyScenario, ScenarioFileError> {
+    if !has_form(text) {
+        return Ok(AnyScenario::Reference(Box::new(parse_scenario(text, path, name)?)));
+    }
+    let file: FamilyFile = toml::from_str(text).map_err(|error| syntax(text, path, &error))?;
+    let source = Source { text, path };
+    let scenario = source.family_scenario(file, name)?;
+    scenario.resolve().map_err(|error| source.model(error))?;
+    Ok(AnyScenario::Family(Box::new(scenario)))
+}
+
+/// True for a file that describes an operator of the family.
+fn has_form(text: &str) -> bool {
+    text.parse::<toml::Table>()
+        .is_ok_and(|table| table.contains_key("form"))
+}
+
+/// Reads and checks a scenario. Without a `name` it is called as its file.
+///
+/// # Errors
+/// [`ScenarioFileError`], which names the file and where it can the line and the key.
+pub fn read_scenario(path: &Path) -> Result<Scenario, ScenarioFileError> {
+    let (text, shown, name) = text_of(path)?;
+    parse_scenario(&text, &shown, &name)
+}
+
+/// The text of a file, its path as it is shown, and its name.
+fn text_of(path: &Path) -> Result<(String, String, String), ScenarioFileError> {
+    let shown = path.display().to_string();
+    let text = crate::input_file::settings_text(path).map_err(|error| ScenarioFileError::Unreadable {
+        path: shown.clone(),
+        reason: error.to_string(),
+    })?;
+    let stem = path.file_stem().map(|s| s.to_string_lossy().into_owned());
+    let name = stem.unwrap_or_else(|| shown.clone());
+    Ok((text, shown, name))
+}
+
+/// A scenario from the text of a file; `path` is for messages, `name` for a text that has none.
+///
+/// # Errors
+/// As [`read_scenario`].
+pub fn parse_scenario(text: &str, path: &str, name: &str) -> Result<Scenario, ScenarioFileError> {
+    if has_form(text) {
+        return Err(Source { text, path }.keys(
+            "the key form describes an operator of the family, which is simulated by itself (hoid simulate --scenario) and \
+             is no scenario of a study; leave form out for the operator K_e (T_L s + 1)",
+        ));
+    }
+    let file: File = toml::from_str(text).map_err(|error| syntax(text, path, &error))?;
+    let source = Source { text, path };
+    let scenario = source.scenario(file, name)?;
+    scenario.resolve().map_err(|error| source.model(error))?;
+    Ok(scenario)
+}
+
+fn syntax(text: &str, path: &str, error: &toml::de::Error) -> ScenarioFileError {
+    ScenarioFileError::Syntax {
+        path: path.to_owned(),
+        line: error.span().map_or(1, |span| line_of(text, span.start)),
+        reason: printable(error.message().trim_end()),
+    }
+}
+
+/// JSON schema of a scenario file of the family, as text.
+pub fn family_scenario_schema() -> String {
+    let schema = schemars::schema_for!(FamilyFile);
+    format!("{:#}", schema.as_value())
+}
+
+/// JSON schema of a scenario file, as text.
+pub fn scenario_schema() -> String {
+    let schema = schemars::schema_for!(File);
+    format!("{:#}", schema.as_value())
+}

@@ -1,0 +1,117 @@
+//! What is inside of a file, before anything is chosen: columns, their sampling and ranges, and
+//! what is suspicious in them.
+//!
+//! Nothing is judged finally here: a channel may rightly be constant. What is suspicious is found
+//! by `data_quality`, in columns that belong to one time together; a column that is constant is
+//! only marked, because many files carry such.
+
+use std::path::Path;
+
+use super::read::{Read, of_arrays, of_table};
+use super::sampling::{SamplingSurvey, sampling};
+use super::values::{ValueSurvey, values};
+use crate::IoError;
+use crate::data_quality::{QualityIssue, QualityIssueKind, Signal, Signals, issues_of, names_a_clock};
+use crate::formats::arrays::TIMES;
+use crate::formats::{Reading, bytes_of};
+use crate::time::with_time;
+
+/// What a file holds.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FileSurvey {
+    /// Its format, as in "Parquet".
+    pub format: &'static str,
+    /// Its columns, in their order.
+    pub columns: Vec<ColumnSurvey>,
+    /// The sampling of each structure with a time, one for a flat table.
+    pub samplings: Vec<SamplingSurvey>,
+    /// What is wrong with the sampling, structure by structure.
+    pub quality_issues: Vec<QualityIssue>,
+    /// What to know about how it was read.
+    pub notes: Vec<String>,
+}
+
+/// One column.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ColumnSurvey {
+    /// Its name, or its path in the file.
+    pub path: String,
+    /// Unit; empty when unknown.
+    pub unit: String,
+    /// The type of its values, such as "double" or "text".
+    pub kind: String,
+    /// The number of its rows; 0 for what is not read.
+    pub rows: usize,
+    /// What its numbers are, where it holds any finite one.
+    pub values: Option<ValueSurvey>,
+}
+
+/// Looks into a file of any format that is read.
+///
+/// # Errors
+/// Those of reading: [`IoError`], naming the place in the file.
+pub fn survey(path: &Path) -> Result<FileSurvey, IoError> {
+    let file = path.display().to_string();
+    let (format, mut bytes) = bytes_of(path)?;
+    let (columns, notes) = match format.reading {
+        Reading::Table { record, .. } => of_table(with_time(record(&mut bytes, &file)?, None)?),
+        Reading::Arrays(read) => of_arrays(&read(bytes, &file)?),
+    };
+    let is_time = |column: &&Read| TIMES.contains(&column.name.as_str()) && column.rows > 1;
+    let samplings = columns
+        .iter()
+        .filter(is_time)
+        .filter_map(|time| sampling(time, &columns))
+        .collect();
+    let quality_issues = quality_issues(&columns);
+    let survey = |column: Read| ColumnSurvey {
+        values: column.values.as_deref().and_then(values),
+        path: column.path,
+        unit: column.unit,
+        kind: column.kind,
+        rows: column.rows,
+    };
+    Ok(FileSurvey {
+        format: format.name,
+        samplings,
+        quality_issues,
+        columns: columns.into_iter().map(survey).collect(),
+        notes,
+    })
+}
+
+fn signal(column: &Read) -> Signal<'_> {
+    Signal {
+        name: &column.path,
+        values: column.values.as_deref().unwrap_or_default(),
+    }
+}
+
+/// What is wrong with the columns that stand beside each other, by structure and length.
+fn quality_issues(columns: &[Read]) -> Vec<QualityIssue> {
+    let mut seen: Vec<(&str, usize)> = Vec::new();
+    let mut found = Vec::new();
+    for column in columns.iter().filter(|column| column.rows > 1) {
+        let key = (column.parent.as_str(), column.rows);
+        if seen.contains(&key) {
+            continue;
+        }
+        seen.push(key);
+        let beside = || columns.iter().filter(|c| (c.parent.as_str(), c.rows) == key);
+        let time = TIMES
+            .iter()
+            .find_map(|name| beside().find(|c| c.name == *name && c.values.is_some()));
+        let is_time = |c: &Read| time.is_some_and(|time| time.path == c.path);
+        let numbers = || beside().filter(|c| c.values.is_some() && !is_time(c));
+        let is_clock = |c: &&Read| names_a_clock(&c.name) || TIMES.contains(&c.name.as_str());
+        found.extend(issues_of(&Signals {
+            columns: numbers().filter(|c| !is_clock(c)).map(signal).collect(),
+            time: time.map(signal),
+            precision: time.map(|c| c.precision).unwrap_or_default(),
+            clocks: numbers().filter(is_clock).map(signal).collect(),
+            ..Signals::default()
+        }));
+    }
+    found.retain(|one| one.kind != QualityIssueKind::Constant);
+    found
+}

@@ -1,0 +1,94 @@
+//! The columns of a file of any format, before anything is chosen.
+
+use crate::formats::arrays::{ColumnPath, Contents, Holds, TIMES};
+use crate::table::{Column, DECIMAL_COMMA, Precision, Table, UNITS_ROW, has_decimal_comma};
+use crate::wording::named;
+
+/// A column as it was read.
+pub(super) struct Read {
+    pub(super) path: String,
+    pub(super) parent: String,
+    pub(super) name: String,
+    pub(super) unit: String,
+    pub(super) kind: String,
+    pub(super) values: Option<Vec<f64>>,
+    pub(super) rows: usize,
+    pub(super) precision: Precision,
+}
+
+/// Those of a flat table, with what a reader of it should know.
+pub(super) fn of_table(mut table: Table<'_>) -> (Vec<Read>, Vec<String>) {
+    let rows = table.rows;
+    let commas = decimal_commas(&table);
+    table.notes.extend(commas);
+    let unusable = unusable(&table);
+    table.notes.extend(unusable);
+    if rows > 1 && table.has_no_number_in(0) {
+        let place = table.source.place(0);
+        table.notes.push(format!("{place}: {UNITS_ROW}"));
+    }
+    let read = |column: Column| {
+        let text = column.texts.len() == rows;
+        Read {
+            path: column.name.clone(),
+            parent: String::new(),
+            name: column.name,
+            unit: column.unit,
+            kind: String::from(if text { "text" } else { "numbers" }),
+            values: (!text).then_some(column.values),
+            rows,
+            precision: column.precision,
+        }
+    };
+    (table.columns.into_iter().map(read).collect(), table.notes)
+}
+
+/// Columns of text that would be numbers with a point in the place of each comma.
+fn decimal_commas(table: &Table<'_>) -> Vec<String> {
+    let first_text = |(at, column): (usize, &Column)| {
+        let row = *column.texts.first()?;
+        let cell = table.source.cell(row, at);
+        has_decimal_comma(&cell).then(|| {
+            let (name, place) = (named(&column.name), table.source.place(row));
+            let (count, rows) = (column.texts.len(), table.rows);
+            format!("column {name}, {place}: \"{cell}\" is text, {count} of {rows} cells in all; {DECIMAL_COMMA}")
+        })
+    };
+    table.columns.iter().enumerate().filter_map(first_text).collect()
+}
+
+/// Columns of numbers in which some cells are text, or infinite: they are refused when read, and told as they are then.
+fn unusable(table: &Table<'_>) -> Vec<String> {
+    let first = |(at, column): (usize, &Column)| {
+        let numbers = column.values.iter().any(|value| value.is_finite());
+        let row = (0..table.rows)
+            .find(|row| column.values[*row].is_infinite() || column.texts.binary_search(row).is_ok())
+            .filter(|row| numbers && !(*row == 0 && table.has_no_number_in(0)))?;
+        let comma = has_decimal_comma(&table.source.cell(row, at));
+        (!comma).then(|| table.bad_value(at, row, 0..table.rows).to_string())
+    };
+    table.columns.iter().enumerate().filter_map(first).collect()
+}
+
+/// Those of a file of named arrays.
+pub(super) fn of_arrays(contents: &Contents) -> (Vec<Read>, Vec<String>) {
+    let column_paths = contents.column_paths();
+    let read = |column_path: ColumnPath| {
+        let (values, single) = match &column_path.holds {
+            Holds::Numbers(numbers) => (Some(numbers.values()), numbers.kind().is_single()),
+            Holds::Texts(_) | Holds::Unread(_) => (None, false),
+        };
+        let times = values.as_deref().filter(|_| TIMES.contains(&column_path.name()));
+        Read {
+            parent: column_path.parent.clone(),
+            name: column_path.name().to_owned(),
+            unit: column_path.unit.clone(),
+            kind: column_path.what(),
+            rows: column_path.len(),
+            precision: times.map_or_else(Precision::default, |t| Precision::of_times(t, single)),
+            values,
+            path: column_path.path,
+        }
+    };
+    (column_paths.into_iter().map(read).collect(), contents.notes.clone())
+}

@@ -1,0 +1,113 @@
+//! The sampling of columns that belong together, as it is found.
+
+use super::read::Read;
+use crate::data_quality::Grid;
+
+/// The sampling of columns that belong together.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SamplingSurvey {
+    /// Path of the time.
+    pub path: String,
+    /// Number of rows.
+    pub rows: usize,
+    /// First and last finite time, s.
+    pub span_s: (f64, f64),
+    /// Sample time of the even grid behind the time, s.
+    pub sample_time_s: f64,
+    /// Largest deviation of a time from the even grid, s.
+    pub jitter_s: f64,
+    /// Places where rows are missing.
+    pub gaps: usize,
+    /// Rows missing in them.
+    pub missing: u64,
+    /// Time of the row before the first gap, s.
+    pub first_gap_s: Option<f64>,
+    /// Rows in which the time stands still or runs back.
+    pub not_increasing: usize,
+    /// Rows in which each other column that is not constant repeats the row before.
+    pub repeated: usize,
+}
+
+/// The sampling by a time; none where it holds fewer than two finite values.
+pub(super) fn sampling(time: &Read, columns: &[Read]) -> Option<SamplingSurvey> {
+    let t: Vec<f64> = time
+        .values
+        .as_ref()?
+        .iter()
+        .copied()
+        .filter(|t| t.is_finite())
+        .collect();
+    let &[first, .., last] = t.as_slice() else { return None };
+    let grid = Grid::of(time.values.as_ref()?);
+    if !grid.sample_time_s.is_finite() {
+        return None;
+    }
+    let all = time.values.as_ref()?;
+    let beside: Vec<&Vec<f64>> = columns
+        .iter()
+        .filter(|column| column.parent == time.parent && column.rows == time.rows && column.path != time.path)
+        .filter_map(|column| column.values.as_ref())
+        .filter(|values| {
+            values
+                .windows(2)
+                .any(|pair| pair[0] != pair[1] && !pair[0].is_nan() && !pair[1].is_nan())
+        })
+        .collect();
+    let repeats = |row: &usize| beside.iter().all(|values| values[*row] == values[row - 1]);
+    Some(SamplingSurvey {
+        path: time.path.clone(),
+        rows: time.rows,
+        span_s: (first, last),
+        sample_time_s: grid.sample_time_s,
+        jitter_s: grid.jitter(all).map_or(0.0, |(_, worst, _)| worst),
+        gaps: grid.gaps().count(),
+        missing: grid
+            .gaps()
+            .map(|(_, missing)| missing as u64)
+            .fold(0, u64::saturating_add),
+        first_gap_s: grid.gaps().next().map(|(i, _)| all[grid.rows[i]]),
+        not_increasing: t.windows(2).filter(|pair| pair[1] <= pair[0]).count(),
+        repeated: if beside.is_empty() {
+            0
+        } else {
+            (1..time.rows).filter(repeats).count()
+        },
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::table::Precision;
+
+    #[test]
+    fn time_and_its_faults() {
+        let read = |name: &str, values: Vec<f64>| Read {
+            path: name.into(),
+            parent: String::new(),
+            name: name.into(),
+            unit: String::new(),
+            kind: String::new(),
+            rows: values.len(),
+            values: Some(values),
+            precision: Precision::default(),
+        };
+        let mut t: Vec<f64> = (0..100)
+            .map(|k| 0.01 * f64::from(k) + if k >= 50 { 0.03 } else { 0.0 })
+            .collect();
+        t[20] += 0.002;
+        t[80] = t[79];
+        let mut x: Vec<f64> = (0..100).map(f64::from).collect();
+        x[31] = x[30];
+        let columns = [read("t", t), read("x", x), read("c", vec![1.0; 100])];
+        let found = sampling(&columns[0], &columns).unwrap();
+        assert!((found.sample_time_s - 0.01).abs() < 1e-5 && (found.jitter_s - 0.002).abs() < 2e-4);
+        // The row behind the one that stands still is two steps late.
+        assert_eq!(
+            (found.gaps, found.missing, found.not_increasing, found.repeated),
+            (2, 4, 1, 1)
+        );
+        assert!((found.first_gap_s.unwrap() - 0.49).abs() < 1e-12);
+        assert!(sampling(&read("t", vec![1.0, 1.0]), &columns).is_none());
+    }
+}

@@ -1,0 +1,129 @@
+//! The numbers of a column: how many are missing, their range and course, their steps and rails.
+
+use crate::data_quality::{Levels, rails};
+
+/// Characters of a sketch.
+const SKETCH: usize = 32;
+const BARS: [char; 8] = ['▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'];
+
+/// The numbers of a column, in its unit.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ValueSurvey {
+    /// Values that are missing, text or not finite.
+    pub missing: usize,
+    /// Smallest value.
+    pub min: f64,
+    /// Largest value.
+    pub max: f64,
+    /// Mean.
+    pub mean: f64,
+    /// Root mean square deviation from the mean.
+    pub deviation: f64,
+    /// Whether all values are one.
+    pub constant: bool,
+    /// The step of a quantised column.
+    pub quantum: Option<f64>,
+    /// Rows in which a saturated column stands at its smallest value.
+    pub saturated_low: usize,
+    /// Rows in which a saturated column stands at its largest value.
+    pub saturated_high: usize,
+    /// The course of the values in block characters.
+    pub sketch: String,
+}
+
+/// The numbers of a column; none where no value is finite.
+pub(super) fn values(all: &[f64]) -> Option<ValueSurvey> {
+    let finite: Vec<f64> = all.iter().copied().filter(|value| value.is_finite()).collect();
+    let (min, max) = finite.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(min, max), v| {
+        (min.min(*v), max.max(*v))
+    });
+    if finite.is_empty() {
+        return None;
+    }
+    let n = finite.len() as f64;
+    // Scaled, so that no sum overflows.
+    let mean = if min == max {
+        min
+    } else {
+        finite.iter().map(|v| v / n).sum::<f64>()
+    };
+    let deviation = (finite.iter().map(|v| (v - mean).powi(2) / n).sum::<f64>()).sqrt();
+    let constant = min == max;
+    let levels = Levels::of(all);
+    let found = rails(all, &levels);
+    let at_rail = |upper: bool| {
+        let rail = found.iter().find(|rail| rail.is_upper == upper);
+        rail.map_or(0, |rail| rail.rows())
+    };
+    let (low, high) = (at_rail(false), at_rail(true));
+    Some(ValueSurvey {
+        missing: all.len() - finite.len(),
+        min,
+        max,
+        mean,
+        deviation,
+        constant,
+        quantum: levels.quantum().map(|(step, _)| step),
+        saturated_low: low,
+        saturated_high: high,
+        sketch: sketch(all, min, max),
+    })
+}
+
+/// Means of equal parts as bars; a blank where no value is finite.
+fn sketch(all: &[f64], min: f64, max: f64) -> String {
+    let parts = SKETCH.min(all.len());
+    let bar = |part: usize| {
+        let values = &all[part * all.len() / parts..(part + 1) * all.len() / parts];
+        let (sum, count) = values
+            .iter()
+            .filter(|value| value.is_finite())
+            .fold((0.0, 0_usize), |(sum, count), value| {
+                (sum + (value / max.abs().max(min.abs()).max(1e-300)), count + 1)
+            });
+        if count == 0 {
+            return ' ';
+        }
+        let scale = max.abs().max(min.abs()).max(1e-300);
+        let (low, high) = (min / scale, max / scale);
+        let height = if high > low {
+            (sum / count as f64 - low) / (high - low)
+        } else {
+            0.5
+        };
+        BARS[((height * BARS.len() as f64) as usize).min(BARS.len() - 1)]
+    };
+    (0..parts).map(bar).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_and_their_faults() {
+        let sine: Vec<f64> = (0..400).map(|k| (0.05 * f64::from(k)).sin()).collect();
+        let found = values(&sine).unwrap();
+        assert_eq!(
+            (found.constant, found.quantum, found.saturated_low, found.saturated_high),
+            (false, None, 0, 0)
+        );
+        assert_eq!(found.sketch.chars().count(), SKETCH);
+        assert!(found.sketch.contains('█') && found.sketch.contains('▁'));
+        let coarse: Vec<f64> = sine.iter().map(|v| (20.0 * v).round() / 20.0).collect();
+        assert!((values(&coarse).unwrap().quantum.unwrap() - 0.05).abs() < 1e-12);
+        let clipped: Vec<f64> = sine.iter().map(|v| v.min(0.8)).collect();
+        let found = values(&clipped).unwrap();
+        assert_eq!(found.saturated_low, 0);
+        assert_eq!(found.saturated_high, clipped.iter().filter(|v| **v == 0.8).count());
+        let constant = values(&[2.0; 10]).unwrap();
+        assert!(constant.constant && constant.deviation == 0.0);
+        let missing = values(&[1.0, f64::NAN, 3.0, f64::INFINITY]).unwrap();
+        assert_eq!(
+            (missing.missing, missing.mean, missing.sketch.as_str()),
+            (2, 2.0, "▁ █ ")
+        );
+        assert_eq!(values(&[f64::NAN]), None);
+        assert!(values(&[f64::MAX, f64::MIN]).is_some_and(|found| found.mean == 0.0));
+    }
+}

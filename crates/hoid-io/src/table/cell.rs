@@ -1,0 +1,101 @@
+//! What the text of a cell means: a number, with a point or a comma, nothing, or something else.
+
+use std::borrow::Cow;
+
+/// What stands in a cell.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Cell {
+    /// A number, finite or infinite.
+    Number(f64),
+    /// Nothing, or a word for nothing.
+    Missing,
+    /// Something else.
+    Text,
+}
+
+/// How programs write that there is no value: R, pandas, databases, spreadsheets, statistics packages, the C library of
+/// Windows.
+const MISSING: [&str; 16] = [
+    "", "na", "n/a", "null", "none", "<na>", "#n/a", "#na", "-", "--", ".", "?", "1.#ind", "-1.#ind", "1.#qnan",
+    "-1.#qnan",
+];
+
+impl Cell {
+    /// What the text of a cell means: empty, NaN and the words of [`MISSING`] are missing values.
+    pub(crate) fn parse(text: &str) -> Self {
+        let text = text.trim();
+        match text.parse::<f64>() {
+            Ok(value) if value.is_nan() => Self::Missing,
+            Ok(value) => Self::Number(value),
+            Err(_) if MISSING.iter().any(|word| text.eq_ignore_ascii_case(word)) => Self::Missing,
+            Err(_) => Self::Text,
+        }
+    }
+}
+
+/// The remedy for [`has_decimal_comma`].
+pub(crate) const DECIMAL_COMMA: &str = "write the numbers with a decimal point instead of a comma";
+
+/// Whether a cell that is text would be a number with a point in the place of its comma.
+pub(crate) fn has_decimal_comma(cell: &str) -> bool {
+    cell.contains(',') && matches!(Cell::parse(&cell.replacen(',', ".", 1)), Cell::Number(_))
+}
+
+/// A number as it is written with a decimal point; any other cell as it is.
+pub(crate) fn with_decimal_point(cell: &str, commas: bool) -> Cow<'_, str> {
+    if commas && has_decimal_comma(cell) {
+        Cow::Owned(cell.replacen(',', ".", 1))
+    } else {
+        Cow::Borrowed(cell)
+    }
+}
+
+/// Whether a cell looks like a date or the time of a clock: `2024-03-01 10:00:00.5`, `10:00:00,5`.
+pub(super) fn is_moment(cell: &str) -> bool {
+    let parts = |marks: &[char]| {
+        cell.split(marks)
+            .filter(|part| part.starts_with(|c: char| c.is_ascii_digit()))
+            .count()
+    };
+    cell.starts_with(|c: char| c.is_ascii_digit()) && (parts(&[':']) > 1 || parts(&['-', '/', '.']) > 2)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cells() {
+        for missing in [
+            "", "  ", "NaN", "nan", "NA", "n/a", "NULL", "-NaN", "None", "<NA>", "#N/A", "-", "-1.#IND",
+        ] {
+            assert_eq!(Cell::parse(missing), Cell::Missing, "{missing:?}");
+        }
+        for text in ["1,5", "abc", "1 2", "--1", "0x10", "1_000", "-.", "nothing"] {
+            assert_eq!(Cell::parse(text), Cell::Text, "{text:?}");
+        }
+        assert_eq!(Cell::parse(" -1.5e-3 "), Cell::Number(-1.5e-3));
+        assert_eq!(Cell::parse("+.5"), Cell::Number(0.5));
+        assert_eq!(Cell::parse("1e999"), Cell::Number(f64::INFINITY));
+    }
+
+    #[test]
+    fn decimal_commas_and_moments() {
+        assert_eq!(with_decimal_point("-1,5e-3", true), "-1.5e-3");
+        for cell in ["1,5", "a,b", "1,234,567", "1.5"] {
+            assert_eq!(with_decimal_point(cell, cell != "1,5"), cell);
+        }
+        for moment in [
+            "2024-03-01 10:00:00.000",
+            "2024-03-01T10:00:00Z",
+            "10:00:00,5",
+            "01.03.2024",
+            "3/1/2024",
+        ] {
+            assert!(is_moment(moment), "{moment}");
+        }
+        for other in ["abc", "s", "1.5.", "-1", "1-2", "a:b:c", ""] {
+            assert!(!is_moment(other), "{other}");
+        }
+    }
+}

@@ -1,0 +1,228 @@
+//! Columns of numbers as they stand in a file, before anything is chosen, checked or repaired.
+//!
+//! Each format fills a [`Table`]; everything behind it (choice of columns, sampling, repair) is the
+//! same for all formats. A value that is missing or no number is NaN here; the file is asked again
+//! what stood there only when an error has to say so, which keeps a million rows cheap.
+
+use std::collections::HashMap;
+use std::ops::Range;
+
+use super::cell::{DECIMAL_COMMA, has_decimal_comma, is_moment};
+use super::precision::Precision;
+use crate::IoError;
+use crate::wording::{named, shown};
+
+/// One column.
+#[derive(Debug, Default)]
+pub(crate) struct Column {
+    /// Name; empty when the header has none.
+    pub(crate) name: String,
+    /// Unit; empty when unknown.
+    pub(crate) unit: String,
+    /// One value a row, NaN where there is no number.
+    pub(crate) values: Vec<f64>,
+    /// Rows that hold text, in increasing order.
+    pub(crate) texts: Vec<usize>,
+    /// Whether the values are moments of a clock, in s from the first.
+    pub(crate) moments: bool,
+    /// How exactly the values are printed; only kept for the time.
+    pub(crate) precision: Precision,
+}
+
+/// Where the rows came from, for messages.
+pub(crate) trait Source {
+    /// Name of the file.
+    fn file(&self) -> &str;
+    /// "line 12" or "row 12".
+    fn place(&self, row: usize) -> String;
+    /// What stands in a cell, cut to a readable length.
+    fn cell(&self, row: usize, column: usize) -> String;
+    /// Whether the file ends in the middle of this row, as far as can be seen.
+    fn is_open(&self, _row: usize) -> bool {
+        false
+    }
+}
+
+/// The columns of a file.
+pub(crate) struct Table<'a> {
+    pub(crate) columns: Vec<Column>,
+    pub(crate) rows: usize,
+    /// Sample time that the file states beside its columns, s.
+    pub(crate) sample_time_s: Option<f64>,
+    pub(crate) source: Box<dyn Source + 'a>,
+    pub(crate) notes: Vec<String>,
+}
+
+impl Table<'_> {
+    /// Names of all columns in order.
+    pub(crate) fn names(&self) -> Vec<&str> {
+        self.columns.iter().map(|c| c.name.as_str()).collect()
+    }
+
+    /// Whether no column has a number in a row, as in one of units.
+    pub(crate) fn has_no_number_in(&self, row: usize) -> bool {
+        let has_none = |column: &Column| column.values.get(row).is_none_or(|value| value.is_nan());
+        self.columns.iter().all(has_none)
+    }
+
+    /// Why the value at `row` of a column, which is not finite, cannot be used. `rows` are the rows
+    /// in use.
+    pub(crate) fn bad_value(&self, column: usize, row: usize, rows: Range<usize>) -> IoError {
+        let Column {
+            name, values, texts, ..
+        } = &self.columns[column];
+        let file = self.source.file().to_owned();
+        let place = self.source.place(row);
+        let found = self.source.cell(row, column);
+        let is_last_cell = column + 1 == self.columns.len();
+        let column = named(name);
+        // At the end of a file that is cut a sign or a point is the beginning of a number.
+        let begun = is_last_cell && self.source.is_open(row) && matches!(found.as_str(), "-" | ".");
+        if begun || texts.binary_search(&row).is_ok() {
+            let remedy = if has_decimal_comma(&found) {
+                DECIMAL_COMMA
+            } else if is_moment(&found) {
+                "a date or time of a clock among numbers: write the whole column in one way, or give --fs HZ where the samples are even"
+            } else if row == 0 && self.rows > 1 && self.has_no_number_in(row) {
+                UNITS_ROW
+            } else if is_last_cell && self.source.is_open(row) {
+                "the file is cut there, in the middle of its last line: copy or record it again, or remove that line"
+            } else {
+                "correct the cell, empty it and bridge it with --fill, or choose another column"
+            };
+            return IoError::NotANumber {
+                file,
+                place,
+                column,
+                found,
+                remedy,
+            };
+        }
+        if values[row].is_infinite() {
+            return IoError::Infinite {
+                file,
+                place,
+                column,
+                found,
+            };
+        }
+        let count = rows
+            .clone()
+            .filter(|row| values[*row].is_nan() && texts.binary_search(row).is_err())
+            .count();
+        IoError::Missing {
+            file,
+            place,
+            column,
+            found: if found.is_empty() { String::from("empty") } else { found },
+            count,
+            rows: rows.len(),
+        }
+    }
+}
+
+/// The remedy for a first row without numbers.
+pub(crate) const UNITS_ROW: &str =
+    "no column has a number there: where that line names the units, remove it and say them with --unit e=deg,u=deg";
+
+/// Checks that the names differ, and notes the columns without one.
+pub(crate) fn check_names(names: &[String], file: &str, notes: &mut Vec<String>) -> Result<(), IoError> {
+    check_number(names.len(), file)?;
+    let mut known: HashMap<&str, usize> = HashMap::new();
+    for (second, name) in names.iter().enumerate() {
+        if name.is_empty() {
+            notes.push(format!("column {} has no name and is left out", second + 1));
+        } else if let Some(first) = known.insert(name, second) {
+            return Err(IoError::DuplicateColumn {
+                file: file.to_owned(),
+                name: shown(name),
+                first: first + 1,
+                second: second + 1,
+            });
+        }
+    }
+    Ok(())
+}
+
+/// Most columns of a table: a recording has some tens.
+const MOST_COLUMNS: usize = 10_000;
+
+/// Checks the number of columns, before anything is made of them.
+pub(crate) fn check_number(columns: usize, file: &str) -> Result<(), IoError> {
+    if columns <= MOST_COLUMNS {
+        return Ok(());
+    }
+    Err(IoError::TooManyColumns {
+        file: file.to_owned(),
+        found: columns,
+        most: MOST_COLUMNS,
+    })
+}
+
+/// Takes the units from the comments above a table, and gives the sample time that they state.
+pub(crate) fn asides<'a>(comments: impl Iterator<Item = &'a str>, columns: &mut [Column]) -> Option<f64> {
+    let mut sample_time_s = None;
+    for line in comments {
+        let line = line.trim_start_matches('#').trim();
+        if let Some(units) = line.strip_prefix("units:") {
+            // Of more parts than columns the rest names nothing.
+            for part in units.split(',').take(columns.len()).map(str::trim) {
+                // A name or a unit may hold blanks: the column that fits with the longest name is
+                // the one.
+                let unit_of = |column: &Column| {
+                    let unit = part.strip_prefix(column.name.as_str())?;
+                    unit.starts_with(char::is_whitespace).then(|| unit.trim().to_owned())
+                };
+                let best = columns
+                    .iter_mut()
+                    .filter(|c| !c.name.is_empty() && unit_of(c).is_some());
+                if let Some(column) = best.max_by_key(|c| c.name.len()) {
+                    column.unit = unit_of(column).unwrap_or_default();
+                }
+            }
+        } else if let Some(stated) = line.strip_prefix("sample_time:") {
+            let value = stated.trim().trim_end_matches('s').trim().parse().ok();
+            sample_time_s = value.filter(|ts: &f64| ts.is_finite() && *ts > 0.0);
+        }
+    }
+    sample_time_s
+}
+
+/// A table without some of its rows; messages still name the rows of the file.
+struct Kept<'a> {
+    source: Box<dyn Source + 'a>,
+    rows: Vec<usize>,
+}
+
+impl Source for Kept<'_> {
+    fn file(&self) -> &str {
+        self.source.file()
+    }
+
+    fn place(&self, row: usize) -> String {
+        self.source.place(self.rows.get(row).copied().unwrap_or(row))
+    }
+
+    fn cell(&self, row: usize, column: usize) -> String {
+        self.source.cell(self.rows.get(row).copied().unwrap_or(row), column)
+    }
+}
+
+/// Some rows of a table.
+pub(crate) fn kept(table: Table<'_>, rows: Vec<usize>) -> Table<'_> {
+    let Table {
+        mut columns, source, ..
+    } = table;
+    for column in &mut columns {
+        column.values = rows.iter().map(|row| column.values[*row]).collect();
+        let texts = (0..rows.len()).filter(|row| column.texts.binary_search(&rows[*row]).is_ok());
+        column.texts = texts.collect();
+    }
+    Table {
+        columns,
+        rows: rows.len(),
+        source: Box::new(Kept { source, rows }),
+        sample_time_s: table.sample_time_s,
+        notes: table.notes,
+    }
+}

@@ -1,0 +1,127 @@
+//! How exactly the numbers of a column are printed.
+
+/// Most decimals of rounded times that are looked for: a µs.
+const MOST_DECIMALS: i32 = 6;
+
+/// How exactly a column of decimal numbers is printed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(crate) struct Precision {
+    /// Most decimals of any value; `None` when the values were not printed.
+    decimals: Option<i32>,
+    /// Most significant digits of any value.
+    significant: i32,
+}
+
+impl Precision {
+    /// That of binary numbers in single precision, seven digits.
+    pub(crate) fn single() -> Self {
+        Self {
+            decimals: Some(45),
+            significant: 7,
+        }
+    }
+
+    /// That of times in a file of binary numbers. A recorder that rounds what it saves, as to tenths of
+    /// a ms, leaves times that are all whole multiples of its last digit, and is known by that. The rest
+    /// of a rounded number is below two units of its last binary digit; as many digits as are looked
+    /// for here leave no such rest by chance.
+    pub(crate) fn of_times(values: &[f64], single: bool) -> Self {
+        if single {
+            return Self::single();
+        }
+        let is_multiple = |value: f64, decimals: i32| {
+            let scaled = value * 10_f64.powi(decimals);
+            (scaled - scaled.round()).abs() <= 2.0 * f64::EPSILON * scaled.abs()
+        };
+        let finite = || values.iter().copied().filter(|value| value.is_finite());
+        Self {
+            decimals: (0..=MOST_DECIMALS).find(|decimals| finite().all(|value| is_multiple(value, *decimals))),
+            significant: 0,
+        }
+    }
+
+    /// Takes one more printed number into account.
+    pub(crate) fn add(&mut self, text: &str) {
+        let (mantissa, exponent) = match text.trim().split_once(['e', 'E']) {
+            Some((mantissa, exponent)) => (mantissa, exponent.parse::<i32>().unwrap_or(0).clamp(-400, 400)),
+            None => (text.trim(), 0),
+        };
+        let digits = |part: &str| part.bytes().filter(u8::is_ascii_digit).count() as i32;
+        let behind = mantissa.split_once('.').map_or(0, |(_, behind)| digits(behind));
+        let leading_zeros = mantissa
+            .bytes()
+            .take_while(|b| !(b'1'..=b'9').contains(b))
+            .filter(u8::is_ascii_digit)
+            .count() as i32;
+        self.decimals = Some(self.decimals.unwrap_or(i32::MIN).max(behind - exponent));
+        self.significant = self.significant.max(digits(mantissa) - leading_zeros);
+    }
+
+    /// Takes one more number with so many decimals into account.
+    pub(crate) fn add_decimals(&mut self, decimals: usize) {
+        self.decimals = Some(self.decimals.unwrap_or(0).max(decimals as i32));
+    }
+
+    /// That of the same numbers times a power of ten.
+    pub(crate) fn shifted(self, power: i32) -> Self {
+        Self {
+            decimals: self.decimals.map(|decimals| decimals - power),
+            ..self
+        }
+    }
+
+    /// One unit of the last printed digit of a value of this size. Fixed decimals give the same
+    /// unit everywhere; with a fixed number of significant digits the unit grows with the value.
+    pub(crate) fn unit(self, value: f64) -> f64 {
+        let Some(decimals) = self.decimals else { return 0.0 };
+        let fixed = 10_f64.powi(-decimals);
+        let magnitude = value.abs().log10().floor();
+        if self.significant == 0 || !magnitude.is_finite() {
+            return fixed;
+        }
+        fixed.max(10_f64.powi(magnitude as i32 + 1 - self.significant))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn precision(texts: &[&str]) -> Precision {
+        let mut precision = Precision::default();
+        texts.iter().for_each(|text| precision.add(text));
+        precision
+    }
+
+    #[test]
+    fn unit_of_the_last_digit() {
+        let fixed = precision(&["0.0000", "0.0167", "45.0167"]);
+        for t in [0.0, 0.0167, 45.0] {
+            assert!((fixed.unit(t) - 1e-4).abs() < 1e-18, "{t}");
+        }
+        // Five significant digits, as some programs print: at 100 s the last digit is 0.01.
+        let significant = precision(&["0", "0.016667", "1.0167", "100.02"]);
+        assert!((significant.unit(100.02) - 1e-2).abs() < 1e-15);
+        assert!((significant.unit(0.016667) - 1e-6).abs() < 1e-18);
+        assert!((precision(&["1.67e-02", "1.00e-01"]).unit(0.0167) - 1e-4).abs() < 1e-18);
+        assert_eq!(precision(&["0", "1", "120"]).unit(3.0), 1.0);
+        assert!(precision(&["0.30000000000000004"]).unit(0.3) < 1e-15);
+        assert_eq!(Precision::default().unit(3.0), 0.0);
+        // Nothing that can stand in a file gives anything but a number of s.
+        assert!(precision(&["1e-99999999999", ".", "-", "e"]).unit(1e300) >= 0.0);
+    }
+
+    #[test]
+    fn times_that_were_rounded_are_known_as_such() {
+        let times = |rate_hz: f64| (0..5000).map(move |k| f64::from(k) / rate_hz);
+        let rounded: Vec<f64> = times(60.0).map(|t| (t * 1e4).round() / 1e4).collect();
+        assert!((Precision::of_times(&rounded, false).unit(45.0) - 1e-4).abs() < 1e-18);
+        let hundredths: Vec<f64> = (0..5000).map(|k| f64::from(k) * 0.01).collect();
+        assert!((Precision::of_times(&hundredths, false).unit(45.0) - 1e-2).abs() < 1e-16);
+        let exact: Vec<f64> = times(60.0).collect();
+        assert_eq!(Precision::of_times(&exact, false).unit(45.0), 0.0);
+        assert_eq!(Precision::of_times(&exact, true), Precision::single());
+        // A t with NaN is judged elsewhere.
+        assert_eq!(Precision::of_times(&[f64::NAN, 0.5], false).unit(1.0), 0.1);
+    }
+}

@@ -1,0 +1,18 @@
+//! The time of a recording: which column it is, what its numbers mean, and whether it is even.
+//!
+//! | module | what it holds |
+//! |---|---|
+//! | `time_choice` | [`TimeChoice`]: the column and its unit as a person types them |
+//! | `time_column` | the time under another name, in another unit |
+//! | `moment` | dates and times of a clock |
+//! | `sampling` | the sample time of an even t, and what makes one uneven |
+
+mod moment;
+pub(crate) mod sampling;
+mod time_choice;
+mod time_column;
+
+pub(crate) use moment::{Moments, seconds};
+pub use sampling::even_times;
+pub use time_choice::TimeChoice;
+pub(crate) use time_column::{is_time, with_time};

@@ -1,0 +1,228 @@
+//! Dates and times of a clock in text: `2024-03-05T10:11:12.020Z`, `05.03.2024 10:11:12,02`,
+//! `10:11:12.5`.
+//!
+//! A moment is counted in ns since 1970 (since midnight where there is no date), by the proleptic
+//! Gregorian calendar. Days are counted from 1 March, so that the leap day is the last of its year:
+//! with `y`, `m` moved so, `365 y + y/4 - y/100 + y/400 + (153 m + 2)/5 + d` (H. Hinnant,
+//! *chrono-compatible low-level date algorithms*).
+
+use crate::table::{Column, Precision};
+
+/// ns in a s.
+const NS_PER_S: i64 = 1_000_000_000;
+
+/// A moment and the digits behind the point of its seconds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Moment {
+    ns: i64,
+    decimals: usize,
+}
+
+/// The moment that a cell says; `None` where it is none. A date without a time is one of midnight.
+fn parse(cell: &str) -> Option<Moment> {
+    let cell = cell.trim();
+    if !cell.starts_with(|c: char| c.is_ascii_digit()) || cell.len() > 40 {
+        return None;
+    }
+    let (date, time) = match cell.split_once(['T', ' ']) {
+        Some((date, time)) => (Some(date), Some(time.trim())),
+        None if cell.contains(':') => (None, Some(cell)),
+        None => (Some(cell), None),
+    };
+    let days = date.map_or(Some(0), days_of)?;
+    let (ns, decimals) = time.map_or(Some((0, 0)), time_of_day)?;
+    let day = days.checked_mul(86_400 * NS_PER_S)?;
+    Some(Moment {
+        ns: day.checked_add(ns)?,
+        decimals,
+    })
+}
+
+/// What the texts of a column are, row by row: moments as long as none is anything else.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(crate) enum Moments {
+    /// Only missing values so far.
+    #[default]
+    Unknown,
+    /// Moments, counted from the first, which is kept in ns.
+    From(i64),
+    /// Numbers, or texts.
+    No,
+}
+
+impl Moments {
+    /// Takes a cell that is text, and puts what it is worth behind the values of its column.
+    pub(crate) fn push(&mut self, column: &mut Column, cell: &str) {
+        let moment = parse(cell).filter(|_| *self != Self::No);
+        let row = column.values.len();
+        let Some(Moment { ns, decimals }) = moment else {
+            self.refuse(column);
+            column.texts.push(row);
+            column.values.push(f64::NAN);
+            return;
+        };
+        let first = match *self {
+            Self::From(first) => first,
+            Self::Unknown | Self::No => ns,
+        };
+        *self = Self::From(first);
+        column.moments = true;
+        // Fixed decimals, whatever the size.
+        column.precision.add_decimals(decimals);
+        column.values.push(seconds(ns, first));
+    }
+
+    /// A number in the column: what looked like moments is text.
+    pub(crate) fn refuse(&mut self, column: &mut Column) {
+        if let Self::From(_) = std::mem::replace(self, Self::No) {
+            column.moments = false;
+            column.precision = Precision::default();
+            let of_text = |(row, value): (usize, &mut f64)| {
+                let text = !value.is_nan();
+                *value = f64::NAN;
+                text.then_some(row)
+            };
+            column.texts = column.values.iter_mut().enumerate().filter_map(of_text).collect();
+        }
+    }
+}
+
+/// s between two moments.
+pub(crate) fn seconds(ns: i64, from: i64) -> f64 {
+    // Exact below 2^53 ns, a hundred days.
+    (i128::from(ns) - i128::from(from)) as f64 / NS_PER_S as f64
+}
+
+/// Days since 1970: year first between hyphens or slashes, day first between points.
+fn days_of(date: &str) -> Option<i64> {
+    let mark = date.chars().find(|c| ['-', '/', '.'].contains(c))?;
+    let parts: Vec<&str> = date.split(mark).collect();
+    let &[a, b, c] = parts.as_slice() else { return None };
+    let number = |text: &str| text.parse::<u16>().ok().map(i64::from);
+    let (year, month, day) = match mark {
+        '.' => (c, b, a),
+        _ if a.len() == 4 => (a, b, c),
+        // Month or day first: which one is not known, and it does not matter within a day.
+        _ => (c, a, b),
+    };
+    let (year, month, day) = (year.len() == 4).then_some((number(year)?, number(month)?, number(day)?))?;
+    // With slashes the day may stand first.
+    let (month, day) = if mark == '/' && month > 12 {
+        (day, month)
+    } else {
+        (month, day)
+    };
+    if !(1..=12).contains(&month) || !(1..=31).contains(&day) {
+        return None;
+    }
+    let (year, month) = if month > 2 {
+        (year, month - 3)
+    } else {
+        (year - 1, month + 9)
+    };
+    let of_years = 365 * year + year.div_euclid(4) - year.div_euclid(100) + year.div_euclid(400);
+    // 719 468 days lie between 1 March of the year 0 and 1970.
+    Some(of_years + (153 * month + 2) / 5 + day - 1 - 719_468)
+}
+
+/// ns since midnight UTC, and decimals: `10:11:12.5`, with `Z` or `+02:00` behind, AM or PM.
+fn time_of_day(text: &str) -> Option<(i64, usize)> {
+    let (text, half_day) = match text.rsplit_once(' ') {
+        Some((text, half)) if half.eq_ignore_ascii_case("pm") => (text, Some(12)),
+        Some((text, half)) if half.eq_ignore_ascii_case("am") => (text, Some(0)),
+        _ => (text, None),
+    };
+    let (clock, zone_min) = match text.find(['Z', 'z', '+', '-']) {
+        None => (text, 0),
+        Some(at) => (text[..at].trim_end(), zone(&text[at..])?),
+    };
+    let parts: Vec<&str> = clock.split(':').collect();
+    let (hour, minute, seconds) = match parts.as_slice() {
+        [hour, minute] => (*hour, *minute, "0"),
+        [hour, minute, seconds] => (*hour, *minute, *seconds),
+        _ => return None,
+    };
+    let whole = |text: &str, below: i64| text.parse::<u8>().ok().map(i64::from).filter(|n| *n < below);
+    let hour = match half_day {
+        Some(half) => whole(hour, 13)? % 12 + half,
+        None => whole(hour, 24)?,
+    };
+    let (second, fraction) = seconds.split_once(['.', ',']).unwrap_or((seconds, ""));
+    if fraction.len() > 18 || !fraction.bytes().all(|digit| digit.is_ascii_digit()) {
+        return None;
+    }
+    let ns = format!("{fraction:0<9}")[..9].parse::<i64>().ok()?;
+    // A leap second is counted as the first of the next minute.
+    let s = (hour * 60 + whole(minute, 60)? - zone_min) * 60 + whole(second, 61)?;
+    Some((s * NS_PER_S + ns, fraction.len()))
+}
+
+/// Minutes east of UTC: `Z`, `+02:00`, `-0530`, `+02`.
+fn zone(text: &str) -> Option<i64> {
+    if text.eq_ignore_ascii_case("z") {
+        return Some(0);
+    }
+    let sign = if text.starts_with('-') { -1 } else { 1 };
+    let digits: String = text[1..].chars().filter(|c| *c != ':').collect();
+    let number = |text: &str| text.parse::<u8>().ok().map(i64::from);
+    let minutes = match digits.len() {
+        2 => number(&digits)? * 60,
+        4 if digits.is_ascii() => number(&digits[..2])? * 60 + number(&digits[2..])?,
+        _ => return None,
+    };
+    Some(sign * minutes)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn moments_against_the_clock_of_unix() {
+        // date -u -d '2024-03-05 10:11:12' +%s
+        let s = 1_709_633_472 * NS_PER_S;
+        for (cell, ns) in [
+            ("2024-03-05T10:11:12Z", s),
+            ("2024-03-05T10:11:12.020Z", s + 20_000_000),
+            ("2024-03-05 12:11:12.020+02:00", s + 20_000_000),
+            ("2024-03-05T04:41:12-0530", s),
+            ("05.03.2024 10:11:12,5", s + NS_PER_S / 2),
+            ("3/5/2024 10:11:12 AM", s),
+            ("25/12/2023 10:11:12 PM", 1_703_542_272 * NS_PER_S),
+            ("1970-01-01", 0),
+            ("1969-12-31 23:59:59", -NS_PER_S),
+            ("2000-02-29T00:00:00", 951_782_400 * NS_PER_S),
+            ("10:11:12.000000001", 36_672 * NS_PER_S + 1),
+            ("00:00", 0),
+        ] {
+            assert_eq!(parse(cell).map(|moment| moment.ns), Some(ns), "{cell}");
+        }
+        assert_eq!(parse("10:11:12.020").map(|moment| moment.decimals), Some(3));
+    }
+
+    #[test]
+    fn what_is_no_moment() {
+        for cell in [
+            "",
+            "abc",
+            "1.5",
+            "1.5.",
+            "12",
+            "2024-13-01",
+            "2024-00-10",
+            "24:00:00",
+            "10:61",
+            "1:2:3:4",
+            "10:11:1é",
+            "2024-03-05T",
+            "2024-03-05Tx",
+            "99999-01-01",
+            "10:11:12+é",
+            "10:11:12.5x",
+            "1-2-3",
+            "1,234",
+        ] {
+            assert_eq!(parse(cell), None, "{cell}");
+        }
+    }
+}

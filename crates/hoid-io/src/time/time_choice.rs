@@ -1,0 +1,106 @@
+//! Which column is the time, and its unit, as a person types them: `clock:ms`.
+
+use std::fmt;
+use std::str::FromStr;
+
+use crate::IoError;
+
+/// The unit of a time.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Unit {
+    /// Seconds, times a power of ten.
+    Power(i32),
+    Minutes,
+    Hours,
+    /// Dates and times of a clock.
+    Iso,
+    /// Whole seconds, and nanoseconds in a column beside.
+    SecondsAndNanoseconds,
+}
+
+impl Unit {
+    pub(super) fn of(text: &str) -> Option<Self> {
+        Some(match text {
+            "s" | "sec" | "secs" | "second" | "seconds" | "sek" | "sekunden" => Self::Power(0),
+            "ms" | "msec" | "millis" | "millisecond" | "milliseconds" => Self::Power(-3),
+            "us" | "µs" | "μs" | "usec" | "micros" | "microsecond" | "microseconds" => Self::Power(-6),
+            "ns" | "nsec" | "nanos" | "nanosec" | "nanosecond" | "nanoseconds" => Self::Power(-9),
+            "min" | "mins" | "minute" | "minutes" | "minuten" => Self::Minutes,
+            "h" | "hr" | "hour" | "hours" => Self::Hours,
+            "iso" => Self::Iso,
+            "sec+nanosec" => Self::SecondsAndNanoseconds,
+            _ => return None,
+        })
+    }
+}
+
+impl fmt::Display for Unit {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Power(-3) => "ms",
+            Self::Power(-6) => "us",
+            Self::Power(-9) => "ns",
+            Self::Power(_) => "s",
+            Self::Minutes => "min",
+            Self::Hours => "h",
+            Self::Iso => "iso",
+            Self::SecondsAndNanoseconds => "sec+nanosec",
+        })
+    }
+}
+
+/// Which column is the time, and its unit: `COLUMN`, `COLUMN:UNIT`, or `SECONDS+NANOSECONDS`.
+///
+/// ```
+/// let time: hoid_io::TimeChoice = "clock:ms".parse()?;
+/// assert_eq!(time.to_string(), "clock:ms");
+/// # Ok::<(), hoid_io::IoError>(())
+/// ```
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct TimeChoice {
+    pub(super) column: String,
+    pub(super) unit: Option<Unit>,
+}
+
+impl FromStr for TimeChoice {
+    type Err = IoError;
+
+    /// # Errors
+    /// [`IoError::Expression`] for an unknown unit, or no column.
+    fn from_str(text: &str) -> Result<Self, IoError> {
+        let refuse = |expected: &str| IoError::Expression {
+            found: text.to_owned(),
+            expected: expected.to_owned(),
+        };
+        let text = text.trim();
+        let (column, unit) = match text.rsplit_once(':') {
+            Some((column, unit)) => match Unit::of(unit.trim()) {
+                Some(unit) => (column.trim(), Some(unit)),
+                // MATLAB and numpy have colons in the names of lines: `ans(1,:)`.
+                None if unit.starts_with([')', ',', ']']) => (text, None),
+                None => {
+                    return Err(refuse(
+                        "expected the column of the time, and behind a colon s, ms, us, ns, min, h, iso or sec+nanosec",
+                    ));
+                }
+            },
+            None => (text, None),
+        };
+        if column.is_empty() {
+            return Err(refuse("expected the name of a column, as in clock:ms"));
+        }
+        Ok(Self {
+            column: column.to_owned(),
+            unit,
+        })
+    }
+}
+
+impl fmt::Display for TimeChoice {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.unit {
+            Some(unit) => write!(f, "{}:{unit}", self.column),
+            None => f.write_str(&self.column),
+        }
+    }
+}

@@ -1,0 +1,394 @@
+//! The time under the name and in the unit that a recorder gives it.
+//!
+//! The time is the column t, in s. Where no column is called so, the first of these takes its place:
+//! 1. the only one that is called a time, with or without a unit: `Time (s)`, `Zeit [s]`, `time_ns`,
+//!    `elapsed`, `%time`;
+//! 2. the only one that holds stamps: dates and times of a clock in text or as such, or numbers that
+//!    count from 1970 in a column `timestamp`, `header.stamp`;
+//! 3. whole seconds with nanoseconds in the next column: `stamp.sec`, `stamp.nanosec`;
+//! 4. a first column without a name, or the first line of a matrix, that increases from row to row
+//!    and is no row number.
+//!
+//! `--time COLUMN[:unit]` wins over all of them. A unit is that of the name; else that of the size of
+//! numbers that count from 1970 (1e11 s would be the year 5138); else that of the steps: whole numbers
+//! at least 5 apart are no s but the unit in which 2 to 2000 of them are in a second. What is taken
+//! is said.
+
+use super::time_choice::{TimeChoice, Unit};
+use crate::IoError;
+use crate::table::{Column, Precision, Table};
+use crate::wording::{did_you_mean, list, named, shown};
+
+/// Numbers from here on that are called a stamp count from 1970: 1e8 s is in 1973.
+const STAMP: f64 = 1e8;
+/// The smallest step of whole numbers that is none of s.
+const STEP_OF_NO_SECONDS: f64 = 5.0;
+/// Most samples in a second by which a unit is known from its steps.
+const MOST_HZ: f64 = 2000.0;
+
+/// Words for the time.
+const WORDS: [&str; 9] = [
+    "t",
+    "time",
+    "zeit",
+    "temps",
+    "tiempo",
+    "tempo",
+    "elapsed",
+    "elapsed time",
+    "elapsedtime",
+];
+/// Words for a moment, which may as well be the time of day, or a count.
+const STAMPS: [&str; 5] = ["timestamp", "stamp", "datetime", "date time", "date"];
+
+/// What a name says about a column.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Meaning {
+    Time(Option<Unit>),
+    Stamp,
+    Other,
+}
+
+fn meaning(name: &str) -> Meaning {
+    let name = name.trim().trim_start_matches(['%', '#']).to_lowercase();
+    let words: Vec<&str> = name
+        .split([' ', '_', '-', '.', ',', '/', '(', ')', '[', ']'])
+        .filter(|word| !word.is_empty())
+        .collect();
+    let unit = words.last().filter(|_| words.len() > 1).and_then(|last| Unit::of(last));
+    let unit = unit.filter(|unit| !matches!(unit, Unit::Iso | Unit::SecondsAndNanoseconds));
+    let base = words[..words.len() - usize::from(unit.is_some())].join(" ");
+    if WORDS.contains(&base.as_str()) {
+        return Meaning::Time(unit);
+    }
+    match (words.last(), unit) {
+        _ if STAMPS.contains(&base.as_str()) && unit.is_some() => Meaning::Time(unit),
+        (Some(last), None) if STAMPS.contains(last) || STAMPS.contains(&base.as_str()) => Meaning::Stamp,
+        _ => Meaning::Other,
+    }
+}
+
+/// Whether the values of a column may become the time.
+pub(crate) fn is_time(name: &str) -> bool {
+    meaning(name) != Meaning::Other
+}
+
+/// The table with a column t in s, where it has one column that is a time or was named as such.
+pub(crate) fn with_time<'a>(mut table: Table<'a>, choice: Option<&TimeChoice>) -> Result<Table<'a>, IoError> {
+    let found = match choice {
+        Some(choice) => Some(chosen(&table, choice)?),
+        None if table.columns.iter().any(|column| column.name == "t" && !column.moments) => table
+            .columns
+            .iter()
+            .position(|column| column.name == "t")
+            .map(|at| (at, None)),
+        None => found(&table),
+    };
+    if let Some((at, unit)) = found {
+        take(&mut table, at, unit);
+    }
+    // Moments that are not the time are no numbers.
+    for column in table.columns.iter_mut().filter(|column| column.moments) {
+        column.values.fill(f64::NAN);
+        column.texts = (0..table.rows).collect();
+    }
+    Ok(table)
+}
+
+/// The column that was asked for.
+fn chosen(table: &Table<'_>, choice: &TimeChoice) -> Result<(usize, Option<Unit>), IoError> {
+    let position = |name: &str| table.columns.iter().position(|column| column.name == name);
+    let unit = choice.unit;
+    if let Some((seconds, nanoseconds)) = choice.column.split_once('+')
+        && let (Some(at), Some(_)) = (position(seconds), position(nanoseconds))
+        && nanoseconds_of(table, at).is_some()
+    {
+        return Ok((at, Some(Unit::SecondsAndNanoseconds)));
+    }
+    if unit == Some(Unit::SecondsAndNanoseconds) {
+        let seconds = (0..table.columns.len()).find(|at| {
+            let name = &table.columns[*at].name;
+            let ours = *name == choice.column || name.strip_prefix(&choice.column).is_some_and(|end| end.len() < 9);
+            ours && nanoseconds_of(table, *at).is_some()
+        });
+        if let Some(at) = seconds {
+            return Ok((at, unit));
+        }
+    } else if let Some(at) = position(&choice.column) {
+        return Ok((at, unit));
+    }
+    let names = table.names();
+    Err(IoError::NoSuchColumn {
+        file: table.source.file().to_owned(),
+        missing: format!("\"{}\"", choice.column),
+        meant: did_you_mean(&[&choice.column], &names),
+        asked: choice.to_string(),
+        available: list(&names),
+    })
+}
+
+/// The only one of some columns.
+fn only(mut columns: impl Iterator<Item = usize>) -> Option<usize> {
+    columns.next().filter(|_| columns.next().is_none())
+}
+
+/// The column that is the time by its name, type or place.
+fn found(table: &Table<'_>) -> Option<(usize, Option<Unit>)> {
+    let columns = &table.columns;
+    let is_constant = |column: &Column| column.values.iter().all(|value| *value == column.values[0]);
+    let of = |meant: &dyn Fn(&Column) -> bool| only((0..columns.len()).filter(|at| meant(&columns[*at])));
+    let unit = |at: usize| match meaning(&columns[at].name) {
+        Meaning::Time(unit) => unit,
+        Meaning::Stamp | Meaning::Other => None,
+    };
+    let by_name = || of(&|column| matches!(meaning(&column.name), Meaning::Time(_)) && column.texts.is_empty());
+    let by_type = || of(&|column| column.moments && !is_constant(column));
+    let by_stamp = || {
+        of(&|column| {
+            meaning(&column.name) == Meaning::Stamp
+                && column.values.iter().all(|value| *value >= STAMP || value.is_nan())
+        })
+    };
+    let pair = || only((0..columns.len()).filter(|at| nanoseconds_of(table, *at).is_some()));
+    by_name()
+        .or_else(by_type)
+        .or_else(by_stamp)
+        .map(|at| (at, unit(at)))
+        .or_else(|| pair().map(|at| (at, Some(Unit::SecondsAndNanoseconds))))
+        .or_else(|| first_line(table).map(|at| (at, None)))
+}
+
+/// The column of nanoseconds that belongs to one of whole seconds.
+fn nanoseconds_of(table: &Table<'_>, at: usize) -> Option<usize> {
+    let split = |name: &str| -> Option<(String, Option<Unit>)> {
+        let lower = name.to_lowercase();
+        let from = lower.rfind(['.', '_', '/', ' ']).map_or(0, |mark| mark + 1);
+        Some((lower[..from].to_owned(), Unit::of(&lower[from..])))
+    };
+    let (prefix, unit) = split(&table.columns[at].name)?;
+    let is_whole = |column: &Column| column.values.iter().all(|value| value.fract() == 0.0);
+    if unit != Some(Unit::Power(0)) || !is_whole(&table.columns[at]) {
+        return None;
+    }
+    only((0..table.columns.len()).filter(|other| {
+        let column = &table.columns[*other];
+        split(&column.name) == Some((prefix.clone(), Some(Unit::Power(-9))))
+            && column.values.iter().all(|ns| (0.0..1e9).contains(ns))
+    }))
+}
+
+/// A first column without a name, or the first line of a matrix, that runs as a time does.
+fn first_line(table: &Table<'_>) -> Option<usize> {
+    let is_first = |(at, column): (usize, &Column)| {
+        let line = ["(1,:)", "(:,1)", "[0,:]", "[:,0]", "[0]"];
+        (at == 0 && column.name.is_empty()) || line.iter().any(|line| column.name.ends_with(line))
+    };
+    let first = only((0..table.columns.len()).filter(|at| is_first((*at, &table.columns[*at]))))?;
+    let values = &table.columns[first].values;
+    let rises = values.windows(2).all(|pair| pair[1] > pair[0]);
+    let counts = values.windows(2).all(|pair| pair[1] - pair[0] == 1.0);
+    (values.len() > 2 && rises && !counts && values.iter().all(|value| value.is_finite())).then_some(first)
+}
+
+/// The unit in which numbers without one count.
+fn unit_of(values: &[f64]) -> Unit {
+    let first = values.iter().copied().find(|value| value.is_finite()).unwrap_or(0.0);
+    match first {
+        stamp if stamp >= 1e17 => return Unit::Power(-9),
+        stamp if stamp >= 1e14 => return Unit::Power(-6),
+        stamp if stamp >= 1e11 => return Unit::Power(-3),
+        _ => {}
+    }
+    if !values.iter().all(|value| value.fract() == 0.0) {
+        return Unit::Power(0);
+    }
+    let mut steps: Vec<f64> = values
+        .windows(2)
+        .map(|pair| pair[1] - pair[0])
+        .filter(|step| *step > 0.0)
+        .collect();
+    if steps.len() < 2 {
+        return Unit::Power(0);
+    }
+    let middle = steps.len() / 2;
+    let step = *steps.select_nth_unstable_by(middle, f64::total_cmp).1;
+    if step < STEP_OF_NO_SECONDS {
+        return Unit::Power(0);
+    }
+    // Steps of 0.5 ms to 0.5 s: each unit has its own three decades.
+    let power = [-3, -6, -9].into_iter().find(|power| {
+        let seconds = step * 10_f64.powi(*power);
+        (1.0 / MOST_HZ..1000.0 / MOST_HZ).contains(&seconds)
+    });
+    Unit::Power(power.unwrap_or(0))
+}
+
+/// Makes a column the time t.
+fn take(table: &mut Table<'_>, at: usize, unit: Option<Unit>) {
+    let beside = nanoseconds_of(table, at).filter(|_| unit == Some(Unit::SecondsAndNanoseconds));
+    let nanoseconds = beside.map(|beside| (table.columns[beside].name.clone(), table.columns[beside].values.clone()));
+    let was_t = table.columns[at].name == "t";
+    if let Some(other) = table
+        .columns
+        .iter()
+        .position(|column| column.name == "t")
+        .filter(|other| *other != at)
+    {
+        table.columns[other].name = String::from("t as recorded");
+    }
+    let time = &mut table.columns[at];
+    let unit = match unit {
+        _ if time.moments => Unit::Iso,
+        Some(unit) => unit,
+        None if time.unit == "s" => Unit::Power(0),
+        None => unit_of(&time.values),
+    };
+    if was_t && unit == Unit::Power(0) {
+        return;
+    }
+    let name = std::mem::replace(&mut time.name, String::from("t"));
+    let name = if name.is_empty() {
+        String::from("the first column, which has no name,")
+    } else {
+        shown(&name)
+    };
+    let first = time
+        .values
+        .iter()
+        .copied()
+        .find(|value| value.is_finite())
+        .unwrap_or(0.0);
+    let scale = |time: &mut Column, factor: f64, from_s: f64, divide: bool| {
+        for value in &mut time.values {
+            let from_first = *value - from_s;
+            *value = if divide {
+                from_first / factor
+            } else {
+                from_first * factor
+            };
+        }
+    };
+    let note = match unit {
+        Unit::Iso => {
+            time.moments = false;
+            let taken = if was_t { "" } else { "taken as t, " };
+            format!("{name} is {taken}in s from its first moment")
+        }
+        Unit::SecondsAndNanoseconds => {
+            let (other, ns) = nanoseconds.unwrap_or_default();
+            let first_ns = ns.first().copied().unwrap_or(0.0);
+            for (value, ns) in time.values.iter_mut().zip(ns) {
+                *value = (*value - first) + (ns - first_ns) / 1e9;
+            }
+            time.precision = Precision::default();
+            format!(
+                "{name} and {} are taken as t, in s from the first of them",
+                named(&other)
+            )
+        }
+        Unit::Minutes | Unit::Hours => {
+            scale(time, if unit == Unit::Minutes { 60.0 } else { 3600.0 }, 0.0, false);
+            time.precision = Precision::default();
+            format!("{name} is taken as t, from {unit}")
+        }
+        Unit::Power(0) => format!("{name} is taken as t, in s"),
+        Unit::Power(power) => {
+            let parts = 10_f64.powi(-power);
+            let from_first = first / parts >= STAMP;
+            scale(time, parts, if from_first { first } else { 0.0 }, true);
+            time.precision = time.precision.shifted(power);
+            let origin = if from_first { " from its first stamp" } else { "" };
+            let taken = if was_t { "" } else { "taken as t, " };
+            format!("{name} is {taken}in s{origin}, from {unit}")
+        }
+    };
+    // What is in s, as t is, needs no unit.
+    time.unit = String::from(if unit == Unit::Power(0) { "" } else { "s" });
+    table
+        .notes
+        .retain(|note| note != "column 1 has no name and is left out" || !name.starts_with("the first column"));
+    table.notes.push(note);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_of_times_and_their_units() {
+        use Meaning::{Other, Stamp, Time};
+        let power = |power| Time(Some(Unit::Power(power)));
+        for (name, meant) in [
+            ("t", Time(None)),
+            ("Time", Time(None)),
+            ("time (s)", power(0)),
+            ("Time [ms]", power(-3)),
+            ("t_ms", power(-3)),
+            ("timestamp_us", power(-6)),
+            ("time_ns", power(-9)),
+            ("TIME, sec", power(0)),
+            ("Zeit [s]", power(0)),
+            ("Zeit/min", Time(Some(Unit::Minutes))),
+            ("elapsed", Time(None)),
+            ("Elapsed Time (ms)", power(-3)),
+            ("%time", Time(None)),
+            ("timestamp", Stamp),
+            ("header.stamp", Stamp),
+            ("times", Other),
+            ("target", Other),
+            ("time to go", Other),
+            ("t2", Other),
+            ("s", Other),
+            ("", Other),
+        ] {
+            assert_eq!(meaning(name), meant, "{name}");
+        }
+    }
+
+    #[test]
+    fn units_by_stamps_and_steps() {
+        let unit = |first: f64, step: f64| unit_of(&(0..9).map(|k| first + step * f64::from(k)).collect::<Vec<_>>());
+        for (first, step, power) in [
+            (1.7e9, 1.0, 0),
+            (1.7e12, 20.0, -3),
+            (1.7e15, 20_000.0, -6),
+            (1.7e18, 2e7, -9),
+            (0.0, 0.02, 0),
+            (0.0, 1.0, 0),
+            (0.0, 20.0, -3),
+            (0.0, 499.0, -3),
+            (0.0, 500.0, -6),
+            (0.0, 20_000.0, -6),
+            (0.0, 2e7, -9),
+            (0.0, 20.5, 0),
+            (0.0, 1e12, 0),
+        ] {
+            assert_eq!(unit(first, step), Unit::Power(power), "{first} {step}");
+        }
+        assert_eq!(unit_of(&[f64::NAN]), Unit::Power(0));
+        assert_eq!(unit_of(&[]), Unit::Power(0));
+    }
+
+    #[test]
+    fn choices() {
+        for text in [
+            "clock",
+            "clock:ms",
+            "a:b:iso",
+            "stamp:sec+nanosec",
+            "ans(1,:)",
+            "ans(1,:):ms",
+        ] {
+            assert_eq!(
+                text.parse::<TimeChoice>().map(|time| time.to_string()).ok().as_deref(),
+                Some(text)
+            );
+        }
+        for text in ["", ":ms", "clock:fortnight"] {
+            assert!(
+                matches!(text.parse::<TimeChoice>(), Err(IoError::Expression { .. })),
+                "{text}"
+            );
+        }
+    }
+}
