@@ -42,19 +42,38 @@ impl Precision {
 
     /// Takes one more printed number into account.
     pub(crate) fn add(&mut self, text: &str) {
-        let (mantissa, exponent) = match text.trim().split_once(['e', 'E']) {
-            Some((mantissa, exponent)) => (mantissa, exponent.parse::<i32>().unwrap_or(0).clamp(-400, 400)),
-            None => (text.trim(), 0),
-        };
-        let digits = |part: &str| part.bytes().filter(u8::is_ascii_digit).count() as i32;
-        let behind = mantissa.split_once('.').map_or(0, |(_, behind)| digits(behind));
-        let leading_zeros = mantissa
-            .bytes()
-            .take_while(|b| !(b'1'..=b'9').contains(b))
-            .filter(u8::is_ascii_digit)
-            .count() as i32;
+        self.add_bytes(text.trim().as_bytes());
+    }
+
+    /// Takes one more printed number without blanks around it into account.
+    pub(crate) fn add_bytes(&mut self, text: &[u8]) {
+        let (mut behind, mut significant, mut point) = (0, 0, false);
+        let mut exponent = 0;
+        for (at, byte) in text.iter().enumerate() {
+            match byte {
+                b'0'..=b'9' => {
+                    behind += i32::from(point);
+                    significant += i32::from(significant > 0 || *byte != b'0');
+                }
+                b'.' => point = true,
+                b'e' | b'E' => {
+                    let written = std::str::from_utf8(&text[at + 1..])
+                        .ok()
+                        .and_then(|text| text.parse().ok());
+                    exponent = written.map_or(0, |exponent: i32| exponent.clamp(-400, 400));
+                    break;
+                }
+                _ => {}
+            }
+        }
         self.decimals = Some(self.decimals.unwrap_or(i32::MIN).max(behind - exponent));
-        self.significant = self.significant.max(digits(mantissa) - leading_zeros);
+        self.significant = self.significant.max(significant);
+    }
+
+    /// Takes all numbers of another part of the column into account.
+    pub(crate) fn join(&mut self, other: Self) {
+        self.decimals = self.decimals.max(other.decimals);
+        self.significant = self.significant.max(other.significant);
     }
 
     /// Takes one more number with so many decimals into account.

@@ -4,12 +4,13 @@
 //! |---|---|
 //! | `foreign` | what other programs write, made plain |
 //! | `text` | encoding, comments, separator, lines |
-//! | `table` | the columns of a record |
+//! | `table`, `plain` | the columns of a record; its rows of plain numbers, fast |
 //! | `record` | a record into CSV |
 //! | `columns` | tables of results, out and in |
 
 mod columns;
 mod foreign;
+mod plain;
 mod record;
 mod table;
 mod text;

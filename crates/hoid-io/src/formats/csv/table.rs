@@ -14,7 +14,9 @@
 //! without rounding what t can only say up to its last digit; it counts where t agrees with it.
 
 use std::collections::HashMap;
+use std::ops::Range;
 
+use super::plain::{Layout, RowStarts, plain_rows};
 use super::text::{
     as_meant, comments, has_decimal_commas, is_aside, open_line, place, reader, refuse_blanks, row_start, separator,
     text,
@@ -29,10 +31,39 @@ struct CsvSource<'a> {
     file: &'a str,
     text: &'a str,
     separator: u8,
-    /// Byte at which each row starts.
-    starts: Vec<usize>,
+    starts: RowStarts,
     /// Where the last line starts, where it lacks its end.
     open: Option<usize>,
+}
+
+impl CsvSource<'_> {
+    /// Where a row begins, and its cells.
+    fn row(&self, row: usize) -> Option<(usize, csv::ByteRecord)> {
+        let (mut at_row, from) = self.starts.before(row)?;
+        let bytes = self.text.as_bytes();
+        let mut reader = reader(&bytes[from..], self.separator);
+        let mut record = csv::ByteRecord::new();
+        while matches!(reader.read_byte_record(&mut record), Ok(true)) {
+            if is_blank_line(&record) {
+                continue;
+            }
+            if at_row == row {
+                return Some((row_start(bytes, from + position(&record)), record));
+            }
+            at_row += 1;
+        }
+        None
+    }
+}
+
+/// Where a record begins, with what the reader skips before it.
+fn position(record: &csv::ByteRecord) -> usize {
+    record.position().map_or(0, |p| p.byte() as usize)
+}
+
+/// Whether a record is a line of blanks: none of the rows.
+fn is_blank_line(record: &csv::ByteRecord) -> bool {
+    record.len() == 1 && record[0].trim_ascii().is_empty()
 }
 
 impl Source for CsvSource<'_> {
@@ -41,26 +72,19 @@ impl Source for CsvSource<'_> {
     }
 
     fn place(&self, row: usize) -> String {
-        place(
-            self.text.as_bytes(),
-            self.starts.get(row).copied().unwrap_or(self.text.len()),
-        )
+        let start = self.row(row).map_or(self.text.len(), |(start, _)| start);
+        place(self.text.as_bytes(), start)
     }
 
     fn cell(&self, row: usize, column: usize) -> String {
-        let start = self.starts.get(row).copied().unwrap_or(self.text.len());
-        let mut record = csv::ByteRecord::new();
-        let read = reader(&self.text.as_bytes()[start..], self.separator).read_byte_record(&mut record);
-        match (read, record.get(column)) {
-            (Ok(true), Some(cell)) => shown(&String::from_utf8_lossy(cell)),
-            _ => String::new(),
-        }
+        let record = self.row(row).map(|(_, record)| record);
+        let cell = record.as_ref().and_then(|record| record.get(column));
+        cell.map_or_else(String::new, |cell| shown(&String::from_utf8_lossy(cell)))
     }
 
     fn is_open(&self, row: usize) -> bool {
-        self.open
-            .zip(self.starts.get(row))
-            .is_some_and(|(open, start)| *start >= open)
+        let begins_there = |open| self.starts.last().is_some_and(|last| last >= open);
+        row + 1 == self.starts.len() && self.open.is_some_and(begins_there)
     }
 }
 
@@ -74,33 +98,141 @@ pub(crate) fn parse<'a>(bytes: &'a [u8], file: &'a str) -> Result<Table<'a>, IoE
     refuse_blanks(header_line, lines.next(), file)?;
     let separator = separator(header_line);
     let commas = has_decimal_commas(text, separator);
-    let mut reader = reader(text.as_bytes(), separator);
-    let mut record = csv::ByteRecord::new();
-    let mut columns: Vec<Column> = Vec::new();
-    let mut times: Vec<(bool, Moments)> = Vec::new();
-    let mut starts = Vec::new();
+    let bytes = text.as_bytes();
+    let first = first_record(bytes, separator);
+    let (names, first) = first.ok_or_else(|| IoError::Empty { file: file.to_owned() })?;
     let mut notes = Vec::new();
-    let mut empty_at_end = 0;
-    let open = open_line(text);
+    let mut columns = header(&names, commas, file, &mut || place(bytes, first.start), &mut notes)?;
+    let mut rows = Rows {
+        file,
+        bytes,
+        separator,
+        commas,
+        open: open_line(text),
+        times: columns.iter().map(|column| is_time(&column.name)).collect(),
+        moments: columns.iter().map(|_| Moments::default()).collect(),
+        starts: RowStarts::default(),
+        empty_at_end: 0,
+    };
+    let mut at = first.end;
+    while at < bytes.len() {
+        at = rows.plain(at, &mut columns);
+        at = rows.whole(at, &mut columns)?;
+    }
+    let Rows {
+        starts, empty_at_end, ..
+    } = rows;
+    // Spreadsheets leave rows of bare separators behind the table.
+    let count = starts.len() - empty_at_end;
+    for column in &mut columns {
+        column.values.truncate(count);
+    }
+    if count == 0 {
+        return Err(IoError::NoRows { file: file.to_owned() });
+    }
+    if commas {
+        notes.push(String::from("the commas in its numbers are taken as decimal commas"));
+    }
+    let sample_time_s = asides(comments(text), &mut columns);
+    let source = CsvSource {
+        file,
+        text,
+        separator,
+        starts,
+        open: open_line(text),
+    };
+    if source.is_open(count - 1) {
+        notes.extend(cut_number(&source, count));
+    }
+    Ok(Table {
+        columns,
+        rows: count,
+        sample_time_s,
+        source: Box::new(source),
+        notes,
+    })
+}
+
+/// The first record that is no blank line, and the bytes that it takes.
+fn first_record(bytes: &[u8], separator: u8) -> Option<(csv::ByteRecord, Range<usize>)> {
+    let mut reader = reader(bytes, separator);
+    let mut record = csv::ByteRecord::new();
     // The reader fails on nothing but input and output, of which there is none here.
     while matches!(reader.read_byte_record(&mut record), Ok(true)) {
-        let blank = record.iter().all(|cell| cell.trim_ascii().is_empty());
-        if blank && record.len() == 1 {
-            continue;
+        if !is_blank_line(&record) {
+            let start = row_start(bytes, position(&record));
+            return Some((record, start..reader.position().byte() as usize));
         }
-        let start = row_start(text.as_bytes(), record.position().map_or(0, |p| p.byte() as usize));
-        let mut line = || place(text.as_bytes(), start);
-        if columns.is_empty() {
-            columns = header(&record, commas, file, &mut line, &mut notes)?;
-            times = columns
-                .iter()
-                .map(|column| (is_time(&column.name), Moments::default()))
-                .collect();
-            continue;
+    }
+    None
+}
+
+/// Rows that are read as whole CSV before plain ones are looked for again.
+const WHOLE: usize = 256;
+
+/// The rows of a table on their way into its columns.
+struct Rows<'a> {
+    file: &'a str,
+    bytes: &'a [u8],
+    separator: u8,
+    commas: bool,
+    open: Option<usize>,
+    /// Whether a column may be the time.
+    times: Vec<bool>,
+    moments: Vec<Moments>,
+    starts: RowStarts,
+    empty_at_end: usize,
+}
+
+impl Rows<'_> {
+    /// Takes the rows of plain numbers from `from` on; where the first begins that is none.
+    fn plain(&mut self, from: usize, columns: &mut [Column]) -> usize {
+        if self.commas {
+            return from;
         }
-        if record.len() < columns.len() && open.is_some_and(|open| start >= open) {
+        let layout = Layout {
+            separator: self.separator,
+            with_precision: &self.times,
+        };
+        let (moments, starts, empty_at_end) = (&mut self.moments, &mut self.starts, &mut self.empty_at_end);
+        plain_rows(self.bytes, from, layout, |run| {
+            if run.starts.is_empty() {
+                return;
+            }
+            *empty_at_end = 0;
+            run.starts.into_iter().for_each(|start| starts.push(start));
+            let each = columns.iter_mut().zip(&mut *moments).zip(run.values).zip(run.precision);
+            for (((column, moments), values), precision) in each {
+                if values.iter().any(|value| !value.is_nan()) {
+                    moments.refuse(column);
+                }
+                column.values.extend(values);
+                column.precision.join(precision);
+            }
+        })
+    }
+
+    /// Takes the rows from `from` on as whole CSV, [`WHOLE`] at most; where the next begins.
+    fn whole(&mut self, from: usize, columns: &mut [Column]) -> Result<usize, IoError> {
+        let mut reader = reader(&self.bytes[from..], self.separator);
+        let mut record = csv::ByteRecord::new();
+        for _ in 0..WHOLE {
+            if !matches!(reader.read_byte_record(&mut record), Ok(true)) {
+                return Ok(self.bytes.len());
+            }
+            if !is_blank_line(&record) {
+                let start = row_start(self.bytes, from + position(&record));
+                self.row(&record, start, columns)?;
+            }
+        }
+        Ok(from + reader.position().byte() as usize)
+    }
+
+    fn row(&mut self, record: &csv::ByteRecord, start: usize, columns: &mut [Column]) -> Result<(), IoError> {
+        let line = || place(self.bytes, start);
+        if record.len() < columns.len() && self.open.is_some_and(|open| start >= open) {
             return Err(IoError::CutRow {
-                file: file.to_owned(),
+                file: self.file.to_owned(),
                 place: line(),
                 found: record.len(),
                 expected: columns.len(),
@@ -108,19 +240,21 @@ pub(crate) fn parse<'a>(bytes: &'a [u8], file: &'a str) -> Result<Table<'a>, IoE
         }
         if record.len() != columns.len() {
             return Err(IoError::RowLength {
-                file: file.to_owned(),
+                file: self.file.to_owned(),
                 place: line(),
                 found: record.len(),
                 expected: columns.len(),
             });
         }
-        empty_at_end = if blank { empty_at_end + 1 } else { 0 };
-        starts.push(start);
-        for ((column, (is_time, moments)), cell) in columns.iter_mut().zip(&mut times).zip(&record) {
+        let blank = record.iter().all(|cell| cell.trim_ascii().is_empty());
+        self.empty_at_end = if blank { self.empty_at_end + 1 } else { 0 };
+        self.starts.push(start);
+        let each = columns.iter_mut().zip(&self.times).zip(&mut self.moments).zip(record);
+        for (((column, is_time), moments), cell) in each {
             // The text is UTF-8 as a whole and the separators are ASCII, so that each cell is as
             // well.
             let cell = std::str::from_utf8(cell).unwrap_or("\u{fffd}");
-            let cell = &*with_decimal_point(cell, commas);
+            let cell = &*with_decimal_point(cell, self.commas);
             match Cell::parse(cell) {
                 Cell::Number(value) => {
                     moments.refuse(column);
@@ -133,38 +267,8 @@ pub(crate) fn parse<'a>(bytes: &'a [u8], file: &'a str) -> Result<Table<'a>, IoE
                 Cell::Text => moments.push(column, cell),
             }
         }
+        Ok(())
     }
-    // Spreadsheets leave rows of bare separators behind the table.
-    starts.truncate(starts.len() - empty_at_end);
-    for column in &mut columns {
-        column.values.truncate(starts.len());
-    }
-    if columns.is_empty() {
-        return Err(IoError::Empty { file: file.to_owned() });
-    }
-    if starts.is_empty() {
-        return Err(IoError::NoRows { file: file.to_owned() });
-    }
-    if commas {
-        notes.push(String::from("the commas in its numbers are taken as decimal commas"));
-    }
-    let sample_time_s = asides(comments(text), &mut columns);
-    if open.is_some_and(|open| starts.last().is_some_and(|start| *start >= open)) {
-        notes.extend(cut_number(text, separator, &starts));
-    }
-    Ok(Table {
-        columns,
-        rows: starts.len(),
-        sample_time_s,
-        source: Box::new(CsvSource {
-            file,
-            text,
-            separator,
-            starts,
-            open,
-        }),
-        notes,
-    })
 }
 
 /// Lines above the last one whose numbers say how long one is.
@@ -173,19 +277,22 @@ const COMPARED: usize = 8;
 /// That the last number of a file may be cut: the last line lacks its end, and its last cell is
 /// shorter by two characters or more than that of each of the [`COMPARED`] lines before, which have
 /// digits behind a point.
-fn cut_number(text: &str, separator: u8, starts: &[usize]) -> Option<String> {
-    let (last, before) = starts.split_last()?;
-    let compared = before.len().checked_sub(COMPARED)?;
-    let last_cell = |start: usize| {
-        let line = text[start..].lines().next().unwrap_or_default();
-        line.rsplit(char::from(separator)).next().unwrap_or_default().trim()
+fn cut_number(source: &CsvSource<'_>, rows: usize) -> Option<String> {
+    let last_cell = |row: usize| {
+        let (start, _) = source.row(row)?;
+        let line = source.text[start..].lines().next().unwrap_or_default();
+        Some(
+            line.rsplit(char::from(source.separator))
+                .next()
+                .unwrap_or_default()
+                .trim(),
+        )
     };
-    let cut = last_cell(*last);
-    let is_longer = |start: &usize| {
-        let cell = last_cell(*start);
-        cell.contains('.') && cell.len() > cut.len() + 1
-    };
-    before[compared..].iter().all(is_longer).then(|| {
+    let last = rows.checked_sub(1)?;
+    let compared = last.checked_sub(COMPARED)?;
+    let cut = last_cell(last)?;
+    let is_longer = |row: usize| last_cell(row).is_some_and(|cell| cell.contains('.') && cell.len() > cut.len() + 1);
+    (compared..last).all(is_longer).then(|| {
         format!(
             "the file ends without the end of its last line, whose last number ({}) is shorter than those above it: it may be \
              cut; leave that line out with --to",
@@ -295,6 +402,57 @@ mod tests {
         }
         assert_eq!(names_and_rows("\"a,b\";c\n1;2\n").0, ["a,b", "c"]);
         assert_eq!(names_and_rows(",t,e,u,\n0,0,1,2,\n").0, ["", "t", "e", "u", ""]);
+    }
+
+    /// Cells between quotes are those of whole CSV; without them, rows of numbers are read by the fast
+    /// reader, in several parts. Both give the same bits, texts, precision and places.
+    #[test]
+    fn plain_rows_are_those_of_whole_csv() {
+        let mut state = 7_u64;
+        let mut draw = |below: u64| {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
+            (state >> 33) % below
+        };
+        let odd = [
+            "", " ", "-", "abc", "1e999", "NaN", "+.5", "-1.", " 7 ", "1e", "0x10", "1_0", ".", "-1e-3",
+        ];
+        let (mut plain, mut quoted) = (String::from("t,e,u\n"), String::from("t,e,u\n"));
+        for row in 0..200_000 {
+            let mut cells = vec![format!("{:.3}", f64::from(row) * 0.01)];
+            for _ in 0..2 {
+                let digits = draw(17) as usize;
+                let value = (draw(1 << 30) as f64 / f64::from(1 << 20) - 512.0) * 10_f64.powi(draw(12) as i32 - 6);
+                cells.push(match draw(200) {
+                    0 => odd[draw(odd.len() as u64) as usize].to_owned(),
+                    1 => format!("{value:e}"),
+                    2 => format!("  {value} "),
+                    _ => format!("{value:.digits$}"),
+                });
+            }
+            let ends = ["\n", "\r\n", "\n\n", "\n# aside\n"][if draw(50) == 0 { draw(4) as usize } else { 0 }];
+            plain += &(cells.join(",") + ends);
+            let cells: Vec<String> = cells.iter().map(|cell| format!("\"{cell}\"")).collect();
+            quoted += &(cells.join(",") + ends);
+        }
+        let (plain, quoted) = (plain.into_bytes(), quoted.into_bytes());
+        assert!(plain.len() > 5 << 20);
+        let [plain, quoted] = [&plain, &quoted].map(|bytes| parse(bytes, "run.csv").unwrap());
+        assert_eq!(plain.rows, quoted.rows);
+        for (at, (a, b)) in plain.columns.iter().zip(&quoted.columns).enumerate() {
+            assert_eq!((&a.texts, a.precision, a.moments), (&b.texts, b.precision, b.moments));
+            for (row, (a, b)) in a.values.iter().zip(&b.values).enumerate() {
+                assert!(
+                    a.to_bits() == b.to_bits() || (a.is_nan() && b.is_nan()),
+                    "{row}: {a} {b}"
+                );
+            }
+            for row in [0, 1023, 1024, 100_001, plain.rows - 1] {
+                assert_eq!(plain.source.cell(row, at).trim(), quoted.source.cell(row, at).trim());
+                assert_eq!(plain.source.place(row), quoted.source.place(row));
+            }
+        }
     }
 
     #[test]

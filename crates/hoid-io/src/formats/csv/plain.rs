@@ -1,0 +1,214 @@
+//! Rows of plain numbers, which nearly all rows of a recording are, straight from the bytes.
+//!
+//! A row is plain where each of its cells is a number with a decimal point, or nothing, with blanks
+//! around it at most. Any other row (texts, quotes, comments, cells too many or too few) ends the
+//! run, and is the reader's of whole CSV ([`super::table`]). The numbers are the same, correctly
+//! rounded by both (D. Lemire, *Software: Practice and Experience* 51 (2021) 1700-1727).
+//!
+//! A long text is taken in parts that end with a line, side by side. Each part says how far it was
+//! plain; what stands behind the first that was not is left.
+
+use std::ops::Range;
+use std::thread;
+
+use crate::table::Precision;
+
+/// Bytes of a part: enough rows that a thread is worth its start, few enough to be small beside the
+/// columns.
+const PART: usize = 4 << 20;
+/// Bytes of the first part, which is read without a thread: where rows that are not plain stand often, it holds one.
+const FIRST: usize = 64 << 10;
+/// Threads at most.
+const THREADS: usize = 8;
+/// Rows between two whose place is kept.
+const KEPT: usize = 1024;
+
+/// Where the rows of a table begin in its text: every [`KEPT`]-th, and the last.
+#[derive(Debug, Default)]
+pub(super) struct RowStarts {
+    kept: Vec<usize>,
+    rows: usize,
+    last: usize,
+}
+
+impl RowStarts {
+    /// One more row.
+    pub(super) fn push(&mut self, start: usize) {
+        if self.rows.is_multiple_of(KEPT) {
+            self.kept.push(start);
+        }
+        self.rows += 1;
+        self.last = start;
+    }
+
+    /// Number of rows.
+    pub(super) fn len(&self) -> usize {
+        self.rows
+    }
+
+    /// Where the last row begins.
+    pub(super) fn last(&self) -> Option<usize> {
+        (self.rows > 0).then_some(self.last)
+    }
+
+    /// The nearest row at or before `row` whose place is kept, and where it begins.
+    pub(super) fn before(&self, row: usize) -> Option<(usize, usize)> {
+        let at = self.kept.get(row / KEPT)?;
+        Some((row / KEPT * KEPT, *at))
+    }
+}
+
+/// Rows that were plain, one after the other.
+#[derive(Debug, Default)]
+pub(super) struct Plain {
+    /// Values by column.
+    pub(super) values: Vec<Vec<f64>>,
+    /// Precision of the columns where it was asked for.
+    pub(super) precision: Vec<Precision>,
+    /// Where the rows begin.
+    pub(super) starts: Vec<usize>,
+    /// Where the first row begins that is not plain; the end of the text where there is none.
+    pub(super) end: usize,
+}
+
+/// A table as its rows are read: what divides the cells, and the columns whose precision is asked for.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Layout<'a> {
+    pub(super) separator: u8,
+    pub(super) with_precision: &'a [bool],
+}
+
+/// The plain rows from `from` on, in runs that are handed over in their order.
+pub(super) fn plain_rows(bytes: &[u8], from: usize, layout: Layout<'_>, mut take: impl FnMut(Plain)) -> usize {
+    let threads = thread::available_parallelism().map_or(1, |n| n.get().min(THREADS));
+    let mut at = from;
+    let first = from..end_of_part(bytes, from, FIRST);
+    if !first.is_empty() {
+        let run = run(bytes, first.clone(), layout);
+        at = run.end;
+        take(run);
+        if at < first.end {
+            return at;
+        }
+    }
+    while at < bytes.len() {
+        let mut parts: Vec<Range<usize>> = Vec::with_capacity(threads);
+        let mut start = at;
+        while parts.len() < threads && start < bytes.len() {
+            let end = end_of_part(bytes, start, PART);
+            parts.push(start..end);
+            start = end;
+        }
+        let runs: Vec<Plain> = if let [only] = parts.as_slice() {
+            vec![run(bytes, only.clone(), layout)]
+        } else {
+            thread::scope(|scope| {
+                let each = |part: &Range<usize>| {
+                    let part = part.clone();
+                    scope.spawn(move || run(bytes, part, layout))
+                };
+                let running: Vec<_> = parts.iter().map(each).collect();
+                // A thread that panicked has read nothing: its part is left to the reader of whole CSV.
+                let joined = running.into_iter().zip(&parts);
+                joined
+                    .map(|(thread, part)| thread.join().unwrap_or_else(|_| Plain::nothing(layout, part.start)))
+                    .collect()
+            })
+        };
+        for (run, part) in runs.into_iter().zip(&parts) {
+            at = run.end;
+            take(run);
+            if at < part.end {
+                return at;
+            }
+        }
+    }
+    at
+}
+
+/// The end of the part that begins at `start`: behind the first end of a line after so many bytes.
+fn end_of_part(bytes: &[u8], start: usize, length: usize) -> usize {
+    let behind = start.saturating_add(length).min(bytes.len());
+    let line = bytes[behind..].iter().position(|byte| *byte == b'\n');
+    line.map_or(bytes.len(), |line| behind + line + 1)
+}
+
+impl Plain {
+    fn nothing(layout: Layout<'_>, at: usize) -> Self {
+        let columns = layout.with_precision.len();
+        Self {
+            values: vec![Vec::new(); columns],
+            precision: vec![Precision::default(); columns],
+            starts: Vec::new(),
+            end: at,
+        }
+    }
+}
+
+/// The plain rows of a part.
+fn run(bytes: &[u8], part: Range<usize>, layout: Layout<'_>) -> Plain {
+    let columns = layout.with_precision.len();
+    let mut found = Plain::nothing(layout, part.start);
+    let mut row = vec![f64::NAN; columns];
+    let mut printed = vec![0..0; columns];
+    while found.end < part.end {
+        let start = found.end;
+        // Blank lines are none of the rows.
+        if matches!(bytes[start], b'\n' | b'\r') {
+            found.end += 1;
+            continue;
+        }
+        let Some(end) = plain_row(&bytes[..part.end], start, layout.separator, &mut row, &mut printed) else {
+            break;
+        };
+        found.starts.push(start);
+        for (column, value) in row.iter().enumerate() {
+            found.values[column].push(*value);
+            if layout.with_precision[column] && !value.is_nan() {
+                found.precision[column].add_bytes(&bytes[printed[column].clone()]);
+            }
+        }
+        found.end = end;
+    }
+    found
+}
+
+/// The numbers of a row and where they are printed, and where the row ends; `None` where it is not plain.
+#[inline]
+fn plain_row(
+    bytes: &[u8],
+    start: usize,
+    separator: u8,
+    row: &mut [f64],
+    printed: &mut [Range<usize>],
+) -> Option<usize> {
+    let blanks = |mut at: usize| {
+        while bytes.get(at) == Some(&b' ') {
+            at += 1;
+        }
+        at
+    };
+    let (mut at, last) = (start, row.len() - 1);
+    let mut empty = true;
+    for (column, (value, place)) in row.iter_mut().zip(printed).enumerate() {
+        at = blanks(at);
+        *value = f64::NAN;
+        if matches!(bytes.get(at), Some(b'0'..=b'9' | b'-' | b'+' | b'.')) {
+            let (number, length) = fast_float2::parse_partial::<f64, _>(&bytes[at..]).ok()?;
+            if !number.is_finite() {
+                return None;
+            }
+            *value = number;
+            *place = at..at + length;
+            at = blanks(at + length);
+            empty = false;
+        }
+        match bytes.get(at) {
+            Some(byte) if *byte == separator && column < last => at += 1,
+            Some(b'\n' | b'\r') | None if column == last => {}
+            _ => return None,
+        }
+    }
+    // Rows without a value may be what a spreadsheet leaves behind its table.
+    (!empty).then_some(at)
+}
