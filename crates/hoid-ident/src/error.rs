@@ -26,7 +26,8 @@ pub enum IdentError {
     },
     /// Records that were sampled differently cannot share a discrete model.
     #[error(
-        "record {label} has the sample time {found} s, the first record {expected} s; resample one of them, or fit them separately"
+        "record {label} has the sample time {found} s, the first record {expected} s; bring them to one rate, as with --new-fs {rate}, or fit them separately",
+        rate = lower_rate(*found, *expected)
     )]
     MixedSampling {
         /// The record that differs.

@@ -245,7 +245,7 @@ impl Record {
         if (first - second).abs() > 1e-6 * first {
             return Err(refuse(
                 format!("a sample time of {second} s behind {first} s"),
-                "the same; resample one of them",
+                "the same: read both at one rate",
             ));
         }
         match (&mut self.input, &next.input) {
