@@ -10,10 +10,9 @@
 //! standard deviations about its prediction. What is held has a weak prior at where it is now, the same for all
 //! spans: where the data say nothing of it, two spans do not differ.
 
-use super::{
-    cholesky,
-    sizes::{HELD, LINEAR, STATES},
-};
+use hoid_numerics::cholesky;
+
+use super::sizes::{HELD, LINEAR, STATES};
 
 /// Products of the upper triangle.
 const PRODUCTS: usize = STATES * (STATES + 1) / 2;
@@ -148,11 +147,7 @@ impl Block {
         }
         let mut state = self.with_output;
         cholesky::solve(&factor, STATES, &mut state);
-        let mut inverse = [[0.0; STATES]; STATES];
-        for (i, row) in inverse.iter_mut().enumerate() {
-            row[i] = 1.0;
-            cholesky::solve(&factor, STATES, row);
-        }
+        let inverse = cholesky::scaled_inverse(&factor, STATES, 1.0);
         let explained: f64 = state.iter().zip(self.with_output).map(|(s, b)| s * b).sum();
         let left = (self.square - explained).max(self.samples * 1e-12);
         Some(Solution { state, inverse, left })

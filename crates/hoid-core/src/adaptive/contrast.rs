@@ -19,7 +19,9 @@
 //! Sources: P. J. Huber, *Proc. Fifth Berkeley Symposium* 1 (1967) 221-233; H. White, *Econometrica* 48 (1980)
 //! 817-838; W. K. Newey and K. D. West, *Econometrica* 55 (1987) 703-708.
 
-use super::{blocks::Block, cholesky, sizes::STATES};
+use hoid_numerics::cholesky;
+
+use super::{blocks::Block, sizes::STATES};
 
 type Matrix = [[f64; STATES]; STATES];
 
