@@ -43,6 +43,12 @@ pub fn sample_variance(values: &[f64]) -> f64 {
     squared_deviations(values) / (values.len() as f64 - 1.0)
 }
 
+/// Root of the variance around the mean with the divisor n; zero of none, unlike [`variance`].
+#[inline]
+pub fn standard_deviation(values: &[f64]) -> f64 {
+    libm::sqrt(squared_deviations(values) / values.len().max(1) as f64)
+}
+
 /// Mean of the squares; no number of none.
 #[inline]
 pub fn mean_square(values: &[f64]) -> f64 {
@@ -118,6 +124,7 @@ mod tests {
         );
         assert!(mean(&[]).is_nan() && variance(&[]).is_nan() && root_mean_square(&[]).is_nan());
         assert!(sample_variance(&[7.0]).is_nan());
+        assert_eq!((standard_deviation(&x), standard_deviation(&[])), (2.5_f64.sqrt(), 0.0));
     }
 
     #[test]
