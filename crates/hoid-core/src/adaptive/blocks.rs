@@ -10,7 +10,7 @@
 //! standard deviations about its prediction. What is held has a weak prior at where it is now, the same for all
 //! spans: where the data say nothing of it, two spans do not differ.
 
-use hoid_numerics::cholesky;
+use hoid_numerics::{cholesky, products::dot};
 
 use super::sizes::{HELD, LINEAR, STATES};
 
@@ -148,17 +148,13 @@ impl Block {
         let mut state = self.with_output;
         cholesky::solve(&factor, STATES, &mut state);
         let inverse = cholesky::scaled_inverse(&factor, STATES, 1.0);
-        let explained: f64 = state.iter().zip(self.with_output).map(|(s, b)| s * b).sum();
-        let left = (self.square - explained).max(self.samples * 1e-12);
+        let left = (self.square - dot(&state, &self.with_output)).max(self.samples * 1e-12);
         Some(Solution { state, inverse, left })
     }
 
     /// The score of a state, `b - A s`: zero in the mean where the state is right.
     pub fn score(&self, state: &[f64; STATES]) -> [f64; STATES] {
         let matrix = self.matrix();
-        core::array::from_fn(|i| {
-            let product: f64 = matrix[i].iter().zip(state).map(|(a, s)| a * s).sum();
-            self.with_output[i] - product
-        })
+        core::array::from_fn(|i| self.with_output[i] - dot(&matrix[i], state))
     }
 }

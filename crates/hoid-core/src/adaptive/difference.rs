@@ -12,7 +12,7 @@
 //! the least `chi_S^2 + 4 |S|` is told: between the 2 of Akaike and the logarithm of the number of samples
 //! of Schwarz (G. Schwarz, *Annals of Statistics* 6 (1978) 461-464).
 
-use hoid_numerics::cholesky;
+use hoid_numerics::{cholesky, products::dot};
 
 use super::{
     contrast::Contrast,
@@ -76,8 +76,7 @@ impl Difference {
             }
             let mut of_set = of_d;
             cholesky::solve(&own, n, &mut of_set);
-            let explained: f64 = of_set[..n].iter().zip(of_d).map(|(s, b)| s * b).sum();
-            let cost = PRICE * n as f64 - explained;
+            let cost = PRICE * n as f64 - dot(&of_set[..n], &of_d);
             if cost < least {
                 least = cost;
                 let mut difference = Self {
