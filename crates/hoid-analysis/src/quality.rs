@@ -12,6 +12,7 @@
 use hoid_ident::faults::Rest;
 use hoid_io::{QualityIssueKind, Step};
 use hoid_model::{Finding, Record};
+use hoid_numerics::statistics::standard_deviation;
 
 use crate::recordings::{Account, RESTING};
 
@@ -67,7 +68,7 @@ pub(crate) fn findings_of_quality(account: &Account, record: &Record, of: Of) ->
         if of == Of::System && channel == input {
             continue;
         }
-        let deviation = deviation(values);
+        let deviation = standard_deviation(values);
         let coarse = issues(QualityIssueKind::Quantised).find(|issue| issue.channel == channel);
         if let Some(issue) = coarse.filter(|issue| issue.size > least * deviation) {
             all.push(Finding::doubt(
@@ -95,10 +96,4 @@ pub(crate) fn findings_of_quality(account: &Account, record: &Record, of: Of) ->
         ));
     }
     all
-}
-
-fn deviation(values: &[f64]) -> f64 {
-    let n = values.len().max(1) as f64;
-    let mean = values.iter().sum::<f64>() / n;
-    (values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n).sqrt()
 }

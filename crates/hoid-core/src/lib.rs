@@ -19,7 +19,8 @@
 //! predictor unstable is halved until it does not. The error bars follow the error of the estimate
 //! through the recursion, whatever the gain, in units of the innovation variance sigma^2.
 //!
-//! **Real time.** `no_std`, no allocation, no dependency but elementary functions (`libm`). Every
+//! **Real time.** `no_std`, no allocation, no dependency but small systems of equations
+//! (`hoid-numerics`) and elementary functions (`libm`). Every
 //! routine works in memory that the caller owns and has a bounded number of operations. The numbers
 //! of a recursion can be saved and restored ([`mod@state`]). Batch estimators and simulator of hoid
 //! stand on the same filters, so that a recursion and its batch counterpart cannot differ in them.

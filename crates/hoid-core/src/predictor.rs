@@ -32,6 +32,8 @@
 
 use core::hint::black_box;
 
+use hoid_numerics::products::dot;
+
 use crate::{
     sensitivities::{ErrorLayout, LinearForm, Sensitivities},
     shape::Shape,
@@ -280,22 +282,7 @@ impl<S: Shape, const N: usize, const L: usize> Predictor<S, N, L> {
     }
 }
 
-/// `sum_j c_j h_j` over the coefficients.
-#[inline(always)]
-pub(crate) fn dot(coefficients: &[f64], history: &[f64]) -> f64 {
-    // Not from zero: every addition is one more that the next sample waits for.
-    let mut pairs = coefficients.iter().zip(history);
-    let Some((c, h)) = pairs.next() else {
-        return 0.0;
-    };
-    let mut sum = c * h;
-    for (c, h) in pairs {
-        sum += c * h;
-    }
-    sum
-}
-
-/// The same, of a history that the sample before has pushed into number by number.
+/// The product of coefficients and a history that the sample before has pushed into number by number.
 ///
 /// Each number is read by itself: one wide load of what was stored narrowly just before would wait
 /// until all of it has reached the memory, so that no two samples could overlap. The compiler likes

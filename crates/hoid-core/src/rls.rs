@@ -4,10 +4,11 @@
 //! `x(t) = e(t - nk)`, and the step of an [`Adaptation`] (eq. 5.21, 5.25, 5.26; L. Ljung and T.
 //! Söderström, *Theory and Practice of Recursive Identification*, 1983, section 2.2).
 
+use hoid_numerics::products::dot;
+
 use crate::{
     adaptation::Adaptation,
     error_bars::{ErrorBars, ErrorPropagation},
-    predictor::dot,
     recursion::{Step, all_finite, ratio},
     sensitivities::{ErrorLayout, Sensitivities},
     shape::Shape,

@@ -15,6 +15,8 @@
 //! (fewer samples than parameters, no excitation), theta stays and there is no covariance. The
 //! caller owns the memory of `W (N + 1)` numbers.
 
+use hoid_numerics::cholesky;
+
 use crate::adaptation::{Adaptation, ParameterStep};
 
 /// Smallest pivot of R, scaled to a unit diagonal, of a window that determines theta: some hundred
@@ -125,23 +127,11 @@ impl<const N: usize, M: AsRef<[f64]> + AsMut<[f64]>> Window<N, M> {
                 return None;
             }
             scale[i] = 1.0 / libm::sqrt(power);
-        }
-        for i in 0..p {
             for j in 0..=i {
-                let mut sum = (self.growing.r[i][j] + self.fading.r[i][j]) * scale[i] * scale[j];
-                for k in 0..j {
-                    sum -= l[i][k] * l[j][k];
-                }
-                if i > j {
-                    l[i][j] = sum / l[j][j];
-                } else if sum > SMALLEST_PIVOT {
-                    l[i][i] = libm::sqrt(sum);
-                } else {
-                    return None;
-                }
+                l[i][j] = (self.growing.r[i][j] + self.fading.r[i][j]) * scale[i] * scale[j];
             }
         }
-        Some(Cholesky {
+        cholesky::factor_above(&mut l, p, SMALLEST_PIVOT).then_some(Cholesky {
             l,
             scale,
             parameters: p,
@@ -160,18 +150,15 @@ struct Cholesky<const N: usize> {
 impl<const N: usize> Cholesky<N> {
     /// `R^{-1} right`.
     fn solve(&self, right: &[f64; N]) -> [f64; N] {
-        let (l, scale, p) = (&self.l, &self.scale, self.parameters);
+        let p = self.parameters;
         let mut x = [0.0; N];
         for i in 0..p {
-            let known: f64 = (0..i).map(|k| l[i][k] * x[k]).sum();
-            x[i] = (right[i] * scale[i] - known) / l[i][i];
+            x[i] = right[i] * self.scale[i];
         }
-        for i in (0..p).rev() {
-            let known: f64 = (i + 1..p).map(|k| l[k][i] * x[k]).sum();
-            x[i] = (x[i] - known) / l[i][i];
-        }
+        cholesky::forward(&self.l, p, &mut x);
+        cholesky::backward(&self.l, p, &mut x);
         for i in 0..p {
-            x[i] *= scale[i];
+            x[i] *= self.scale[i];
         }
         x
     }

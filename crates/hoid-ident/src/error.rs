@@ -196,3 +196,10 @@ pub enum IdentError {
         nyquist_rad_s: f64,
     },
 }
+
+/// The lower of the rates of two sample times, in Hz, to which both can be brought.
+fn lower_rate(a_s: f64, b_s: f64) -> String {
+    let hz = 1.0 / a_s.max(b_s);
+    let digits = format!("{hz:.6}");
+    digits.trim_end_matches('0').trim_end_matches('.').to_owned()
+}

@@ -7,6 +7,7 @@ use hoid_model::{
     remnant::RemnantDiscretisation,
     uncertainty::{Estimate, OperatorEstimate, RemnantEstimate, operator_estimate, remnant_estimate, variance_along},
 };
+use hoid_numerics::statistics::mean;
 
 use crate::{
     IdentError, InitialState, Termination,
@@ -212,8 +213,7 @@ impl Fit {
             .map(|((_, e), _)| Some((e.standard_error? / e.value).powi(2)))
             .collect();
         let relative = relative.filter(|r| !r.is_empty())?;
-        let mean = relative.iter().sum::<f64>() / relative.len() as f64;
-        let yic = (self.loss / self.output_variance).ln() + mean.ln();
+        let yic = (self.loss / self.output_variance).ln() + mean(&relative).ln();
         yic.is_finite().then_some(yic)
     }
 

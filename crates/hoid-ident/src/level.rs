@@ -20,6 +20,7 @@ use hoid_model::{
     polynomial_model::monic,
     uncertainty::{Estimate, variance_along},
 };
+use hoid_numerics::statistics::mean;
 
 use crate::{Fit, IdentError, linalg::least_squares::dot};
 
@@ -66,7 +67,6 @@ impl Fit {
         if !model.structure().has_input() {
             return None;
         }
-        let mean = |x: &[f64]| x.iter().sum::<f64>() / x.len() as f64;
         let (e, u) = (mean(record.input()), mean(record.output()));
         let (response, gradient) = model.response_and_gradient(0.0);
         let gradient: Vec<f64> = gradient.iter().map(|g| g.re).collect();

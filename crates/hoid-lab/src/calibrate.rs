@@ -10,6 +10,7 @@ use std::path::Path;
 
 use hoid_ident::family::{FamilyEstimator, OperatorPrior};
 use hoid_model::{Form, Record, SampleTime, held_system::HeldSystem, operator_family::Coordinate};
+use hoid_numerics::statistics::standard_deviation;
 use hoid_sim::RunSeed;
 use serde::{Deserialize, Serialize};
 
@@ -152,8 +153,8 @@ pub fn judge(out: &Path, record: &Record, logged: &Logged) -> Result<Calibration
         utc: utc::now(),
         latency_s: value - DELAY as f64 * TICK_S,
         latency_se_s: error,
-        input_jitter_ms: deviation(&waits),
-        frame_jitter_ms: deviation(&frames),
+        input_jitter_ms: standard_deviation(&waits),
+        frame_jitter_ms: standard_deviation(&frames),
     };
     let path = out.join("calibration.toml");
     let mut kept: Kept = match hoid_io::read_settings(&path) {
@@ -164,10 +165,4 @@ pub fn judge(out: &Path, record: &Record, logged: &Logged) -> Result<Calibration
     let text = toml::to_string(&kept).map_err(|error| LabError::damaged(&path, error.to_string()))?;
     hoid_io::write_atomically(&path, |file| file.write_all(text.as_bytes()))?;
     Ok(found)
-}
-
-fn deviation(values: &[f64]) -> f64 {
-    let n = values.len().max(1) as f64;
-    let mean = values.iter().sum::<f64>() / n;
-    (values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n).sqrt()
 }

@@ -20,6 +20,7 @@
 //! rounding (sines may differ between computers in the last bit).
 
 use hoid_model::{Finding, Verdict, VerdictLevel};
+use hoid_numerics::statistics::upper_median;
 use serde::Serialize;
 
 use crate::{
@@ -350,8 +351,8 @@ fn rms(values: &[f64]) -> f64 {
     (sum / values.len().max(1) as f64).sqrt()
 }
 
+/// The median of the finite values; zero of none.
 fn median(values: &[f64]) -> f64 {
-    let mut sorted: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
-    sorted.sort_by(f64::total_cmp);
-    sorted.get(sorted.len() / 2).copied().unwrap_or(0.0)
+    let mut finite: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
+    upper_median(&mut finite).unwrap_or(0.0)
 }

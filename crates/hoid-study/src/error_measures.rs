@@ -23,6 +23,7 @@
 
 use hoid_ident::Fit;
 use hoid_model::{Complex64, Orders, PolynomialModel, Record, Structure, uncertainty::OperatorEstimate};
+use hoid_numerics::statistics::mean;
 use hoid_track::{StartAt, Trace};
 
 use crate::{columns::TRACED, plan::Cell};
@@ -212,14 +213,7 @@ impl ChangeMeasures {
             false_alarms: known(declared.iter().filter(|t| !within(**t)).count() as f64),
             hours: known((end_s - fitted_s - THROUGH_S * to_be_found.len() as f64).max(0.0) / 3600.0),
             found_percent: known(100.0 * lags.len() as f64 / to_be_found.len() as f64),
-            lag_s: known(lags.iter().sum::<f64>() / lags.len() as f64),
+            lag_s: known(mean(&lags)),
         }
     }
-}
-
-/// Variance around the mean.
-pub(crate) fn variance(values: &[f64]) -> f64 {
-    let n = values.len() as f64;
-    let mean = values.iter().sum::<f64>() / n;
-    values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n
 }

@@ -10,11 +10,12 @@ use hoid_model::{
     scenario::RemnantStrength,
     uncertainty::{Estimate, OperatorEstimate},
 };
+use hoid_numerics::statistics::{root_mean_square, variance};
 use hoid_track::Trace;
 
 use crate::{
     columns::{OPERATOR, Rows, Schemas, TRACED, extra_axes},
-    error_measures::{ChangeMeasures, TraceErrors, TrueResponse, variance},
+    error_measures::{ChangeMeasures, TraceErrors, TrueResponse},
     plan::{Cell, EstimatorCell, Plan},
 };
 
@@ -124,10 +125,7 @@ impl<'a> EstimateRows<'a> {
         rows.real("noise_level_response", variance(&difference) / power);
         rows.real("noise_level_remnant", variance(n) / power);
         for (name, values) in [("rms_e", record.input()), ("rms_u", u), ("rms_n", n)] {
-            rows.real(
-                name,
-                (values.iter().map(|v| v * v).sum::<f64>() / values.len() as f64).sqrt(),
-            );
+            rows.real(name, root_mean_square(values));
         }
         rows.text("status", "ok");
     }

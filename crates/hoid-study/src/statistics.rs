@@ -10,6 +10,8 @@
 //!   standard deviation to each side of the middle, whatever the distribution; of a rate
 //!   `sqrt(p (1 - p) / n)`.
 
+use hoid_numerics::statistics::{self, finite_sorted, mean};
+
 /// What a box plot and a table say of some values.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Statistics {
@@ -48,8 +50,7 @@ pub struct Statistics {
 impl Statistics {
     /// The statistics of some values; of none, all but the counts are no numbers.
     pub fn of(values: &[f64]) -> Self {
-        let mut sorted: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
-        sorted.sort_by(f64::total_cmp);
+        let sorted = finite_sorted(values.iter().copied());
         let (n, missing) = (sorted.len(), values.len() - sorted.len());
         let (Some(&least), Some(&most)) = (sorted.first(), sorted.last()) else {
             return Self {
@@ -57,7 +58,7 @@ impl Statistics {
                 ..Self::nothing()
             };
         };
-        let mean = sorted.iter().sum::<f64>() / n as f64;
+        let mean = mean(&sorted);
         let moment = |p: i32| sorted.iter().map(|v| (v - mean).powi(p)).sum::<f64>();
         let (sd, sd_se) = deviation(moment(2), moment(4), n);
         let [lower_quartile, median, upper_quartile] = [0.25, 0.5, 0.75].map(|p| quantile(&sorted, p));
@@ -127,20 +128,12 @@ fn deviation(second: f64, fourth: f64, n: usize) -> (f64, f64) {
 
 /// Quantile of sorted values, interpolated; no number of none.
 pub fn quantile(sorted: &[f64], p: f64) -> f64 {
-    let Some(last) = sorted.len().checked_sub(1) else {
-        return f64::NAN;
-    };
-    let at = p.clamp(0.0, 1.0) * last as f64;
-    let below = at.floor() as usize;
-    let above = (below + 1).min(last);
-    sorted[below] + (at - below as f64) * (sorted[above] - sorted[below])
+    statistics::quantile(sorted, p).unwrap_or(f64::NAN)
 }
 
 /// Median of values; those that are no numbers are left out.
 pub fn median(values: &[f64]) -> f64 {
-    let mut sorted: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
-    sorted.sort_by(f64::total_cmp);
-    quantile(&sorted, 0.5)
+    statistics::quantile_of(values, 0.5).unwrap_or(f64::NAN)
 }
 
 /// Standard error of the median of sorted values.

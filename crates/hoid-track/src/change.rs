@@ -8,6 +8,7 @@
 
 use hoid_core::multiple_model::{change as kernel_change, hypothesis as kernel};
 use hoid_model::{SampleTime, uncertainty::Estimate};
+use hoid_numerics::statistics::{mean, sample_variance};
 
 /// A change of the person that was declared.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -110,12 +111,7 @@ impl ErrorThreshold {
         if error.len() < 3 || error.iter().any(|e| !e.is_finite()) {
             return None;
         }
-        let level = |values: &[f64]| {
-            let n = values.len() as f64;
-            let mean = values.iter().sum::<f64>() / n;
-            let variance = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (n - 1.0);
-            [mean, variance.sqrt()]
-        };
+        let level = |values: &[f64]| [mean(values), sample_variance(values).sqrt()];
         Some(Self {
             levels: [level(error), level(&rate)],
             sample_time_s: ts,

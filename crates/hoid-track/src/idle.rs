@@ -8,6 +8,7 @@
 //! near zero.
 
 use hoid_model::Record;
+use hoid_numerics::statistics::{upper_median, upper_quantile};
 
 /// Share of the later size within which a signal is idle.
 const SHARE: f64 = 0.02;
@@ -26,8 +27,9 @@ pub fn idle_head(record: &Record) -> usize {
     let second = (1.0 / record.sample_time().s()).round().max(1.0) as usize;
     let still = |signal: &[f64]| {
         let later = &signal[signal.len() / 2..];
-        let centre = quantile(later.to_vec(), 0.5);
-        let size = quantile(later.iter().map(|x| (x - centre).abs()).collect(), SIZE);
+        let centre = upper_median(&mut later.to_vec()).unwrap_or(0.0);
+        let mut off: Vec<f64> = later.iter().map(|x| (x - centre).abs()).collect();
+        let size = upper_quantile(&mut off, SIZE).unwrap_or(0.0);
         let steps = || later.windows(2).map(|w| (w[1] - w[0]).abs()).filter(|d| *d > 0.0);
         let step = steps().fold(f64::INFINITY, f64::min);
         // Noise has no resolution: its differences are no multiples of the smallest.
@@ -38,7 +40,7 @@ pub fn idle_head(record: &Record) -> usize {
         } else {
             SHARE * size
         };
-        let first = quantile(signal[..second.min(signal.len())].to_vec(), 0.5);
+        let first = upper_median(&mut signal[..second.min(signal.len())].to_vec()).unwrap_or(0.0);
         signal.iter().take_while(|x| (*x - first).abs() <= room).count()
     };
     if record.is_empty() {
@@ -67,15 +69,6 @@ pub fn usual_start_span(record: &Record) -> (f64, f64) {
         begin,
         begin + (record.len() - head) as f64 * record.sample_time().s() / 3.0,
     )
-}
-
-fn quantile(mut values: Vec<f64>, share: f64) -> f64 {
-    values.sort_by(f64::total_cmp);
-    let place = (share * values.len() as f64) as usize;
-    values
-        .get(place.min(values.len().saturating_sub(1)))
-        .copied()
-        .unwrap_or(0.0)
 }
 
 #[cfg(test)]

@@ -33,6 +33,7 @@ use hoid_core::multiple_model::{
     signal_ring::DelayedSignals,
 };
 use hoid_model::Record;
+use hoid_numerics::{cholesky, products::dot};
 
 use crate::{
     Trace,
@@ -300,10 +301,6 @@ struct Pair<'a> {
     z: [f64; OPERATOR],
 }
 
-fn dot(a: &[f64; OPERATOR], b: &[f64; OPERATOR]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
-}
-
 impl<'a> Pair<'a> {
     /// What the difference takes from the logarithm of the weight, at least: `z'z` is no less than
     /// the square of one difference over its variance. As S is larger than either covariance,
@@ -321,8 +318,9 @@ impl<'a> Pair<'a> {
     /// The pair with the logarithm of its weight up to a constant. `None` where S is not positive.
     fn of(f: &'a Side, b: &'a Side) -> Option<(f64, Self)> {
         let sum = std::array::from_fn(|i| std::array::from_fn(|j| f.covariance[i][j] + b.covariance[i][j]));
-        let root = cholesky(&sum)?;
-        let z = forward(&root, std::array::from_fn(|i| b.eta[i] - f.eta[i]));
+        let root = factor(&sum)?;
+        let mut z = std::array::from_fn(|i| b.eta[i] - f.eta[i]);
+        cholesky::forward(&root, OPERATOR, &mut z);
         let determinant: f64 = (0..OPERATOR).map(|i| root[i][i]).product();
         let spread = f.level[1] + b.level[1];
         let apart = b.level[0] - f.level[0];
@@ -334,7 +332,10 @@ impl<'a> Pair<'a> {
     /// `P_f S^-1 x = (L^-1 P_f)' L^-1 x`.
     fn product(&self) -> Joined {
         let (f, b) = (self.f, self.b);
-        let columns: [[f64; OPERATOR]; OPERATOR] = f.covariance.map(|column| forward(&self.root, column));
+        let mut columns = f.covariance;
+        columns
+            .iter_mut()
+            .for_each(|column| cholesky::forward(&self.root, OPERATOR, column));
         let taken = |i: usize, j: usize| f.covariance[i][j] - dot(&columns[i], &columns[j]);
         let level = (f.level[0] * b.level[1] + b.level[0] * f.level[1]) / (f.level[1] + b.level[1]);
         Joined {
@@ -345,8 +346,9 @@ impl<'a> Pair<'a> {
     }
 }
 
-/// L with `L L' = s`.
-fn cholesky(s: &[[f64; OPERATOR]; OPERATOR]) -> Option<[[f64; OPERATOR]; OPERATOR]> {
+/// L with `L L' = s`. Known products are added up before they are taken away, as [`cholesky::forward`] does;
+/// [`cholesky::factor`] is the same but for rounding.
+fn factor(s: &[[f64; OPERATOR]; OPERATOR]) -> Option<[[f64; OPERATOR]; OPERATOR]> {
     let mut l = [[0.0; OPERATOR]; OPERATOR];
     for i in 0..OPERATOR {
         for j in 0..=i {
@@ -362,15 +364,6 @@ fn cholesky(s: &[[f64; OPERATOR]; OPERATOR]) -> Option<[[f64; OPERATOR]; OPERATO
         }
     }
     Some(l)
-}
-
-/// `L^-1 x`.
-fn forward(l: &[[f64; OPERATOR]; OPERATOR], x: [f64; OPERATOR]) -> [f64; OPERATOR] {
-    let mut z = [0.0; OPERATOR];
-    for i in 0..OPERATOR {
-        z[i] = (x[i] - (0..i).map(|k| l[i][k] * z[k]).sum::<f64>()) / l[i][i];
-    }
-    z
 }
 
 /// T_L in s and its variance, from `E[K_e K_e_dot]/E[K_e^2]`.

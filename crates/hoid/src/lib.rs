@@ -69,6 +69,7 @@ pub use hoid_ident as ident;
 pub use hoid_io as io;
 pub use hoid_lanes as lanes;
 pub use hoid_model as model;
+pub use hoid_numerics as numerics;
 #[cfg(feature = "report")]
 pub use hoid_report as report;
 pub use hoid_sim as sim;

@@ -8,6 +8,7 @@
 
 use hoid_ident::frequency::{Excitation, LineSearch, USUAL_EXCITATIONS};
 use hoid_model::Record;
+use hoid_numerics::statistics::variance;
 
 use super::known::Known;
 
@@ -112,8 +113,7 @@ fn lines_in(record: &Record, channel: &str, (from_s, to_s): (f64, f64)) -> Optio
     }
     let values = span.channel(channel)?;
     let n = values.len() as f64;
-    let mean = values.iter().sum::<f64>() / n;
-    let power = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n;
+    let power = variance(values);
     let of_line = |omega: &f64| -> f64 {
         let step = omega * span.sample_time().s();
         let at = |k: usize| (step * k as f64).sin_cos();

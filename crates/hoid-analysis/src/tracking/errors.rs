@@ -1,6 +1,7 @@
 //! Errors of a trace against the truth in its record.
 
 use hoid_model::{NotConvertible, Record, uncertainty::OperatorEstimate};
+use hoid_numerics::statistics::mean;
 use hoid_track::{Trace, value_of};
 
 /// Root of the mean square of the relative error, of the rows from `first` on that converted, for
@@ -23,8 +24,7 @@ pub fn relative_errors(
                 Some((found / truth - 1.0).powi(2))
             })
             .collect();
-        let mean = squares.iter().sum::<f64>() / squares.len() as f64;
-        (!squares.is_empty()).then(|| (name, mean.sqrt()))
+        (!squares.is_empty()).then(|| (name, mean(&squares).sqrt()))
     };
     columns.iter().copied().filter_map(of).collect()
 }

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use hoid::io::{AnyScenario, write_record, write_record_csv};
 use hoid::model::{FamilyScenario, Record, SampleTime, scenario::Scenario};
+use hoid::numerics::statistics::root_mean_square;
 use hoid::report::numbers;
 use hoid::sim::{FamilySimulator, RunSeed, Simulator};
 
@@ -35,7 +36,6 @@ pub fn run(args: &SimulateArgs) -> Result<(), CliError> {
     } else {
         write_record(&args.out, &record)?;
     }
-    let rms = |values: &[f64]| (values.iter().map(|v| v * v).sum::<f64>() / values.len() as f64).sqrt();
     let summary = format!(
         "{}: {} samples of {} s, seed {}, replication {}; rms e {} deg, rms u {} deg.\nWritten to {}.\n",
         record.label(),
@@ -43,8 +43,8 @@ pub fn run(args: &SimulateArgs) -> Result<(), CliError> {
         record.sample_time().s(),
         args.seed,
         args.replication,
-        numbers::plain(rms(record.input())),
-        numbers::plain(rms(record.output())),
+        numbers::plain(root_mean_square(record.input())),
+        numbers::plain(root_mean_square(record.output())),
         if piped {
             "standard output".to_owned()
         } else {

@@ -10,10 +10,9 @@
 //! standard deviations about its prediction. What is held has a weak prior at where it is now, the same for all
 //! spans: where the data say nothing of it, two spans do not differ.
 
-use super::{
-    cholesky,
-    sizes::{HELD, LINEAR, STATES},
-};
+use hoid_numerics::{cholesky, products::dot};
+
+use super::sizes::{HELD, LINEAR, STATES};
 
 /// Products of the upper triangle.
 const PRODUCTS: usize = STATES * (STATES + 1) / 2;
@@ -148,22 +147,14 @@ impl Block {
         }
         let mut state = self.with_output;
         cholesky::solve(&factor, STATES, &mut state);
-        let mut inverse = [[0.0; STATES]; STATES];
-        for (i, row) in inverse.iter_mut().enumerate() {
-            row[i] = 1.0;
-            cholesky::solve(&factor, STATES, row);
-        }
-        let explained: f64 = state.iter().zip(self.with_output).map(|(s, b)| s * b).sum();
-        let left = (self.square - explained).max(self.samples * 1e-12);
+        let inverse = cholesky::scaled_inverse(&factor, STATES, 1.0);
+        let left = (self.square - dot(&state, &self.with_output)).max(self.samples * 1e-12);
         Some(Solution { state, inverse, left })
     }
 
     /// The score of a state, `b - A s`: zero in the mean where the state is right.
     pub fn score(&self, state: &[f64; STATES]) -> [f64; STATES] {
         let matrix = self.matrix();
-        core::array::from_fn(|i| {
-            let product: f64 = matrix[i].iter().zip(state).map(|(a, s)| a * s).sum();
-            self.with_output[i] - product
-        })
+        core::array::from_fn(|i| self.with_output[i] - dot(&matrix[i], state))
     }
 }

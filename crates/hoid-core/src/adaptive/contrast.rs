@@ -19,7 +19,9 @@
 //! Sources: P. J. Huber, *Proc. Fifth Berkeley Symposium* 1 (1967) 221-233; H. White, *Econometrica* 48 (1980)
 //! 817-838; W. K. Newey and K. D. West, *Econometrica* 55 (1987) 703-708.
 
-use super::{blocks::Block, cholesky, sizes::STATES};
+use hoid_numerics::{cholesky, products::dot};
+
+use super::{blocks::Block, sizes::STATES};
 
 type Matrix = [[f64; STATES]; STATES];
 
@@ -125,7 +127,7 @@ impl Contrast {
             return None;
         }
         cholesky::solve(&factor, N, &mut solved);
-        let t: f64 = solved.iter().zip(d).map(|(s, d)| s * d).sum();
+        let t = dot(&solved, &d);
         t.is_finite().then_some(t)
     }
 }

@@ -12,8 +12,9 @@
 //! the least `chi_S^2 + 4 |S|` is told: between the 2 of Akaike and the logarithm of the number of samples
 //! of Schwarz (G. Schwarz, *Annals of Statistics* 6 (1978) 461-464).
 
+use hoid_numerics::{cholesky, products::dot};
+
 use super::{
-    cholesky,
     contrast::Contrast,
     sizes::{GAINS, LINEAR, STATES},
 };
@@ -46,11 +47,7 @@ impl Difference {
         if !cholesky::factor(&mut factor, STATES) {
             return None;
         }
-        let mut w = [[0.0; STATES]; STATES];
-        for (i, row) in w.iter_mut().enumerate() {
-            row[i] = 1.0;
-            cholesky::solve(&factor, STATES, row);
-        }
+        let w = cholesky::scaled_inverse(&factor, STATES, 1.0);
         let mut best = None;
         let mut least = f64::MAX;
         // Each set but the empty one.
@@ -79,21 +76,18 @@ impl Difference {
             }
             let mut of_set = of_d;
             cholesky::solve(&own, n, &mut of_set);
-            let explained: f64 = of_set[..n].iter().zip(of_d).map(|(s, b)| s * b).sum();
-            let cost = PRICE * n as f64 - explained;
+            let cost = PRICE * n as f64 - dot(&of_set[..n], &of_d);
             if cost < least {
                 least = cost;
                 let mut difference = Self {
                     changed: [GAINS_BIT, SYSTEM_BIT, DELAY_BIT].map(|bit| set & bit > 0),
                     ..Self::default()
                 };
+                let inverse = cholesky::scaled_inverse(&own, n, 1.0);
                 for (a, i) in places[..n].iter().enumerate() {
                     difference.value[*i] = of_set[a];
-                    let mut column = [0.0; STATES];
-                    column[a] = 1.0;
-                    cholesky::solve(&own, n, &mut column);
                     for (b, j) in places[..n].iter().enumerate() {
-                        difference.covariance[*i][*j] = column[b];
+                        difference.covariance[*i][*j] = inverse[a][b];
                     }
                 }
                 best = Some(difference);

@@ -16,6 +16,8 @@
 //! with the degrees of freedom of the variance (A. Zellner, *An Introduction to Bayesian Inference in
 //! Econometrics*, 1971, section 3.2).
 
+use hoid_numerics::elimination;
+
 use super::{
     basis::Basis,
     moments::Moments,
@@ -127,7 +129,7 @@ impl Hypothesis {
         });
         (0..STATES).for_each(|i| matrix[i][i] += 1.0);
         let mut after = self.covariance;
-        let log_determinant = solve(&mut matrix, &mut after);
+        let log_determinant = elimination::solve_any(&mut matrix, &mut after);
         for i in 0..STATES {
             for j in 0..i {
                 let mean = 0.5 * (after[i][j] + after[j][i]);
@@ -171,44 +173,6 @@ impl Hypothesis {
         self.variance = (nu * self.variance + (left.energy - of_them) / dispersion) / (nu + n);
         self.residuals = (nu + n).min(memory / dispersion);
     }
-}
-
-/// The solution X of `M X = B` in the place of B, by elimination with row pivots, and `ln |det M|`.
-pub(super) fn solve(m: &mut Covariance, b: &mut Covariance) -> f64 {
-    let mut log_determinant = 0.0;
-    for i in 0..STATES {
-        let mut pivot = i;
-        for r in i + 1..STATES {
-            if m[r][i].abs() > m[pivot][i].abs() {
-                pivot = r;
-            }
-        }
-        m.swap(i, pivot);
-        b.swap(i, pivot);
-        let (row, right, size) = (m[i], b[i], m[i][i]);
-        log_determinant += libm::log(size.abs());
-        for r in i + 1..STATES {
-            let factor = m[r][i] / size;
-            for c in i..STATES {
-                m[r][c] -= factor * row[c];
-            }
-            for c in 0..STATES {
-                b[r][c] -= factor * right[c];
-            }
-        }
-    }
-    for i in (0..STATES).rev() {
-        let size = m[i][i];
-        b[i].iter_mut().for_each(|x| *x /= size);
-        let right = b[i];
-        for r in 0..i {
-            let factor = m[r][i];
-            for c in 0..STATES {
-                b[r][c] -= factor * right[c];
-            }
-        }
-    }
-    log_determinant
 }
 
 #[cfg(test)]

@@ -20,6 +20,8 @@
 //! **The estimate** is the mean of the mixture, its covariance that of the mixture, the differences between
 //! the hypotheses included.
 
+use hoid_numerics::elimination;
+
 use super::{
     basis::Basis,
     hypothesis::{Covariance, Hypothesis, Left, Segment},
@@ -395,7 +397,7 @@ impl Mixture {
                 }
             }
             let mut after = h.covariance;
-            super::hypothesis::solve(&mut matrix, &mut after);
+            elimination::solve_any(&mut matrix, &mut after);
             let sound = after.iter().flatten().all(|p| p.is_finite()) && (0..STATES).all(|i| after[i][i] >= 0.0);
             if !sound {
                 continue;

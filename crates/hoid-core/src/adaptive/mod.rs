@@ -52,8 +52,6 @@ pub mod usual;
 mod alternatives;
 mod blocks;
 mod candidate;
-mod cholesky;
-mod elimination;
 mod filter;
 mod history;
 mod hypothesis;

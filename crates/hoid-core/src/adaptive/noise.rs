@@ -13,7 +13,9 @@
 //!
 //! D is only ever used as a filter of finite length: it need not be stable.
 
-use super::{cholesky, elimination, pair::Pair, sizes::LARGEST_ORDER, usual::ORDER};
+use hoid_numerics::{cholesky, elimination};
+
+use super::{pair::Pair, sizes::LARGEST_ORDER, usual::ORDER};
 
 const WIDTH: usize = LARGEST_ORDER + 1;
 /// The same in pairs, a whole number of them.
@@ -197,12 +199,7 @@ impl NoiseModel {
         if self.samples <= self.order as f64 || !cholesky::factor(&mut matrix, self.order) {
             return None;
         }
-        let mut covariance = [[0.0; LARGEST_ORDER]; LARGEST_ORDER];
-        for (i, row) in covariance.iter_mut().enumerate().take(self.order) {
-            row[i] = 0.6 * self.variance();
-            cholesky::solve(&matrix, self.order, row);
-        }
-        Some(covariance)
+        Some(cholesky::scaled_inverse(&matrix, self.order, 0.6 * self.variance()))
     }
 
     /// D of what was taken so far. It stays where the sums do not determine it.

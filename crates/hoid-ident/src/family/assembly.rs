@@ -5,6 +5,7 @@
 //! difference become a part of the errors of the operator (`Covariances::add_bias`).
 
 use hoid_model::{FamilyOperator, Finding, Form, Record, Verdict, operator_family::Coordinate};
+use hoid_numerics::statistics::mean;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::{
@@ -413,8 +414,7 @@ fn constancy(fit: &PredictionFit<'_>, run_to_run: f64, workspace: &mut Workspace
 /// Mean squared coherence of the lines.
 fn coherent_share(describing: &DescribingFunction) -> Option<f64> {
     let all: Option<Vec<f64>> = describing.lines.iter().map(|line| line.coherence).collect();
-    let all = all.filter(|all| !all.is_empty())?;
-    Some(all.iter().sum::<f64>() / all.len() as f64)
+    all.filter(|all| !all.is_empty()).map(|all| mean(&all))
 }
 
 /// Whether a form beside the one in front knows the response: one whose parameters make up for each other, the data

@@ -6,6 +6,7 @@
 //! Schwarz, *Annals of Statistics* 6 (1978) 461-464) in place of Akaike's 2. A form whose parameters the data leave open counts only where all are so.
 
 use hoid_model::{FamilyOperator, Form, operator_family::Coordinate};
+use hoid_numerics::statistics::upper_median;
 
 use super::{
     choice::{FormFigures, weigh},
@@ -132,8 +133,7 @@ fn has_lost_its_muscles(tried: &Tried<'_>) -> bool {
 fn common_inflation(tried: &[Tried<'_>]) -> f64 {
     let fits = tried.iter().filter_map(|t| t.fit.as_ref().ok());
     let mut all: Vec<f64> = fits.map(|fit| fit.inflation).collect();
-    all.sort_by(f64::total_cmp);
-    all.get(all.len() / 2).copied().unwrap_or(1.0)
+    upper_median(&mut all).unwrap_or(1.0)
 }
 
 /// The criterion of each form; `None` for one that could not be fitted.

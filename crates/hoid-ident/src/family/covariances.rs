@@ -15,6 +15,7 @@
 //! `kappa sigma^2 H^-1 P H^-1`, H = G + P.
 
 use hoid_model::{Complex64, FamilyOperator, uncertainty::variance_along};
+use hoid_numerics::statistics::mean;
 
 use super::{
     clusters::ClusterKind,
@@ -236,7 +237,7 @@ pub(super) fn inflation(fit: &PredictionFit<'_>) -> Option<f64> {
             }
         }
     }
-    let mean = ratios.iter().sum::<f64>() / ratios.len() as f64;
+    let mean = mean(&ratios);
     mean.is_finite().then(|| mean.max(1.0))
 }
 

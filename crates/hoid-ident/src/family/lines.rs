@@ -9,6 +9,7 @@
 //! *Statistical Applications in Genetics and Molecular Biology* 3 (2004), article 3).
 
 use hoid_model::Complex64;
+use hoid_numerics::statistics::upper_median;
 
 use super::response_fit::MeasuredResponse;
 use crate::frequency::DescribingFunction;
@@ -35,9 +36,8 @@ impl<'d> LineData<'d> {
             .filter_map(|i| Some(lines[i].standard_error?.powi(2) / beside(i)))
             .filter(|r| r.is_finite())
             .collect();
-        ratios.sort_by(f64::total_cmp);
         // Runs that differ by less than their remnant do so by chance.
-        let excess = match ratios.get(ratios.len() / 2) {
+        let excess = match upper_median(&mut ratios) {
             Some(median) if runs >= FEWEST_RUNS => median.max(1.0),
             _ => 1.0,
         };

@@ -6,7 +6,7 @@
 //! of any order, and the order that predicts best is what the operator's bias depends on (R.
 //! Shibata, *Annals of Statistics* 8 (1980) 147-164).
 
-use crate::linalg::least_squares::solve_symmetric;
+use crate::linalg::{gram::Gram, least_squares::solve_symmetric};
 
 /// Largest modulus of a root of C in a start.
 const LARGEST_ROOT: f64 = 0.999;
@@ -25,31 +25,17 @@ pub(crate) struct Autoregression {
 pub(crate) struct NoiseProducts {
     highest: usize,
     count: usize,
-    products: Vec<f64>,
+    products: Gram,
 }
 
 impl NoiseProducts {
     /// The products of these series up to an order.
     pub fn new(series: &[Vec<f64>], highest: usize) -> Self {
-        let size = highest + 1;
-        let mut products = vec![0.0; size * size];
+        let mut products = Gram::new(highest + 1);
         let mut count = 0;
         for v in series {
-            let n = v.len();
-            count += n.saturating_sub(highest);
-            for t in highest..n {
-                for i in 0..size {
-                    let x = v[t - i];
-                    for j in 0..=i {
-                        products[i * size + j] += x * v[t - j];
-                    }
-                }
-            }
-        }
-        for i in 0..size {
-            for j in i + 1..size {
-                products[i * size + j] = products[j * size + i];
-            }
+            count += v.len().saturating_sub(highest);
+            (highest..v.len()).for_each(|t| products.add(|i| v[t - i]));
         }
         Self {
             highest,
@@ -60,17 +46,11 @@ impl NoiseProducts {
 
     /// The autoregression of this order; `None` where v has no such.
     pub fn fit(&self, order: usize) -> Option<Autoregression> {
-        let size = self.highest + 1;
-        let at = |i: usize, j: usize| self.products[i * size + j];
-        let power = at(0, 0);
+        let power = self.products.at(0, 0);
         if self.count == 0 || power <= 0.0 {
             return None;
         }
-        let gram: Vec<f64> = (1..=order)
-            .flat_map(|i| (1..=order).map(move |j| (i, j)))
-            .map(|(i, j)| at(i, j))
-            .collect();
-        let past: Vec<f64> = (1..=order).map(|i| at(i, 0)).collect();
+        let (gram, past) = self.products.system(1..order + 1, 0);
         let a = if order == 0 {
             Vec::new()
         } else {
@@ -110,7 +90,7 @@ impl NoiseProducts {
 pub(super) fn hannan_rissanen(series: &[Vec<f64>], (nc, nd): (usize, usize), long: usize) -> Option<Vec<f64>> {
     let d = NoiseProducts::new(series, long).fit(long)?.d;
     let q = nc + nd;
-    let (mut gram, mut right) = (vec![0.0; q * q], vec![0.0; q]);
+    let mut products = Gram::new(q + 1);
     for v in series {
         let past = |t: usize| (0..long).map(|k| d[k] * v[t - k - 1]).sum::<f64>();
         let innovation: Vec<f64> = (0..v.len())
@@ -120,20 +100,12 @@ pub(super) fn hannan_rissanen(series: &[Vec<f64>], (nc, nd): (usize, usize), lon
             let x: Vec<f64> = (1..=nc)
                 .map(|k| innovation[t - k])
                 .chain((1..=nd).map(|k| -v[t - k]))
+                .chain([v[t]])
                 .collect();
-            for i in 0..q {
-                right[i] += x[i] * v[t];
-                for j in 0..=i {
-                    gram[i * q + j] += x[i] * x[j];
-                }
-            }
+            products.add(|i| x[i]);
         }
     }
-    for i in 0..q {
-        for j in i + 1..q {
-            gram[i * q + j] = gram[j * q + i];
-        }
-    }
+    let (gram, right) = products.system(0..q, q);
     let mut found = solve_symmetric(&gram, &right)?;
     for _ in 0..MOST_DRAWN {
         if hoid_core::stability::roots_inside(&found[..nc], LARGEST_ROOT) {

@@ -8,7 +8,7 @@
 //! keeps the normal equations of a smooth channel regular, and what is smaller is no fault.
 
 use super::robust::quantile;
-use crate::linalg::least_squares::solve_symmetric;
+use crate::linalg::{gram::Gram, least_squares::solve_symmetric};
 
 /// Order of the autoregression.
 pub(super) const ORDER: usize = 16;
@@ -87,24 +87,15 @@ impl Autoregression {
 }
 
 fn least_squares(x: &[f64], rows: &[usize], p: usize, floor: f64) -> Option<Vec<f64>> {
-    let size = p + 1;
-    let mut products = vec![0.0; size * size];
+    let mut products = Gram::new(p + 1);
     for &t in rows {
         let row = &x[t - p..=t];
-        for i in 0..size {
-            let v = row[p - i];
-            for j in 0..=i {
-                products[i * size + j] += v * row[p - j];
-            }
-        }
+        products.add(|i| row[p - i]);
     }
+    let (mut gram, mut past) = products.system(1..p + 1, 0);
     let white = floor * floor * rows.len() as f64;
-    let at = |i: usize, j: usize| products[i.max(j) * size + i.min(j)] + if i == j { white } else { 0.0 };
-    let gram: Vec<f64> = (1..=p)
-        .flat_map(|i| (1..=p).map(move |j| (i, j)))
-        .map(|(i, j)| at(i, j))
-        .collect();
-    let past: Vec<f64> = (1..=p).map(|i| -at(i, 0)).collect();
+    gram.iter_mut().step_by(p + 1).for_each(|diagonal| *diagonal += white);
+    past.iter_mut().for_each(|past| *past = -*past);
     let mut a = vec![1.0];
     a.extend(solve_symmetric(&gram, &past)?);
     a.iter().all(|v| v.is_finite()).then_some(a)

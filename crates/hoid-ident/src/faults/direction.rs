@@ -18,6 +18,7 @@
 //! is the wrong sign where the sum lies [`WRONG`] standard errors below zero.
 
 use hoid_model::{FaultKind, Record};
+use hoid_numerics::statistics::mean;
 
 use crate::linalg::least_squares::solve_symmetric;
 
@@ -41,11 +42,7 @@ pub(super) fn wrong_direction(record: &Record) -> Option<(FaultKind, f64)> {
     if record.input().is_empty() || record.sample_time().s() > 0.1 {
         return None;
     }
-    let average = |x: &[f64]| -> Vec<f64> {
-        x.chunks_exact(block)
-            .map(|part| part.iter().sum::<f64>() / block as f64)
-            .collect()
-    };
+    let average = |x: &[f64]| -> Vec<f64> { x.chunks_exact(block).map(mean).collect() };
     let (e, u) = (average(record.input()), average(record.output()));
     if e.len() < FEWEST {
         return None;

@@ -5,18 +5,16 @@
 //! a hand rests more than half of the time. Where both vanish it is the root mean square of all but
 //! one half of a per cent (P. J. Huber, *Robust Statistics*, 1981, ch. 5).
 
-/// The value below which this share of the numbers lies; they are put in another order.
+use hoid_numerics::statistics::{nearest_quantile, upper_median};
+
+/// The value nearest to the place of a quantile, zero of none; the values are put in another order.
 pub(super) fn quantile(values: &mut [f64], share: f64) -> f64 {
-    if values.is_empty() {
-        return 0.0;
-    }
-    let place = ((values.len() - 1) as f64 * share).round() as usize;
-    *values.select_nth_unstable_by(place, f64::total_cmp).1
+    nearest_quantile(values, share).unwrap_or(0.0)
 }
 
-/// The median.
+/// The median, zero of none.
 pub(super) fn median(values: &[f64]) -> f64 {
-    quantile(&mut values.to_vec(), 0.5)
+    upper_median(&mut values.to_vec()).unwrap_or(0.0)
 }
 
 /// Median and robust deviation.

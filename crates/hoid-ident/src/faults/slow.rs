@@ -43,6 +43,7 @@ fn take_out(values: &mut [f64], count: usize) {
 #[cfg(test)]
 mod tests {
     use hoid_model::{Channel, SampleTime};
+    use hoid_numerics::statistics::root_mean_square;
 
     use super::*;
 
@@ -57,10 +58,6 @@ mod tests {
         .unwrap()
     }
 
-    fn rms(values: &[f64]) -> f64 {
-        (values.iter().map(|v| v * v).sum::<f64>() / values.len() as f64).sqrt()
-    }
-
     #[test]
     fn what_is_slow_goes_and_what_is_fast_stays() {
         let gone = |e: &dyn Fn(f64) -> f64| {
@@ -69,7 +66,7 @@ mod tests {
             // u is .3 e before and behind.
             let same = after.input().iter().zip(after.output());
             assert!(same.clone().all(|(e, u)| (0.3 * e - u).abs() < 1e-9));
-            rms(after.input()) / rms(before.input())
+            root_mean_square(after.input()) / root_mean_square(before.input())
         };
         assert!(gone(&|t| 3.0 + 0.2 * t) < 1e-9);
         assert!(gone(&|t| (2.0 * PI * t / 60.0).sin()) < 0.1);

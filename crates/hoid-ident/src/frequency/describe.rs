@@ -2,6 +2,7 @@
 //! and errors.
 
 use hoid_model::{Channel, Complex64, Record, uncertainty::Estimate};
+use hoid_numerics::statistics::root_mean_square;
 
 use super::{
     excitation::{Excitation, channel_of, refuse},
@@ -247,7 +248,6 @@ fn runs_of(record: &Record, excitation: &Excitation, options: &DescribingOptions
         Realisation::Record => vec![window],
         Realisation::Period => window.single_periods(),
     };
-    let rms = |part: &[f64]| (part.iter().map(|v| v * v).sum::<f64>() / part.len() as f64).sqrt();
     let run = |window: Window| -> Result<Run, IdentError> {
         let (e, _) = window.samples_of(record.input(), 0.0);
         let (u, late) = window.samples_of(record.output(), options.offset_samples);
@@ -270,7 +270,7 @@ fn runs_of(record: &Record, excitation: &Excitation, options: &DescribingOptions
             u: control,
             reference: reference.map(|r| window.coefficients(r, 0.0)),
             element,
-            rms: (rms(pair.input()), rms(pair.output())),
+            rms: (root_mean_square(pair.input()), root_mean_square(pair.output())),
         })
     };
     let runs: Result<Vec<Run>, IdentError> = windows.into_iter().map(run).collect();

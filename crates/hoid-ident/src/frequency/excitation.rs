@@ -10,6 +10,7 @@
 use std::f64::consts::TAU;
 
 use hoid_model::{Record, forcing::ForcingFunction};
+use hoid_numerics::statistics::mean_square;
 
 use super::{
     spectrum::{coefficients, power},
@@ -144,9 +145,8 @@ impl Excitation {
         let x = coefficients(values);
         let powers: Vec<f64> = (1..x.len()).map(|k| power(&x, k, n)).collect();
         let (total, largest) = (powers.iter().sum::<f64>(), powers.iter().copied().fold(0.0, f64::max));
-        let mean_square = values.iter().map(|v| v * v).sum::<f64>() / n as f64;
         // Rounding of the transform leaves about 1e-32 of the power in each bin.
-        if total <= 1e-24 * mean_square || largest == 0.0 {
+        if total <= 1e-24 * mean_square(values) || largest == 0.0 {
             return Err(IdentError::NoExcitation {
                 channel: channel.to_owned(),
                 label: record.label().to_owned(),

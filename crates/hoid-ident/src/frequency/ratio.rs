@@ -11,6 +11,7 @@
 //! Efron, *The Jackknife, the Bootstrap and Other Resampling Plans*, 1982, chapter 3).
 
 use hoid_model::{Complex64, uncertainty::Estimate};
+use hoid_numerics::statistics::{self, sample_variance, squared_deviations};
 
 /// Terms of numerator and denominator, one of each a run.
 #[derive(Debug, Clone, PartialEq)]
@@ -75,26 +76,21 @@ pub(super) fn jackknife(value: f64, without: &[Option<f64>]) -> Estimate {
     if n < 2 || known.len() < n {
         return Estimate::fixed(value);
     }
-    let mean = known.iter().sum::<f64>() / n as f64;
-    let squares: f64 = known.iter().map(|v| (v - mean).powi(2)).sum();
-    Estimate::with_variance(value, squares * (n as f64 - 1.0) / n as f64)
+    Estimate::with_variance(value, squared_deviations(&known) * (n as f64 - 1.0) / n as f64)
 }
 
 /// Mean with its standard error from the spread; none for one value.
 pub(super) fn mean(values: &[f64]) -> Estimate {
-    let n = values.len() as f64;
-    let value = values.iter().sum::<f64>() / n;
+    let value = statistics::mean(values);
     match deviation(values) {
-        Some(s) => Estimate::with_variance(value, s * s / n),
+        Some(s) => Estimate::with_variance(value, s * s / values.len() as f64),
         None => Estimate::fixed(value),
     }
 }
 
 /// Standard deviation with n - 1; `None` for fewer than two values.
 pub(super) fn deviation(values: &[f64]) -> Option<f64> {
-    let n = values.len() as f64;
-    let mean = values.iter().sum::<f64>() / n;
-    (values.len() > 1).then(|| (values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (n - 1.0)).sqrt())
+    (values.len() > 1).then(|| sample_variance(values).sqrt())
 }
 
 #[cfg(test)]

@@ -17,6 +17,7 @@
 use std::f64::consts::{PI, TAU};
 
 use hoid_model::{Complex64, Finding, Record, uncertainty::variance_along};
+use hoid_numerics::statistics::mean;
 use rand_chacha::{
     ChaCha8Rng,
     rand_core::{Rng, SeedableRng},
@@ -192,10 +193,8 @@ impl Spectra {
 /// The thinned channel behind its own autoregression, and its coefficients.
 fn whitened(channel: &[f64], thin: usize) -> Option<(Vec<f64>, Vec<f64>)> {
     // The mean of what is left out holds what is faster.
-    let mut thinned: Vec<f64> = (channel.chunks_exact(thin))
-        .map(|chunk| chunk.iter().sum::<f64>() / thin as f64)
-        .collect();
-    let mean = thinned.iter().sum::<f64>() / thinned.len() as f64;
+    let mut thinned: Vec<f64> = (channel.chunks_exact(thin)).map(mean).collect();
+    let mean = mean(&thinned);
     thinned.iter_mut().for_each(|v| *v -= mean);
     if thinned.len() < 8 * NOISE || !thinned.iter().all(|v| v.is_finite()) {
         return None;

@@ -19,6 +19,7 @@
 //! `s^2 kappa (psi' psi)^-1`, `kappa = mean(rho'^2) / mean(rho'')^2`, with the unweighted psi.
 
 use hoid_model::SampleTime;
+use hoid_numerics::statistics::upper_median;
 
 use crate::{
     Fit, IdentError, Reason, Termination,
@@ -158,11 +159,7 @@ fn all_residuals(criterion: &Criterion<'_>, theta: &[f64], workspace: &mut Works
 
 fn median_absolute(residuals: &[Vec<f64>]) -> f64 {
     let mut sizes: Vec<f64> = residuals.iter().flatten().map(|r| r.abs()).collect();
-    if sizes.is_empty() {
-        return 0.0;
-    }
-    let middle = sizes.len() / 2;
-    *sizes.select_nth_unstable_by(middle, f64::total_cmp).1
+    upper_median(&mut sizes).unwrap_or(0.0)
 }
 
 #[cfg(test)]

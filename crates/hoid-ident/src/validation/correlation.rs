@@ -1,5 +1,7 @@
 //! Autocorrelation of residuals and their cross-correlation with the input, with 99 % bounds.
 
+use hoid_numerics::statistics::mean;
+
 use crate::linalg::least_squares::dot;
 
 /// 99 % point of the normal distribution, two sided.
@@ -39,7 +41,7 @@ fn covariances_at(x: &[f64], y: &[f64], lags: &[i64]) -> Vec<f64> {
 
 /// The signal without its mean.
 pub(super) fn centred(mut x: Vec<f64>) -> Vec<f64> {
-    let mean = x.iter().sum::<f64>() / x.len().max(1) as f64;
+    let mean = mean(&x);
     x.iter_mut().for_each(|v| *v -= mean);
     x
 }

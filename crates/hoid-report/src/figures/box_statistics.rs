@@ -4,10 +4,9 @@
 //! the last value within 1.5 interquartile ranges of the box, and what lies beyond is a point
 //! (Tukey, *Exploratory Data Analysis*, 1977).
 
-use super::{
-    series::{quantile, sorted},
-    style,
-};
+use hoid_numerics::statistics::{finite_sorted, quantile};
+
+use super::style;
 
 /// Longest whiskers, in interquartile ranges.
 const REACH: f64 = 1.5;
@@ -34,7 +33,7 @@ pub struct BoxStatistics {
 impl BoxStatistics {
     /// Of the values that are finite; quartiles by linear interpolation between ranks.
     pub fn of(values: &[f64]) -> Self {
-        let values = sorted(values.iter().copied());
+        let values = finite_sorted(values.iter().copied());
         let quartile = |q| quantile(&values, q).unwrap_or_default();
         let (lower, upper) = (quartile(0.25), quartile(0.75));
         let reach = REACH * (upper - lower);

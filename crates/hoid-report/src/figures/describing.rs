@@ -5,6 +5,7 @@
 
 use hoid_ident::frequency::{Description, chance_coherence, unwrapped_deg};
 use hoid_model::{Complex64, uncertainty::Estimate};
+use hoid_numerics::statistics::upper_median;
 
 use super::{
     curves::{Curve, CurveGrid, CurvePanel, LineKind, curves},
@@ -63,8 +64,7 @@ impl ModelCurve {
                 Some(((of_point - phase[k]) / 360.0).round()).filter(|t| t.is_finite())
             })
             .collect();
-        turns.sort_by(f64::total_cmp);
-        let turn = turns.get(turns.len() / 2).copied().unwrap_or(0.0);
+        let turn = upper_median(&mut turns).unwrap_or(0.0);
         phase.iter().map(|p| p + 360.0 * turn).collect()
     }
 }

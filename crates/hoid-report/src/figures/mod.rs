@@ -59,7 +59,6 @@ pub use file::{DPI, FigureFormat, with_width_mm};
 pub use maps::{MapGrid, MapPanel, maps};
 pub use palette::{Shade, shade};
 pub use panel::{Beyond, CurveKind, Ordinate, TraceCurve, TracePanel};
-pub(crate) use series::quantile_of;
 pub(crate) use time_response::has_close_up;
 pub use time_response::time_response;
 pub use trace::{TraceGrid, trace_panels};

@@ -9,11 +9,9 @@
 //! of its size, and methods and batch fits beyond do not count. What lies outside is cut off at the
 //! axes, and [`TracePanel::beyond`] counts it.
 
-use super::{
-    axes::one_two_five,
-    series::{quantile, quantile_of, sorted},
-    style,
-};
+use hoid_numerics::statistics::{finite_sorted, quantile, quantile_of};
+
+use super::{axes::one_two_five, style};
 
 /// How far beyond its middle part an ordinate may reach, in ranges of that part.
 const MORE: f64 = 1.5;
@@ -98,7 +96,7 @@ impl TracePanel {
             Ordinate::Robust => self.robust_range(),
             Ordinate::Within(low, high) => style::padded_range([low, high]),
             Ordinate::Logarithmic => {
-                let positive = sorted(self.pooled(|c| c.values.iter().copied().filter(|v| *v > 0.0).collect()));
+                let positive = finite_sorted(self.pooled(|c| c.values.iter().copied().filter(|v| *v > 0.0).collect()));
                 match (quantile(&positive, 0.01), quantile(&positive, 0.99)) {
                     (Some(low), Some(high)) => (one_two_five(low, false), one_two_five(high * 1.05, true)),
                     _ => (0.1, 1.0),
@@ -113,7 +111,7 @@ impl TracePanel {
         let near = |v: f64| within(v) == v;
         let (mut core, mut wanted) = (Vec::new(), Vec::new());
         for curve in &self.curves {
-            let values = sorted(curve.values.iter().copied());
+            let values = finite_sorted(curve.values.iter().copied());
             if curve.kind != CurveKind::Estimate {
                 core.extend(values.into_iter().filter(|v| near(*v)));
                 continue;
@@ -123,8 +121,8 @@ impl TracePanel {
             }
             core.extend([0.1, 0.9].iter().filter_map(|q| quantile(&values, *q)));
             wanted.extend([0.01, 0.99].iter().filter_map(|q| quantile(&values, *q)));
-            wanted.extend(quantile(&sorted(curve.band.iter().map(|b| b.0)), 0.25));
-            wanted.extend(quantile(&sorted(curve.band.iter().map(|b| b.1)), 0.75));
+            wanted.extend(quantile(&finite_sorted(curve.band.iter().map(|b| b.0)), 0.25));
+            wanted.extend(quantile(&finite_sorted(curve.band.iter().map(|b| b.1)), 0.75));
         }
         let (low, high) = style::padded_range(core.into_iter().map(within));
         let more = MORE * (high - low);
@@ -136,7 +134,7 @@ impl TracePanel {
     /// Two spans to either side of the truth, when the middle of an estimate lies there.
     fn limit(&self) -> Option<(f64, f64)> {
         let of = |kind| self.curves.iter().filter(move |c| c.kind == kind);
-        let truth = sorted(of(CurveKind::Truth).flat_map(|c| c.values.iter().copied()));
+        let truth = finite_sorted(of(CurveKind::Truth).flat_map(|c| c.values.iter().copied()));
         let (least, most) = (*truth.first()?, *truth.last()?);
         let span = (most - least).max(0.25 * least.abs().max(most.abs()));
         let (low, high) = (least - 2.0 * span, most + 2.0 * span);

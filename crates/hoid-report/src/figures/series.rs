@@ -99,27 +99,6 @@ pub fn runs(n: usize, known: impl Fn(usize) -> bool) -> Vec<Range<usize>> {
     joined
 }
 
-/// The value below which the share `q` of the sorted values lies, by linear interpolation.
-pub fn quantile(sorted: &[f64], q: f64) -> Option<f64> {
-    let last = sorted.len().checked_sub(1)?;
-    let at = q.clamp(0.0, 1.0) * last as f64;
-    let below = at.floor() as usize;
-    let (low, high) = (sorted[below], sorted[(below + 1).min(last)]);
-    Some(low + (at - below as f64) * (high - low))
-}
-
-/// The value below which the share `q` of those that are finite lies.
-pub fn quantile_of(values: &[f64], q: f64) -> Option<f64> {
-    quantile(&sorted(values.iter().copied()), q)
-}
-
-/// The finite values in ascending order.
-pub fn sorted(values: impl IntoIterator<Item = f64>) -> Vec<f64> {
-    let mut finite: Vec<f64> = values.into_iter().filter(|v| v.is_finite()).collect();
-    finite.sort_by(f64::total_cmp);
-    finite
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -171,14 +150,5 @@ mod tests {
             runs(100_000, |k| k % 2 == 0 && !(40_000..50_000).contains(&k)),
             vec![0..39_999, 50_000..99_999]
         );
-    }
-
-    #[test]
-    fn quantiles_interpolate() {
-        let values = sorted([3.0, f64::NAN, 1.0, 2.0, f64::INFINITY]);
-        assert_eq!(values, [1.0, 2.0, 3.0]);
-        assert_eq!(quantile(&values, 0.25), Some(1.5));
-        assert_eq!(quantile(&values, 1.0), Some(3.0));
-        assert_eq!(quantile(&[], 0.5), None);
     }
 }

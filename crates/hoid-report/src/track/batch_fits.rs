@@ -2,6 +2,7 @@
 
 use hoid_ident::{Estimator, Fit, IdentError};
 use hoid_model::{Orders, Record};
+use hoid_numerics::statistics::upper_median;
 use hoid_track::{StartAt, Trace};
 
 /// A batch fit and its span, s.
@@ -22,8 +23,7 @@ fn orders_within(trace: &Trace, (from, to): (f64, f64)) -> Orders {
     let mut delays: Vec<f64> = rows
         .filter_map(|(row, _)| Some(trace.operator_values(row).ok()?.tau_e_s.value))
         .collect();
-    delays.sort_by(f64::total_cmp);
-    match delays.get(delays.len() / 2) {
+    match upper_median(&mut delays) {
         Some(delay_s) => Orders {
             nk: (delay_s / trace.sample_time().s()).round() as usize + 1,
             ..orders

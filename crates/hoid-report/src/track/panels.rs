@@ -6,6 +6,7 @@ use hoid_model::{
     GainUnit, Record,
     uncertainty::{Estimate, OperatorEstimate},
 };
+use hoid_numerics::statistics::quantile_of;
 use hoid_track::{StartAt, Trace};
 
 use super::{
@@ -14,7 +15,7 @@ use super::{
     truth,
 };
 use crate::{
-    figures::{CurveKind, Ordinate, TraceCurve, TraceGrid, TracePanel, quantile_of},
+    figures::{CurveKind, Ordinate, TraceCurve, TraceGrid, TracePanel},
     numbers::Z_95,
 };
 

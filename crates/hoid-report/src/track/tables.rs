@@ -3,6 +3,7 @@
 use std::mem::{Discriminant, discriminant};
 
 use hoid_model::{NotConvertible, Record, uncertainty::Estimate};
+use hoid_numerics::statistics::mean;
 use hoid_track::Change;
 use minijinja::{Value, context};
 
@@ -182,7 +183,7 @@ fn relative_error(trace: &Evaluated<'_>, record: &Record, name: &str, from_s: f6
             relative.is_finite().then_some(relative * relative)
         })
         .collect();
-    (!squares.is_empty()).then(|| (squares.iter().sum::<f64>() / squares.len() as f64).sqrt())
+    (!squares.is_empty()).then(|| mean(&squares).sqrt())
 }
 
 fn percent(share: f64) -> String {

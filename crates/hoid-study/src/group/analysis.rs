@@ -18,6 +18,7 @@ use hoid_analysis::{Recordings, Tracking};
 use hoid_ident::{Estimator, GreyBox, choose_orders, order_selection::Criterion};
 use hoid_io::OutputTable;
 use hoid_model::{Decimation, Form, Orders, Record, Structure, uncertainty::Estimate};
+use hoid_numerics::statistics::root_mean_square;
 use hoid_track::{Method, TrackRequest};
 
 use super::{
@@ -156,7 +157,10 @@ impl<'a> RunAnalysis<'a> {
         let record = &run.record;
         let windows = windows(self.settings, record);
         let change = run.seam_s.or(self.rows.condition.change_s).map(|at| ("change_s", at));
-        let of_record = [("rms_e", rms(record.input())), ("rms_u", rms(record.output()))];
+        let of_record = [
+            ("rms_e", root_mean_square(record.input())),
+            ("rms_u", root_mean_square(record.output())),
+        ];
         for (name, value) in of_record.into_iter().chain(change) {
             self.rows.row(Some(windows[2]), "record", name, Estimate::fixed(value));
         }
@@ -315,8 +319,4 @@ impl<'a> RunAnalysis<'a> {
             }
         }
     }
-}
-
-fn rms(values: &[f64]) -> f64 {
-    (values.iter().map(|v| v * v).sum::<f64>() / values.len() as f64).sqrt()
 }

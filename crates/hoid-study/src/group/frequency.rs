@@ -24,6 +24,7 @@ use std::path::Path;
 use hoid_ident::frequency::{DescribingFunction, DescriptionOptions, Line, describe_runs};
 use hoid_io::OutputTable;
 use hoid_model::{ContinuousTransferFunction, Detrend, ModelError, Record, uncertainty::Estimate};
+use hoid_numerics::statistics::mean;
 
 use super::{
     condition_settings::ConditionSettings,
@@ -207,10 +208,7 @@ fn of_records(
         margins.real(&format!("{name}_se"), estimate.standard_error.unwrap_or(f64::NAN));
     };
     let coherences: Vec<f64> = found.lines.iter().filter_map(|line| line.coherence).collect();
-    put(
-        "coherence",
-        Estimate::fixed(coherences.iter().sum::<f64>() / coherences.len() as f64),
-    );
+    put("coherence", Estimate::fixed(mean(&coherences)));
     put("off_line_share", found.off_line_share);
     put("noise_ratio", found.noise_ratio);
     put("rms_e", found.rms_e);

@@ -11,6 +11,7 @@
 use hoid_ident::{Estimator, OrderRanges, choose_orders, order_selection::Criterion};
 use hoid_io::OutputTable;
 use hoid_model::{Orders, Record, Structure, remnant::RemnantDiscretisation, uncertainty::Estimate};
+use hoid_numerics::statistics::mean;
 
 use super::{
     analysis_settings::AnalysisSettings,
@@ -75,7 +76,7 @@ pub(super) fn choose(
     rows.row(None, label_of(structure), "nk", Estimate::fixed(nk as f64));
     if structure == Structure::BoxJenkins {
         rows.row(None, label_of(structure), "nd", Estimate::fixed(nd as f64));
-        let mean = t_n.iter().sum::<f64>() / t_n.len() as f64;
+        let mean = mean(&t_n);
         if mean.is_finite() {
             rows.row(None, label_of(structure), "T_n", Estimate::fixed(mean));
         }

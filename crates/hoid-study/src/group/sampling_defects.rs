@@ -2,6 +2,7 @@
 
 use hoid_io::{ColumnValues, OutputColumn, OutputTable};
 use hoid_model::Record;
+use hoid_numerics::statistics::root_mean_square;
 
 /// A defect of the sampling, as recorded data have it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -70,7 +71,7 @@ pub(super) fn recorded(record: &Record, names: &[&str], defects: &[SamplingDefec
             .for_each(|(t, z)| *t += (0.2 * z).clamp(-0.45, 0.45) * ts);
     }
     let mut u = record.output().to_vec();
-    let sd = (u.iter().map(|u| u * u).sum::<f64>() / n as f64).sqrt();
+    let sd = root_mean_square(&u);
     if has(SamplingDefect::Saturated) {
         u.iter_mut().for_each(|u| *u = u.clamp(-1.5 * sd, 1.5 * sd));
     }

@@ -3,6 +3,7 @@
 use std::{collections::BTreeMap, path::Path};
 
 use hoid_io::{ColumnKind, ColumnValues, OutputTable, TableWriter};
+use hoid_numerics::statistics::{mean, sample_variance};
 
 use super::layout::{BUDGET, PartsOfCell, schema};
 use crate::{
@@ -120,14 +121,11 @@ impl Series {
             for (name, values) in names.iter().zip(parameters) {
                 let mut sorted = values.clone();
                 sorted.sort_by(f64::total_cmp);
-                let n = sorted.len() as f64;
-                let mean = sorted.iter().sum::<f64>() / n;
-                let sd = (sorted.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (n - 1.0)).sqrt();
                 let median = quantile(&sorted, 0.5);
                 of_time.push(median);
                 for (figure, value) in [
-                    ("mean", mean),
-                    ("sd", sd),
+                    ("mean", mean(&sorted)),
+                    ("sd", sample_variance(&sorted).sqrt()),
                     ("lower_quartile", quantile(&sorted, 0.25)),
                     ("median", median),
                     ("upper_quartile", quantile(&sorted, 0.75)),

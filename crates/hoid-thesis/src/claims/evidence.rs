@@ -14,6 +14,7 @@
 
 use std::collections::BTreeMap;
 
+use hoid_numerics::statistics::mean;
 use hoid_study::{
     OPERATOR, Query, Results, TraceSummary, TrueState,
     plan::{EstimatorCell, Task},
@@ -177,7 +178,7 @@ impl<'a> Study<'a> {
         let ranges: Vec<f64> = within
             .map(|(k, _)| 100.0 * (bands.upper_quartile[k] - bands.lower_quartile[k]) / truth[1].abs())
             .collect();
-        let value = ranges.iter().sum::<f64>() / ranges.len() as f64;
+        let value = mean(&ranges);
         Ok(Value {
             value,
             error: 1.166 * value / (replications as f64).sqrt(),
@@ -203,7 +204,7 @@ impl<'a> Study<'a> {
                 .zip(&bands.median)
                 .filter(|(t, _)| (from_s..=to_s).contains(*t));
             let values: Vec<f64> = within.map(|(_, value)| *value).collect();
-            values.iter().sum::<f64>() / values.len() as f64
+            mean(&values)
         };
         let (from, to) = (level(midpoint_s - BEFORE_S, midpoint_s), level(end - AFTER_S, end));
         let settled = |errors: f64| {

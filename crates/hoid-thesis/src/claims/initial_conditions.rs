@@ -8,6 +8,7 @@ use super::{
     statistics::{jackknife, median_of, share_of},
     value::Value,
 };
+use hoid_numerics::statistics::mean;
 use hoid_study::Query;
 
 const PLANS: &[&str] = &["initial-conditions"];
@@ -117,7 +118,7 @@ fn single_runs(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {
 
 fn mean_size(values: &[f64]) -> f64 {
     let finite: Vec<f64> = values.iter().filter(|v| v.is_finite()).map(|v| v.abs()).collect();
-    finite.iter().sum::<f64>() / finite.len() as f64
+    mean(&finite)
 }
 
 fn poles_matter(evidence: &Evidence<'_>) -> Result<Vec<Part>, String> {

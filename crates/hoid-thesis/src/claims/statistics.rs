@@ -7,6 +7,7 @@
 //!   replications left out of all samples at once, `s^2 = (G - 1)/G sum (x_g - mean x_g)^2`.
 //!   Estimators that saw the same records stay paired.
 
+use hoid_numerics::statistics::{mean, squared_deviations};
 use hoid_study::{Statistics, statistics::median};
 
 use super::value::Value;
@@ -55,8 +56,7 @@ pub(super) fn mean_of(values: &[f64]) -> Value {
 
 pub(super) fn share_of(values: &[f64]) -> Value {
     let finite: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
-    let n = finite.len() as f64;
-    let p = finite.iter().sum::<f64>() / n;
+    let (n, p) = (finite.len() as f64, mean(&finite));
     Value {
         value: p,
         error: (p * (1.0 - p) / n).sqrt().max(1.5 / n),
@@ -103,7 +103,7 @@ pub(super) fn spread(values: impl Iterator<Item = f64>) -> f64 {
 /// R^2 of the straight line through values at equal distances.
 pub(super) fn linearity(values: &[f64]) -> f64 {
     let n = values.len() as f64;
-    let (x0, y0) = (0.5 * (n - 1.0), values.iter().sum::<f64>() / n);
+    let (x0, y0) = (0.5 * (n - 1.0), mean(values));
     let [mut xx, mut xy, mut yy] = [0.0; 3];
     for (k, y) in values.iter().enumerate() {
         let (x, y) = (k as f64 - x0, y - y0);
@@ -137,11 +137,9 @@ pub(super) fn jackknife(samples: &[Vec<f64>], f: &dyn Fn(&[Vec<f64>]) -> f64) ->
         })
         .collect();
     let g = groups as f64;
-    let mean = left.iter().sum::<f64>() / g;
-    let squares: f64 = left.iter().map(|x| (x - mean).powi(2)).sum();
     Value {
         value,
-        error: ((g - 1.0) / g * squares).sqrt(),
+        error: ((g - 1.0) / g * squared_deviations(&left)).sqrt(),
     }
 }
 

@@ -4,6 +4,7 @@ use hoid_ident::{Estimator, Fit, validation::vaf};
 use hoid_model::{
     OperatorParameters, Orders, Record, Structure, remnant::RemnantDiscretisation, uncertainty::OperatorEstimate,
 };
+use hoid_numerics::statistics::mean;
 use hoid_track::{Method, StartAt, TrackOptions, track_from};
 
 use crate::ThesisError;
@@ -144,7 +145,7 @@ fn time_constant(fits: &[Fit; 2]) -> f64 {
             .map(|r| r.t_n_s.value)
     };
     let all: Vec<f64> = fits.iter().filter_map(of).collect();
-    all.iter().sum::<f64>() / all.len() as f64
+    mean(&all)
 }
 
 /// RLS or RPEM from the fit of the first span.

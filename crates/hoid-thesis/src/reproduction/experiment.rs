@@ -5,6 +5,7 @@
 use std::sync::{Arc, OnceLock};
 
 use hoid_model::scenario::Condition;
+use hoid_numerics::statistics::mean;
 use hoid_study::statistics::median;
 
 use super::{
@@ -170,7 +171,7 @@ fn middle(values: impl Iterator<Item = f64>) -> [f64; 2] {
     if finite.is_empty() {
         return [f64::NAN; 2];
     }
-    [finite.iter().sum::<f64>() / finite.len() as f64, median(&finite)]
+    [mean(&finite), median(&finite)]
 }
 
 fn curve(kind: CurveKind, method: usize, level: usize, times_s: Vec<f64>, values: Vec<f64>) -> TraceCurve {

@@ -11,6 +11,7 @@ use hoid_core::guard::{
     profile::{Block, CHANNELS, Profile, STILL},
 };
 use hoid_model::Record;
+use hoid_numerics::statistics::{mean, upper_quantile};
 
 use super::Guard;
 
@@ -94,20 +95,16 @@ fn middle(values: Vec<f64>) -> f64 {
     quantile(values, 0.5)
 }
 
+/// A quantile of the finite values; zero of none.
 fn quantile(mut values: Vec<f64>, share: f64) -> f64 {
     values.retain(|v| v.is_finite());
-    values.sort_by(f64::total_cmp);
-    let place = (share * values.len() as f64) as usize;
-    values
-        .get(place.min(values.len().saturating_sub(1)))
-        .copied()
-        .unwrap_or(0.0)
+    upper_quantile(&mut values, share).unwrap_or(0.0)
 }
 
 /// True for each first difference that is more than a signal that stands still has.
 fn moving(signal: &[f64]) -> Vec<bool> {
     let sizes: Vec<f64> = signal.windows(2).map(|w| (w[1] - w[0]).abs()).collect();
-    let mean = sizes.iter().sum::<f64>() / sizes.len().max(1) as f64;
+    let mean = mean(&sizes);
     sizes.iter().map(|size| *size > STILL * mean).collect()
 }
 

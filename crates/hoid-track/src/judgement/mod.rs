@@ -49,6 +49,7 @@ mod tests;
 
 use hoid_ident::{Choice, IdentError};
 use hoid_model::{Finding, Record, Severity, Verdict, uncertainty::Estimate};
+use hoid_numerics::statistics::upper_median;
 
 use self::operators::{Operator, operator_findings};
 use crate::trace::Trace;
@@ -175,11 +176,9 @@ impl Trace {
         let names = self.parameter_names();
         let estimates: Vec<Vec<Estimate>> = rows.iter().map(|row| self.parameters(*row)).collect();
         let grown = |i: usize| {
-            let errors: Vec<f64> = estimates.iter().filter_map(|e| e[i].standard_error).collect();
-            let mut sorted = errors.clone();
-            sorted.sort_by(f64::total_cmp);
-            let median = *sorted.get(sorted.len() / 2)?;
-            let largest = *sorted.last()?;
+            let mut errors: Vec<f64> = estimates.iter().filter_map(|e| e[i].standard_error).collect();
+            let median = upper_median(&mut errors)?;
+            let largest = errors.into_iter().max_by(f64::total_cmp)?;
             (median > 0.0 && largest > BLOWN_UP * median).then_some(largest / median)
         };
         let (name, ratio) = names

@@ -2,6 +2,7 @@
 
 use std::f64::consts::{FRAC_PI_4, TAU};
 
+use hoid_numerics::statistics::upper_median;
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 
 use super::{
@@ -133,8 +134,7 @@ pub(super) fn strongest_among(of: &Constancy<'_>, directions: &[&Direction], set
             .filter_map(|k| tested(of, (&matrices, &scores), &inverse, (&v, direction.size), &sets[k], k))
             .collect();
         let mut ratios: Vec<f64> = all.iter().map(|t| t.by_blocks / t.by_model).collect();
-        ratios.sort_by(f64::total_cmp);
-        let usual = ratios.get(ratios.len() / 2).copied().unwrap_or(1.0);
+        let usual = upper_median(&mut ratios).unwrap_or(1.0);
         let smallest = all.iter().map(|t| t.share.min(1.0 - t.share)).fold(0.5, f64::min);
         for t in &all {
             // All blocks have a share in a drift and a sway, and the usual scatter is that of them all.

@@ -1,0 +1,178 @@
+//! Statistics of some values.
+//!
+//! **Quantiles** are those of R. J. Hyndman and Y. Fan, *The American Statistician* 50 (1996) 361-365.
+//! With the order statistics `x_0 <= .. <= x_(n-1)` and a share p:
+//!
+//! | function | value | |
+//! |---|---|---|
+//! | [`quantile`] | x at the place `(n-1) p`, by linear interpolation | type 7, the default of NumPy and R |
+//! | [`nearest_quantile`] | `x_k`, k the whole number nearest to `(n-1) p` | type 7 without interpolation |
+//! | [`upper_quantile`] | `x_k`, k the largest whole number not above `n p` | right-continuous inverse of the distribution of the values, type 1 but where `n p` is whole |
+//!
+//! The first is what tables and figures say. The others give one of the values and need no order of
+//! all of them: scales of many samples, and thresholds whose results depend on that definition. Their
+//! medians are the same, the upper one of the two in the middle.
+//!
+//! Order is that of [`f64::total_cmp`].
+
+#[cfg(feature = "alloc")]
+use alloc::vec::Vec;
+
+/// Mean; no number of none.
+#[inline]
+pub fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len() as f64
+}
+
+/// Sum of the squared distances from the mean.
+#[inline]
+pub fn squared_deviations(values: &[f64]) -> f64 {
+    let mean = mean(values);
+    values.iter().map(|v| (v - mean) * (v - mean)).sum()
+}
+
+/// Variance around the mean with the divisor n; no number of none.
+#[inline]
+pub fn variance(values: &[f64]) -> f64 {
+    squared_deviations(values) / values.len() as f64
+}
+
+/// Variance around the mean with the divisor n - 1, without bias; no number of fewer than two values.
+#[inline]
+pub fn sample_variance(values: &[f64]) -> f64 {
+    squared_deviations(values) / (values.len() as f64 - 1.0)
+}
+
+/// Root of the variance around the mean with the divisor n; zero of none, unlike [`variance`].
+#[inline]
+pub fn standard_deviation(values: &[f64]) -> f64 {
+    libm::sqrt(squared_deviations(values) / values.len().max(1) as f64)
+}
+
+/// Mean of the squares; no number of none.
+#[inline]
+pub fn mean_square(values: &[f64]) -> f64 {
+    values.iter().map(|v| v * v).sum::<f64>() / values.len() as f64
+}
+
+/// Root of the mean of the squares; no number of none.
+#[inline]
+pub fn root_mean_square(values: &[f64]) -> f64 {
+    libm::sqrt(mean_square(values))
+}
+
+/// The value below which this share of sorted values lies, by linear interpolation; `None` of none.
+pub fn quantile(sorted: &[f64], share: f64) -> Option<f64> {
+    let last = sorted.len().checked_sub(1)?;
+    let at = share.clamp(0.0, 1.0) * last as f64;
+    let below = at as usize;
+    let (low, high) = (sorted[below], sorted[(below + 1).min(last)]);
+    Some(low + (at - below as f64) * (high - low))
+}
+
+/// The value nearest to the place of a quantile, of two the upper; the values are put in another
+/// order. `None` of none.
+pub fn nearest_quantile(values: &mut [f64], share: f64) -> Option<f64> {
+    let last = values.len().checked_sub(1)?;
+    order_statistic(values, libm::round(last as f64 * share) as usize)
+}
+
+/// The smallest value with more than this share of the values at or below it, at most the largest;
+/// the values are put in another order. `None` of none.
+pub fn upper_quantile(values: &mut [f64], share: f64) -> Option<f64> {
+    order_statistic(values, (share * values.len() as f64) as usize)
+}
+
+/// The median, of two in the middle the upper; the values are put in another order. `None` of none.
+pub fn upper_median(values: &mut [f64]) -> Option<f64> {
+    order_statistic(values, values.len() / 2)
+}
+
+/// The value at this place in ascending order, at most the largest.
+fn order_statistic(values: &mut [f64], place: usize) -> Option<f64> {
+    let last = values.len().checked_sub(1)?;
+    Some(*values.select_nth_unstable_by(place.min(last), f64::total_cmp).1)
+}
+
+/// The finite values in ascending order.
+#[cfg(feature = "alloc")]
+pub fn finite_sorted(values: impl IntoIterator<Item = f64>) -> Vec<f64> {
+    let mut finite: Vec<f64> = values.into_iter().filter(|v| v.is_finite()).collect();
+    finite.sort_by(f64::total_cmp);
+    finite
+}
+
+/// The value below which this share of the finite values lies, by linear interpolation; `None` where
+/// none is finite.
+#[cfg(feature = "alloc")]
+pub fn quantile_of(values: &[f64], share: f64) -> Option<f64> {
+    quantile(&finite_sorted(values.iter().copied()), share)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn moments_by_hand() {
+        let x = [1.0, 2.0, 4.0, 5.0];
+        assert_eq!((mean(&x), squared_deviations(&x)), (3.0, 10.0));
+        assert_eq!((variance(&x), sample_variance(&x)), (2.5, 10.0 / 3.0));
+        assert_eq!(
+            (mean_square(&x), root_mean_square(&[3.0, -4.0, 5.0, 0.0])),
+            (11.5, 12.5_f64.sqrt())
+        );
+        assert!(mean(&[]).is_nan() && variance(&[]).is_nan() && root_mean_square(&[]).is_nan());
+        assert!(sample_variance(&[7.0]).is_nan());
+        assert_eq!((standard_deviation(&x), standard_deviation(&[])), (2.5_f64.sqrt(), 0.0));
+    }
+
+    #[test]
+    fn three_quantiles() {
+        // NumPy: quantile([1..9, 100], [.25, .5, .75]) = 3.25, 5.5, 7.75.
+        let sorted = [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0, 100.0];
+        let mut mixed = [5.0, 1.0, 9.0, 100.0, 2.0, 8.0, 3.0, 7.0, 4.0, 6.0];
+        for (share, by_line, nearest, upper) in [
+            (0.0, 1.0, 1.0, 1.0),
+            (0.25, 3.25, 3.0, 3.0),
+            (0.5, 5.5, 6.0, 6.0),
+            (0.75, 7.75, 8.0, 8.0),
+            (0.9, 18.1, 9.0, 100.0),
+            (1.0, 100.0, 100.0, 100.0),
+        ] {
+            let found = quantile(&sorted, share).unwrap_or(f64::NAN);
+            assert!((found - by_line).abs() < 1e-13, "{share}: {found}");
+            assert_eq!(nearest_quantile(&mut mixed, share), Some(nearest), "{share}");
+            assert_eq!(upper_quantile(&mut mixed, share), Some(upper), "{share}");
+        }
+        assert_eq!(upper_median(&mut mixed), Some(6.0));
+        assert_eq!(
+            (quantile(&[3.0], 0.3), quantile(&sorted, 2.0)),
+            (Some(3.0), Some(100.0))
+        );
+        assert_eq!((quantile(&[], 0.5), nearest_quantile(&mut [], 0.5)), (None, None));
+        assert_eq!((upper_quantile(&mut [], 0.5), upper_median(&mut [])), (None, None));
+    }
+
+    #[test]
+    fn medians_are_the_same_of_any_number_of_values() {
+        for n in 1..30 {
+            let of = || (0..n).map(|i| f64::from(i * 7 % n)).collect::<std::vec::Vec<_>>();
+            let median = upper_median(&mut of());
+            assert_eq!(nearest_quantile(&mut of(), 0.5), median);
+            assert_eq!(upper_quantile(&mut of(), 0.5), median);
+        }
+    }
+
+    #[cfg(feature = "alloc")]
+    #[test]
+    fn only_finite_values_count() {
+        let values = [3.0, f64::NAN, 1.0, 2.0, f64::INFINITY];
+        assert_eq!(finite_sorted(values), [1.0, 2.0, 3.0]);
+        assert_eq!(
+            (quantile_of(&values, 0.25), quantile_of(&values, 1.0)),
+            (Some(1.5), Some(3.0))
+        );
+        assert_eq!(quantile_of(&[f64::NAN], 0.5), None);
+    }
+}
