@@ -69,7 +69,7 @@ pub(crate) fn verdict(v: &Verdict) -> Value {
 const WORDS: [(&str, &str, &str); 7] = [
     ("gain", "K", ""),
     ("gain", "K_e", ""),
-    ("gain over lag", "K_over_T_I", ""),
+    ("K/T_I", "K_over_T_I", ""),
     ("integral gain", "K_I", ""),
     ("lead", "T_L", " s"),
     ("lag", "T_I", " s"),
@@ -85,7 +85,7 @@ pub fn sentence<'a>(
     phase_margin_deg: Option<Estimate>,
 ) -> Option<String> {
     let known: Vec<(&str, f64)> = parameters.into_iter().filter(|(_, value)| value.is_finite()).collect();
-    // The gain over the lag is what is left to say where the gain itself is not known.
+    // K/T_I is what is left to say where the gain itself is not known.
     let has_gain = known.iter().any(|(name, _)| *name == "K");
     let of = |(word, name, unit): &(&str, &str, &str)| {
         let found = known.iter().find(|(known, _)| known == name);
@@ -135,7 +135,7 @@ mod tests {
         assert_eq!(sentence([("T_L", f64::INFINITY)], None, None), None);
         assert_eq!(sentence([("T_L", 0.5)], None, None).unwrap(), "lead 0.5 s");
         let integrating = sentence([("K_over_T_I", 0.37), ("tau_e", 0.2)], None, None);
-        assert_eq!(integrating.unwrap(), "gain over lag 0.37, delay 0.2 s");
+        assert_eq!(integrating.unwrap(), "K/T_I 0.37, delay 0.2 s");
         let lagging = sentence([("K", 3.0), ("K_over_T_I", 0.37), ("T_I", 8.0)], None, None);
         assert_eq!(lagging.unwrap(), "gain 3, lag 8 s");
         let known = Estimate::fixed(3.0);

@@ -94,7 +94,9 @@ impl Tracker {
         })
     }
 
-    /// Takes a sample.
+    /// Takes a sample: a bounded number of operations, whatever the sample holds and however long the
+    /// run was. On a PC with 100 samples a second `adaptive` takes 33 us in the median and 86 us at 99 of
+    /// 100 samples, without reading the record again (`replay` of 0) 0.5 and 22 us, `rpem` 0.1 and 0.2 us.
     pub fn step(&mut self, e: f64, u: f64) -> Outcome {
         self.update(Sample { e, u, reference: None }, true)
     }

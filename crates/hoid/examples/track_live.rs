@@ -1,8 +1,8 @@
 //! Tracks a person while they act: one sample in, one estimate out.
 //! `cargo run --example track_live`.
 //!
-//! The samples come from a simulated run whose task changes at 40.96 s; the first 20 s give the
-//! start fit.
+//! The samples come from a simulated run whose task changes at 40.96 s. The default tracker is told
+//! nothing of the person and begins with the first sample.
 #![allow(clippy::print_stdout)]
 
 use std::error::Error;
@@ -11,20 +11,17 @@ use hoid::prelude::*;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let run = Simulator::new(&Scenario::condition(Condition::C4))?.run(RunSeed::default(), false)?;
-    let start = run.span(0.0, 20.0)?;
-    let fit = identify_box_jenkins(std::slice::from_ref(&start))?.fit;
-
-    let options = TrackOptions::usual(Method::physical(), fit.orders().nk).with(&[("memory_of", "K_e=4s")])?;
-    let mut tracker = Tracker::new(&options, Some(&start), run.sample_time())?;
+    let options = TrackOptions::told_nothing(Method::default(), run.sample_time());
+    let mut tracker = Tracker::new(&options, None, run.sample_time())?;
     for (k, (e, u)) in run.input().iter().zip(run.output()).enumerate() {
         tracker.step(*e, *u);
-        if k % 1000 == 0 {
+        if let Some(change) = tracker.change() {
+            println!("{:5.1} s  {} changed", run.time_s(k), change.changed().join(", "));
+        }
+        if k % 1000 == 999 {
             let t = run.time_s(k);
             match tracker.operator() {
-                Ok(operator) => println!(
-                    "{t:5.1} s  K_e {:.4}  K_e_dot {:.4}",
-                    operator.k_e.value, operator.k_e_dot.value
-                ),
+                Ok(operator) => println!("{t:5.1} s  K_e {}  K_e_dot {}", operator.k_e, operator.k_e_dot),
                 Err(reason) => println!("{t:5.1} s  {reason}"),
             }
         }

@@ -23,8 +23,8 @@
 //! let choice = identify_box_jenkins(&records)?;             // polynomials; delay and noise order by BIC
 //! println!("{}", choice.fit.validate(&records[0])?);
 //!
-//! let options = TrackOptions::usual(Method::multiple_model(), choice.fit.orders().nk);
-//! let trace = track(&records[0], &options, 10)?;            // every tenth sample
+//! let options = TrackOptions::told_nothing(Method::default(), records[0].sample_time());
+//! let trace = track(&records[0], &options, 10)?;            // as `hoid track`: every tenth sample
 //! println!("{trace}");
 //!
 //! let page = Report::of("Run 1", &records, &choice).to_html()?;

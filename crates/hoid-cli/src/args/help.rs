@@ -58,10 +58,12 @@ const HELP: [Help; 17] = [
             "structure",
             "orders",
             "nk",
+            "scale",
             "excitation",
             "controlled_element",
             "answers",
             "figure",
+            "table",
             "report",
             "verbose",
             "json",
@@ -264,6 +266,7 @@ const HEADINGS: [(&str, &[&str]); 2] = [
             "horizon",
             "figure",
             "width",
+            "table",
             "trace",
             "out",
             "report",
@@ -395,6 +398,35 @@ mod tests {
                 inner.get_name(),
                 help.lines().count()
             );
+        }
+    }
+
+    /// An option that the first pages use is found where a newcomer looks first.
+    #[test]
+    fn the_options_of_the_first_pages_stand_in_the_short_help() {
+        let mut program = command();
+        program.build();
+        let pages = [
+            include_str!("../../../../README.md"),
+            include_str!("../../../../docs/src/guides/first-run.md"),
+        ];
+        let typed = pages.iter().flat_map(|page| page.lines());
+        let calls: Vec<Vec<&str>> = typed
+            .filter_map(|line| {
+                line.strip_prefix("hoid ")
+                    .or_else(|| line.strip_prefix("cargo run --release -- "))
+            })
+            .map(|call| call.split(' ').collect())
+            .collect();
+        assert!(calls.len() > 5, "{} calls", calls.len());
+        for call in calls {
+            let Some(inner) = program.find_subcommand_mut(call[0]) else {
+                continue;
+            };
+            let help = inner.render_help().to_string();
+            for option in call.iter().filter(|word| word.starts_with("--")) {
+                assert!(help.contains(option), "hoid {} -h lacks {option}", call[0]);
+            }
         }
     }
 
