@@ -126,7 +126,7 @@ fn margins(fit: &FamilyFit, element: &ContinuousTransferFunction) -> Option<Marg
     })
 }
 
-/// The fitted operator, by prediction error, at the lines, by instrumental variables.
+/// The fitted operator: by prediction error with its band, at the lines, by instrumental variables.
 fn curves(fit: &FamilyFit, described: &Description) -> Vec<ModelCurve> {
     let half = 0.5 * fit.sample_time.s();
     let curve = |name: &str, operator: &FamilyOperator| {
@@ -135,7 +135,13 @@ fn curves(fit: &FamilyFit, described: &Description) -> Vec<ModelCurve> {
             operator.response(omega) * turn(omega)
         })
     };
-    let mut all = vec![curve("prediction error", &fit.operator(0).operator)];
+    let delay_s = fit.operator(0).operator.tau_e_s() + half;
+    let mut all = vec![ModelCurve::with_band(
+        described,
+        "prediction error, band 95 %",
+        delay_s,
+        |omega| fit.frequency_response(0, omega),
+    )];
     if let Some(lines) = &fit.lines {
         all.push(curve("fit at the lines", &lines.operator));
     }
@@ -149,8 +155,9 @@ fn through_describing_function(fit: &FamilyFit, described: &Description) -> Pict
     Picture {
         svg: picture(fit, described),
         caption:
-            "The describing function at the lines of the excitation, with 95 % by its scatter, and the operator of the \
-                  chosen form: by prediction error, fitted at the lines, and by instrumental variables (RIV-BJ) where these converge."
+            "The describing function at the lines of the excitation, with 95 % by its scatter, and the operator: by \
+                  prediction error, the mean over its forms with their 95 % band; in the form in front fitted at the lines, and by \
+                  instrumental variables (RIV-BJ) where these converge."
                 .to_owned(),
     }
 }

@@ -3,7 +3,10 @@
 //!
 //! The phase of a model is drawn in the turn in which it lies nearest to the points.
 
-use hoid_ident::frequency::{Description, chance_coherence, unwrapped_deg};
+use hoid_ident::{
+    ResponsePoint,
+    frequency::{Description, chance_coherence, unwrapped_deg},
+};
 use hoid_model::{Complex64, uncertainty::Estimate};
 use hoid_numerics::statistics::upper_median;
 
@@ -29,6 +32,8 @@ pub struct ModelCurve {
     pub omega_rad_s: Vec<f64>,
     /// The response at each.
     pub response: Vec<Complex64>,
+    /// Standard errors of magnitude in dB and phase in deg at each, for a band; empty for none.
+    pub standard_errors: Vec<[f64; 2]>,
     /// Its delay, which is taken out while the phase is unwrapped, s.
     pub delay_s: f64,
 }
@@ -36,17 +41,49 @@ pub struct ModelCurve {
 impl ModelCurve {
     /// A response over the frequencies of a description, and a little beyond.
     pub fn over(found: &Description, name: &str, delay_s: f64, response: impl Fn(f64) -> Complex64) -> Self {
-        let lines = &found.function.lines;
-        let ends = lines.first().zip(lines.last());
-        let (low, high) = ends.map_or((0.1, 10.0), |(a, b)| (0.9 * a.omega_rad_s, 1.1 * b.omega_rad_s));
-        let step = (high / low).ln() / (POINTS - 1) as f64;
-        let omega_rad_s: Vec<f64> = (0..POINTS).map(|k| low * (step * k as f64).exp()).collect();
+        let omega_rad_s = frequencies(found);
         Self {
             name: name.to_owned(),
             response: omega_rad_s.iter().map(|omega| response(*omega)).collect(),
             omega_rad_s,
+            standard_errors: Vec::new(),
             delay_s,
         }
+    }
+
+    /// A response with its standard errors over the same frequencies.
+    pub fn with_band(
+        found: &Description,
+        name: &str,
+        delay_s: f64,
+        response: impl Fn(&[f64]) -> Vec<ResponsePoint>,
+    ) -> Self {
+        let points = response(&frequencies(found));
+        let value = |p: &ResponsePoint| {
+            let gain = 10.0_f64.powf(p.magnitude_db.value / 20.0);
+            Complex64::from_polar(gain, p.phase_deg.value.to_radians())
+        };
+        let errors = |p: &ResponsePoint| {
+            [p.magnitude_db, p.phase_deg].map(|estimate| estimate.standard_error.unwrap_or(f64::NAN))
+        };
+        Self {
+            name: name.to_owned(),
+            omega_rad_s: points.iter().map(|p| p.omega_rad_s).collect(),
+            response: points.iter().map(value).collect(),
+            standard_errors: points.iter().map(errors).collect(),
+            delay_s,
+        }
+    }
+
+    /// The band of 1.96 standard errors around magnitude (0) or phase (1); empty where there is none.
+    fn band(&self, part: usize, around: &[f64]) -> Vec<(f64, f64)> {
+        let ends = |(value, errors): (&f64, &[f64; 2])| {
+            let whole = Z_95 * errors[part];
+            // Not `min`, which takes the number of a number and NaN.
+            let half = if whole > LONGEST_BAR { LONGEST_BAR } else { whole };
+            (value - half, value + half)
+        };
+        around.iter().zip(&self.standard_errors).map(ends).collect()
     }
 
     /// Phase in deg, in the turn that is nearest to points of frequency and phase.
@@ -69,6 +106,15 @@ impl ModelCurve {
     }
 }
 
+/// The frequencies of a description, and a little beyond, rad/s.
+fn frequencies(found: &Description) -> Vec<f64> {
+    let lines = &found.function.lines;
+    let ends = lines.first().zip(lines.last());
+    let (low, high) = ends.map_or((0.1, 10.0), |(a, b)| (0.9 * a.omega_rad_s, 1.1 * b.omega_rad_s));
+    let step = (high / low).ln() / (POINTS - 1) as f64;
+    (0..POINTS).map(|k| low * (step * k as f64).exp()).collect()
+}
+
 /// The describing function as points with error bars of 1.96 standard errors, and models as lines.
 /// `title` is what a screen reader says.
 pub fn describing(id: &str, title: &str, found: &Description, models: &[ModelCurve]) -> String {
@@ -87,13 +133,13 @@ pub fn describing(id: &str, title: &str, found: &Description, models: &[ModelCur
         band: Vec::new(),
         bars: values.iter().map(bar).collect(),
     };
-    let line = |(k, model): (usize, &ModelCurve), y: Vec<f64>| Curve {
+    let line = |(k, model): (usize, &ModelCurve), part: usize, y: Vec<f64>| Curve {
         name: model.name.clone(),
         kind: kind_of(k),
         shade: Shade::of_method(k + 1),
         x: model.omega_rad_s.clone(),
+        band: model.band(part, &y),
         y,
-        band: Vec::new(),
         bars: Vec::new(),
     };
     let panel = |name: &str, unit: &str, curves: Vec<Curve>| CurvePanel {
@@ -105,12 +151,12 @@ pub fn describing(id: &str, title: &str, found: &Description, models: &[ModelCur
     let known: Vec<(f64, f64)> = omega.iter().copied().zip(phases.iter().map(|p| p.value)).collect();
     let gain_of = |model: &ModelCurve| model.response.iter().map(|h| 20.0 * h.norm().log10()).collect();
     // Models first: the points lie on them.
-    let mut magnitude: Vec<Curve> = models.iter().enumerate().map(|m| line(m, gain_of(m.1))).collect();
+    let mut magnitude: Vec<Curve> = models.iter().enumerate().map(|m| line(m, 0, gain_of(m.1))).collect();
     magnitude.push(points(&magnitudes, name));
     let mut phase: Vec<Curve> = models
         .iter()
         .enumerate()
-        .map(|m| line(m, m.1.phase_deg(&known)))
+        .map(|m| line(m, 1, m.1.phase_deg(&known)))
         .collect();
     phase.push(points(&phases, name));
     let mut panels = vec![panel("magnitude", "dB", magnitude), panel("phase", "deg", phase)];
@@ -220,9 +266,44 @@ mod tests {
         let empty = ModelCurve {
             omega_rad_s: Vec::new(),
             response: Vec::new(),
+            standard_errors: Vec::new(),
             ..model(0.0)
         };
         assert!(empty.phase_deg(&points).is_empty());
+    }
+
+    #[test]
+    fn a_model_has_its_band() {
+        let found = described(4);
+        let of = |error: Option<f64>| {
+            ModelCurve::with_band(&found, "m", 0.3, |omega| {
+                let point = |&omega_rad_s: &f64| ResponsePoint {
+                    omega_rad_s,
+                    magnitude_db: Estimate {
+                        value: 6.0,
+                        standard_error: error,
+                    },
+                    phase_deg: Estimate {
+                        value: -170.0,
+                        standard_error: error.map(|e| 200.0 * e),
+                    },
+                };
+                omega.iter().map(point).collect()
+            })
+        };
+        let known = of(Some(1.0));
+        assert!((known.response[0].norm() - 10.0_f64.powf(0.3)).abs() < 1e-12);
+        assert!(
+            known
+                .band(0, &[6.0, 6.0])
+                .iter()
+                .all(|b| *b == (6.0 - Z_95, 6.0 + Z_95))
+        );
+        assert_eq!(known.band(1, &[0.0])[0], (-LONGEST_BAR, LONGEST_BAR));
+        assert!(of(None).band(0, &[6.0])[0].0.is_nan());
+        let drawn = |model: ModelCurve| describing("d", "t", &found, &[model]);
+        assert_ne!(drawn(known), drawn(of(None)));
+        assert!(!drawn(of(None)).contains("NaN"));
     }
 
     #[test]
