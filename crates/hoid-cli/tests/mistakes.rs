@@ -97,7 +97,7 @@ fn bad_input_is_told_in_the_users_words() {
         (&["one.csv", "--nk", "500"], &["nk = 500", "400 samples"]),
         (&["zero.csv"], &["u", "0 in every sample"]),
         (&["constant.csv"], &["e", "2.5 in every sample"]),
-        (&["one.csv", "slow.csv"], &["0.02", "0.01", "resample"]),
+        (&["one.csv", "slow.csv"], &["0.02", "0.01", "--new-fs 50"]),
         (&["one.csv", "--from", "90", "--to", "95"], &["90", "95"]),
         (&["one.csv", "--input", "q"], &["q", "t, e, u"]),
         (

@@ -266,7 +266,6 @@ const HEADINGS: [(&str, &[&str]); 2] = [
             "horizon",
             "figure",
             "width",
-            "table",
             "trace",
             "out",
             "report",
