@@ -17,7 +17,7 @@ CRATES = Path(__file__).parents[2] / "crates"
 # Libraries whose messages come through Python.
 LIBRARIES = ("hoid-io", "hoid-model", "hoid-ident", "hoid-track", "hoid-analysis")
 # What is only of the program: files of its own, pages, how it prints; and examples for its developers.
-OF_THE_PROGRAM = {"json", "mask", "unit", "scenario", "shortest"}
+OF_THE_PROGRAM = {"json", "scenario"}
 
 
 def table(path: Path, rows: list[tuple[Any, ...]]) -> Path:
@@ -84,7 +84,15 @@ def test_an_option_is_a_keyword(typed: str, said: str) -> None:
 
 
 def test_every_option_that_a_library_names_is_a_keyword() -> None:
-    functions = [pyhoid.read, pyhoid.read_trials, pyhoid.identify, pyhoid.track, pyhoid.describe, pyhoid.info]
+    functions = [
+        pyhoid.read,
+        pyhoid.read_segments,
+        pyhoid.read_trials,
+        pyhoid.identify,
+        pyhoid.track,
+        pyhoid.describe,
+        pyhoid.info,
+    ]
     known = {name for function in functions for name in inspect.signature(function).parameters}
     for of in (_settings.BatchSettings, _settings.MethodSettings):
         known |= set(of.__annotations__)

@@ -19,7 +19,7 @@ type Read<'py> = (Bound<'py, PyDict>, Vec<String>, Vec<String>);
 
 /// The record of a file, or the records between what is masked.
 #[pyfunction]
-#[pyo3(signature = (path, *, input, output, time, trial, all_trials, sampling_frequency, start, stop, resample, fill, detrend, drop_repeated, scale, offset, decimate,
+#[pyo3(signature = (path, *, input, output, time, trial, all_trials, sampling_frequency, start, stop, resample, fill, detrend, drop_repeated, unit, scale, offset, decimate,
     new_sampling_frequency, run_in, mask, shortest))]
 #[allow(clippy::too_many_arguments)]
 pub fn read<'py>(
@@ -37,6 +37,7 @@ pub fn read<'py>(
     fill: bool,
     detrend: &str,
     drop_repeated: bool,
+    unit: BTreeMap<String, String>,
     scale: BTreeMap<String, String>,
     offset: BTreeMap<String, String>,
     decimate: Option<usize>,
@@ -58,7 +59,7 @@ pub fn read<'py>(
         repair: Repair { resample, fill },
     };
     let preparation = Preparation {
-        units: std::collections::BTreeMap::new(),
+        units: unit,
         scale: parsed(scale)?,
         offset: parsed(offset)?,
         rate: match (decimate, new_sampling_frequency) {

@@ -186,6 +186,36 @@ fn a_group_gives_its_people_back_and_goes_on_when_it_was_stopped() {
 }
 
 #[test]
+fn a_polynomial_model_that_is_not_asked_for_is_in_no_table() {
+    let data = recorded();
+    let mut manifest = manifest(data.path());
+    manifest.runs.retain(|run| run.subject == "A" && run.condition == "C1");
+    manifest.analysis.methods = vec!["rls".to_owned()];
+    manifest.analysis.polynomials = vec!["bj".to_owned()];
+    let out = data.path().with_extension("out");
+    run_group(&manifest, data.path(), &out, &RunOptions::default(), &|_| (), &|| true).unwrap();
+    let estimators = |table: &str| {
+        let table = read_table(&out.join(table)).unwrap();
+        texts(&table, "estimator")
+            .iter()
+            .map(ToString::to_string)
+            .collect::<Vec<_>>()
+    };
+    let drawn = estimators("responses.parquet");
+    assert!(drawn.iter().any(|name| name == "BJ") && !drawn.iter().any(|name| name == "ARX"));
+    // The recursion has its orders, and starts.
+    assert!(drawn.iter().any(|name| name == "RLS"), "{drawn:?}");
+    fs::remove_dir_all(out).unwrap();
+
+    manifest.analysis.polynomials = vec!["armax".to_owned()];
+    let refused = Manifest::parse(&manifest.text(), "group.toml").unwrap_err().to_string();
+    assert!(
+        refused.contains("analysis.polynomials has \"armax\", expected some of arx, bj"),
+        "{refused}"
+    );
+}
+
+#[test]
 fn a_bad_file_is_a_row_and_a_bad_manifest_an_error() {
     let data = recorded();
     let mut manifest = manifest(data.path());

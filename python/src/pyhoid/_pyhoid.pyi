@@ -525,6 +525,7 @@ def read(
     fill: bool,
     detrend: str,
     drop_repeated: bool,
+    unit: dict[str, str],
     scale: dict[str, str],
     offset: dict[str, str],
     decimate: int | None,

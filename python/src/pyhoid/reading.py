@@ -31,6 +31,7 @@ if TYPE_CHECKING:
         resample: bool
         fill: bool
         drop_repeated: bool
+        unit: Mapping[str, str] | None
         scale: Mapping[str, float | str] | None
         offset: Mapping[str, float | str] | None
         decimate: int | None
@@ -52,6 +53,7 @@ def read(
     resample: bool = False,
     fill: bool = False,
     drop_repeated: bool = False,
+    unit: Mapping[str, str] | None = None,
     scale: Mapping[str, float | str] | None = None,
     offset: Mapping[str, float | str] | None = None,
     decimate: int | None = None,
@@ -84,6 +86,8 @@ def read(
         Bridge missing values by linear interpolation.
     drop_repeated : bool
         Drop rows that occur twice, with the same time.
+    unit : mapping, optional
+        Units that the file does not say, by channel: ``{"e": "deg", "u": "V"}``. No number changes.
     scale : mapping, optional
         Factors by channel (``e`` and ``u`` are input and output): ``{"u": 12.5}``, into a unit
         ``{"u": "12.5:deg"}``, or from unit to unit ``{"e": "rad:deg"}``.
@@ -135,6 +139,7 @@ def read(
         resample=resample,
         fill=fill,
         drop_repeated=drop_repeated,
+        unit=unit,
         scale=scale,
         offset=offset,
         decimate=decimate,
@@ -226,6 +231,7 @@ def _read(
     resample: bool = False,
     fill: bool = False,
     drop_repeated: bool = False,
+    unit: Mapping[str, str] | None = None,
     scale: Mapping[str, float | str] | None = None,
     offset: Mapping[str, float | str] | None = None,
     decimate: int | None = None,
@@ -248,6 +254,7 @@ def _read(
             fill=fill,
             detrend=detrend,
             drop_repeated=drop_repeated,
+            unit=dict(unit or {}),
             scale={name: _written(value) for name, value in (scale or {}).items()},
             offset={name: _written(value) for name, value in (offset or {}).items()},
             decimate=decimate,

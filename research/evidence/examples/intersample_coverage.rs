@@ -97,11 +97,13 @@ fn record(
 fn main() -> Result<(), Box<dyn Error>> {
     let number = |i: usize, otherwise: u64| env::args().nth(i).map_or(Ok(otherwise), |text| text.parse());
     let (people, seed) = (number(1, 200)?, number(2, 1)?);
-    println!("rate Hz, error, people whose delay is held, by the other value, mean standard error s");
+    println!(
+        "rate Hz, error, people whose delay is held, by the other value, mean standard error s, people without an interval"
+    );
     for rate_hz in RATES_HZ {
         for is_held in [true, false] {
             let mut random = Uniform(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15));
-            let (mut right, mut other, mut errors) = (0, 0, 0.0);
+            let (mut right, mut other, mut none, mut errors) = (0, 0, 0, 0.0);
             for _ in 0..people {
                 let x = [
                     random.between(1.0, 3.0),
@@ -122,20 +124,24 @@ fn main() -> Result<(), Box<dyn Error>> {
                 let of = fit.operator(0);
                 let tau = of.parameters.iter().find(|p| p.name == "tau_e").ok_or("no delay")?;
                 let later = fit.delay_if_straight_s(0).map_or(0.0, |straight| straight - tau.value);
-                let (low, high) = tau.interval.ok_or("no interval")?;
+                let Some((low, high)) = tau.interval else {
+                    none += 1;
+                    continue;
+                };
                 let held = |later: f64| u64::from((low + later..=high + later).contains(&x[4]));
                 let (mine, others) = if is_held { (0.0, later) } else { (later, 0.0) };
                 right += held(mine);
                 other += held(others);
                 errors += tau.standard_error.unwrap_or(0.0);
             }
-            let share = |n: u64| 100.0 * n as f64 / people as f64;
+            let told = (people - none) as f64;
+            let share = |n: u64| 100.0 * n as f64 / told;
             let kind = if is_held { "held" } else { "logged" };
             println!(
-                "{rate_hz:5} {kind:6} {:5.1} % {:5.1} % {:.4}",
+                "{rate_hz:5} {kind:6} {:5.1} % {:5.1} % {:.4}, {none} without",
                 share(right),
                 share(other),
-                errors / people as f64
+                errors / told
             );
         }
     }

@@ -146,7 +146,12 @@ fn main() -> Result<(), Box<dyn Error>> {
             // A quadratic numerator with real zeros is a lead with a droop.
             let zeros = [Form::QuadraticIntegral, Form::LeadDroop];
             if fit.form != form && !(zeros.contains(&fit.form) && zeros.contains(&form)) {
-                println!("{what}: {} {:.4?}", fit.form, found.operator.coordinates());
+                let left = fit.noise_free.unwrap_or(f64::NAN);
+                println!(
+                    "{what}: {} {:.4?}, {left:.1e} left",
+                    fit.form,
+                    found.operator.coordinates()
+                );
                 continue;
             }
             forms += 1;

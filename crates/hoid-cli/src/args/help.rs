@@ -87,6 +87,7 @@ const HELP: [Help; 17] = [
             "controlled_element",
             "figure",
             "width",
+            "table",
             "verbose",
             "json",
         ],

@@ -38,7 +38,36 @@
 //!
 //! Nothing has to be fitted before: the estimate begins with the first second, whose ratio of
 //! output to error gives the scale of the gains' prior. Where an earlier fit of the person is at hand
-//! ([`known`]), it begins there. [`AdaptiveFilter`] is the recursion.
+//! ([`known`]), it begins there. [`AdaptiveFilter`] is the recursion: it needs no operating system, and its memory
+//! is an array of the caller's.
+//!
+//! ```
+//! use hoid_core::adaptive::{AdaptiveFilter, least_memory, usual::Usual};
+//!
+//! const SAMPLE_TIME_S: f64 = 0.02;
+//! // Without what is kept for replays, as on a microcontroller; memory_needed() says how much those take.
+//! const MEMORY: usize = 192;
+//! assert!(MEMORY >= least_memory(SAMPLE_TIME_S));
+//! let person = Usual::with_delay(0.2);
+//! let mut tracker = AdaptiveFilter::new(person.prior(SAMPLE_TIME_S), [0.0; MEMORY]).ok_or("no filter")?;
+//!
+//! // Somebody with a gain of 0.5, muscles of 11 rad/s and a delay of 0.2 s; some noise.
+//! let (mut u, mut rate, mut late) = (0.0, 0.0, [0.0; 10]);
+//! for k in 0..3000_u32 {
+//!     let t = f64::from(k) * SAMPLE_TIME_S;
+//!     let e = libm::sin(0.6 * t) + 0.7 * libm::sin(1.7 * t) + 0.5 * libm::sin(4.1 * t) + 0.3 * libm::sin(9.0 * t);
+//!     late.rotate_left(1);
+//!     late[9] = e;
+//!     rate += SAMPLE_TIME_S * 121.0 * (0.5 * late[0] - u - 2.0 * 0.25 / 11.0 * rate);
+//!     u += SAMPLE_TIME_S * rate;
+//!     let noise = 0.02 * (f64::from(k * k % 7) - 2.0);
+//!     tracker.step(e, u + noise);
+//! }
+//! let [k_e, k_e_dot, omega_nm, zeta_nm, tau_e] = tracker.operator();
+//! let error = libm::sqrt(tracker.operator_covariance()[0][0]);
+//! assert!((k_e - 0.5).abs() < 4.0 * error && error < 0.05, "{k_e} {error} {k_e_dot} {omega_nm} {zeta_nm} {tau_e}");
+//! # Ok::<(), &str>(())
+//! ```
 
 pub mod basis;
 pub mod contrast;

@@ -16,6 +16,10 @@ const POLES: usize = 16;
 const FEWEST: usize = 4;
 /// Most coefficients of B.
 const MOST_GAINS: usize = 60;
+/// Most of them where u is predicted so well that there may be no noise, and how well that is: at high rates a long delay
+/// has more samples than that.
+const MOST_WITHOUT_NOISE: usize = 200;
+const PROMISING: f64 = 1e-3;
 /// Frequencies of the response, rad/s, evenly over their logarithm.
 const BAND_RAD_S: (f64, f64) = (0.5, 20.0);
 const POINTS: usize = 24;
@@ -37,13 +41,21 @@ impl ArxResponse {
     /// # Errors
     /// Those of the regression with the fewest coefficients.
     pub fn of(records: &[Record]) -> Result<Self, IdentError> {
-        regressed(records, false)
+        regressed(records, false, MOST_GAINS)
     }
 
     /// The same where there is hardly any noise, to as many coefficients of B as there may be: u without noise leaves
     /// those of A open, and B is to be as long as the delay. `None` where there is more.
     pub fn without_noise(records: &[Record]) -> Option<Self> {
-        regressed(records, true).ok().filter(|found| found.innovations < NONE)
+        let found = regressed(records, true, MOST_GAINS).ok()?;
+        if found.innovations < NONE {
+            return Some(found);
+        }
+        if gains(records) <= MOST_GAINS || found.innovations > PROMISING {
+            return None;
+        }
+        let found = regressed(records, true, MOST_WITHOUT_NOISE).ok()?;
+        (found.innovations < NONE).then_some(found)
     }
 
     fn of_fit(records: &[Record], fit: &Fit) -> Self {
@@ -61,15 +73,24 @@ impl ArxResponse {
     }
 }
 
+/// Coefficients of B that hold a response.
+fn gains(records: &[Record]) -> usize {
+    (RESPONSE_S / records[0].sample_time().s()).ceil() as usize
+}
+
 /// The regression with half as many coefficients, of A alone or of both, as long as the records do not determine them.
-fn regressed(records: &[Record], of_a_alone: bool) -> Result<ArxResponse, IdentError> {
-    let gains = (RESPONSE_S / records[0].sample_time().s()).ceil() as usize;
+fn regressed(records: &[Record], of_a_alone: bool, most_gains: usize) -> Result<ArxResponse, IdentError> {
     let shortest = records.iter().map(Record::len).min().unwrap_or(0);
     let mut orders = Structure::Arx.operator_orders(1);
     orders.na = POLES.min(shortest / 12).max(2);
-    orders.nb = gains.clamp(4, MOST_GAINS).min(shortest / 8).max(2);
+    orders.nb = gains(records).clamp(4, most_gains).min(shortest / 8).max(2);
     loop {
-        let found = Estimator::new(Structure::Arx, orders).fit(records);
+        // Where there is no noise, what the means took out shows.
+        let estimator = Estimator {
+            level: of_a_alone,
+            ..Estimator::new(Structure::Arx, orders)
+        };
+        let found = estimator.fit(records);
         let has_more = if of_a_alone {
             orders.na > 2
         } else {

@@ -14,8 +14,10 @@ use super::{
     covariances::BAND_RAD_S,
     estimated::{Errors, Estimated, in_form, operator_of},
     instrumental::{Instrumental, InstrumentalFit},
+    joint::with_lines,
     judgement::{Judged, LARGEST_RESPONSE_ERROR, findings},
     line_fit::LineFit,
+    lines::LineData,
     prediction::Prediction,
     prediction_fit::PredictionFit,
     result::{FamilyFit, FreeModel, OperatorInForm, WeighedForm},
@@ -68,7 +70,7 @@ pub(super) struct Chosen<'p, 'a> {
     pub highest_order: usize,
 }
 
-impl Chosen<'_, '_> {
+impl<'a> Chosen<'_, 'a> {
     /// All that is said of the person.
     ///
     /// # Errors
@@ -101,9 +103,16 @@ impl Chosen<'_, '_> {
                 instrumental.as_ref().filter(|found| found.termination.converged()),
                 &others,
             );
-            add_bias(&mut errors, fit, self.lines.fit.as_ref(), separate, (&others, unseen));
         }
-        let mut weighed = vec![in_form(fit, &errors, self.weight, separate)?];
+        let joint = self.joint(fit, self.lines.fit.as_ref(), separate, workspace);
+        if let Some(joint) = &joint {
+            errors = Errors::of(joint, self.run_to_run, workspace);
+        }
+        let found = joint.as_ref().unwrap_or(fit);
+        if noise_free.is_none() {
+            add_bias(&mut errors, found, self.lines.fit.as_ref(), separate, (&others, unseen));
+        }
+        let mut weighed = vec![in_form(found, &errors, self.weight, separate)?];
         for other in &self.beside {
             let form = self.weighed(other, separate, workspace)?;
             if form.operators.first().is_some_and(knows_the_response) {
@@ -113,7 +122,7 @@ impl Chosen<'_, '_> {
         let forms = self.with_weights_of(&mut weighed);
         let mut operators = Vec::with_capacity(separate);
         for record in 0..separate {
-            operators.push(operator_of(fit, &errors, &weighed, record)?);
+            operators.push(operator_of(found, &errors, &weighed, record)?);
         }
         let free_model = match noise_free {
             None => free_model(fit, workspace),
@@ -124,7 +133,7 @@ impl Chosen<'_, '_> {
         let all_parameters: Vec<_> = operators.iter().flat_map(|o| o.parameters.clone()).collect();
         let verdict = Verdict::of(findings(&Judged {
             termination: fit.minimum.termination,
-            delay: (fit.eta()[of_delay], layout.limits()[of_delay]),
+            delay: (found.eta()[of_delay], layout.limits()[of_delay]),
             parameters: &all_parameters,
             prior: &self.prediction.prior,
             residuals,
@@ -145,7 +154,7 @@ impl Chosen<'_, '_> {
                 .and_then(|errors| errors.into_iter().min_by(f64::total_cmp)),
             weighed: &weighed,
         }));
-        let noise = &fit.eta()[layout.operator_elements()..];
+        let noise = &found.eta()[layout.operator_elements()..];
         Ok(FamilyFit {
             form: layout.form,
             neuromuscular: layout.neuromuscular,
@@ -178,6 +187,21 @@ impl Chosen<'_, '_> {
             sample_time: layout.sample_time,
             verdict,
         })
+    }
+
+    /// The fit with the lines beside it, where there are lines, noise, and one operator of all records.
+    fn joint(
+        &self,
+        fit: &PredictionFit<'a>,
+        lines: Option<&LineFit>,
+        separate: usize,
+        workspace: &mut Workspace,
+    ) -> Option<PredictionFit<'a>> {
+        if separate > 1 || self.prediction.noise_free().is_some() {
+            return None;
+        }
+        let data = LineData::new(self.lines.describing?);
+        with_lines(self.prediction, fit, (lines?, &data), workspace)
     }
 
     /// Refined instrumental variables with the recorded excitation, for one operator of all records.
@@ -216,14 +240,16 @@ impl Chosen<'_, '_> {
     }
 
     /// Another form with its errors, made as those of the form in front.
-    fn weighed(&self, of: &Beside<'_>, separate: usize, workspace: &mut Workspace) -> Result<WeighedForm, IdentError> {
-        let mut errors = Errors::of(&of.fit, self.run_to_run, workspace);
+    fn weighed(&self, of: &Beside<'a>, separate: usize, workspace: &mut Workspace) -> Result<WeighedForm, IdentError> {
+        let joint = self.joint(&of.fit, of.lines.as_ref(), separate, workspace);
+        let found = joint.as_ref().unwrap_or(&of.fit);
+        let mut errors = Errors::of(found, self.run_to_run, workspace);
         let others = rivals(self.prediction, &of.fit, self.highest_order, workspace);
         if self.prediction.noise_free().is_none() {
             let unseen = self.prediction.little_noise.is_none();
-            add_bias(&mut errors, &of.fit, of.lines.as_ref(), separate, (&others, unseen));
+            add_bias(&mut errors, found, of.lines.as_ref(), separate, (&others, unseen));
         }
-        in_form(&of.fit, &errors, of.weight, separate)
+        in_form(found, &errors, of.weight, separate)
     }
 }
 

@@ -38,8 +38,17 @@ pub(crate) fn limits(
     form.coordinates(neuromuscular).iter().map(of).collect()
 }
 
+/// How near to each other the points are from which searches start.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Grid {
+    /// For people: the prior holds their neuromuscular system near to what is usual.
+    Usual,
+    /// For a response that is known exactly, of whom it may be.
+    Dense,
+}
+
 /// Values of a coordinate from which searches start.
-pub(super) fn start_values(coordinate: Coordinate, (low, high): (f64, f64)) -> Vec<f64> {
+fn start_values(coordinate: Coordinate, (low, high): (f64, f64), grid: Grid) -> Vec<f64> {
     let values: &[f64] = match coordinate {
         // The gain is solved for.
         Coordinate::Gain => &[1.0],
@@ -48,10 +57,12 @@ pub(super) fn start_values(coordinate: Coordinate, (low, high): (f64, f64)) -> V
         Coordinate::Linear => &[0.5, 1.5],
         Coordinate::Quadratic => &[0.05, 0.4],
         Coordinate::Droop => &[0.1, 0.6],
+        Coordinate::LogOmega if grid == Grid::Dense => &[1.9, 2.4, 2.9],
         Coordinate::LogOmega => &[2.35],
+        Coordinate::LogZeta if grid == Grid::Dense => &[-2.0, -1.2, -0.4],
         Coordinate::LogZeta => &[-1.2],
         Coordinate::Delay => {
-            let steps = 4;
+            let steps = if grid == Grid::Dense { 8 } else { 4 };
             return (0..=steps)
                 .map(|i| low + (high - low) * (i as f64 + 0.5) / (steps as f64 + 1.0))
                 .map(|tau| tau.min(high))
@@ -62,10 +73,10 @@ pub(super) fn start_values(coordinate: Coordinate, (low, high): (f64, f64)) -> V
 }
 
 /// All combinations of the starting values of a form.
-pub(super) fn start_grid(form: Form, neuromuscular: bool, limits: &[(f64, f64)]) -> Vec<Vec<f64>> {
+pub(super) fn start_grid(form: Form, neuromuscular: bool, limits: &[(f64, f64)], density: Grid) -> Vec<Vec<f64>> {
     let mut grid: Vec<Vec<f64>> = vec![Vec::new()];
     for (coordinate, bounds) in form.coordinates(neuromuscular).into_iter().zip(limits) {
-        let values = start_values(coordinate, *bounds);
+        let values = start_values(coordinate, *bounds, density);
         grid = grid
             .into_iter()
             .flat_map(|head| {
@@ -89,7 +100,7 @@ mod tests {
         for form in Form::ALL {
             for neuromuscular in [true, false] {
                 let limits = limits(form, neuromuscular, (0.05, 0.6), SampleTime::HUNDREDTH);
-                let grid = start_grid(form, neuromuscular, &limits);
+                let grid = start_grid(form, neuromuscular, &limits, Grid::Usual);
                 assert!(!grid.is_empty());
                 for start in grid {
                     assert_eq!(start.len(), limits.len());

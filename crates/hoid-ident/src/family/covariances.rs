@@ -23,7 +23,8 @@ use super::{
     prediction_fit::PredictionFit,
 };
 use crate::{
-    grey_box::parametrisation::Parametrisation, linalg::least_squares::solve_symmetric, optimize::Linearisation,
+    criterion::Workspace, grey_box::parametrisation::Parametrisation, linalg::least_squares::solve_symmetric,
+    optimize::Linearisation,
 };
 
 /// Frequencies at which two responses are compared.
@@ -178,7 +179,7 @@ pub(super) fn covariances(fit: &PredictionFit<'_>) -> Option<Covariances> {
     let inverse = inverse(fit)?;
     let model_based: Vec<f64> = inverse.iter().map(|g| g * fit.innovation_variance).collect();
     let scale = fit.innovation_variance * fit.inflation;
-    let clustered = match fit.clusters.kind {
+    let mut clustered: Vec<f64> = match fit.clusters.kind {
         ClusterKind::Runs => {
             // H^-1 P H^-1: the prior is weighed as the inflated data are.
             let mut open = vec![0.0; p * p];
@@ -192,11 +193,36 @@ pub(super) fn covariances(fit: &PredictionFit<'_>) -> Option<Covariances> {
         // H^-1 G H^-1 + H^-1 P H^-1 = H^-1, all of it inflated.
         ClusterKind::Blocks => inverse.iter().map(|g| scale * g).collect(),
     };
+    // H^-1 L H^-1 of lines whose weight is w, L their part of H. The scatter of runs has none of it.
+    let counted = if fit.clusters.kind == ClusterKind::Runs {
+        0.0
+    } else {
+        1.0
+    };
+    let factor = scale * (fit.weight_of_lines - counted);
+    if fit.weight_of_lines > 0.0 {
+        add_lines_part(&mut clustered, factor, fit, &inverse);
+    }
     Some(Covariances {
         clustered,
         model_based,
         besides: vec![0.0; p],
     })
+}
+
+/// Adds `factor H^-1 L H^-1`.
+fn add_lines_part(covariance: &mut [f64], factor: f64, fit: &PredictionFit<'_>, inverse: &[f64]) {
+    let p = fit.parameters();
+    let l = fit.criterion.beside_at(fit.eta(), &mut Workspace::default()).gram;
+    let product = |a: &[f64], b: &[f64]| -> Vec<f64> {
+        let of = |at: usize| (0..p).map(|k| a[at / p * p + k] * b[k * p + at % p]).sum();
+        (0..p * p).map(of).collect()
+    };
+    let part = product(&product(inverse, &l), inverse);
+    covariance
+        .iter_mut()
+        .zip(part)
+        .for_each(|(c, part)| *c += factor * part);
 }
 
 /// The jackknife over clusters.

@@ -7,6 +7,7 @@ use super::{
     arx_response::ArxResponse,
     assembly::{AtLines, Beside, Chosen},
     comparison::{Comparison, Tried},
+    coordinates::Grid,
     intersample::Intersample,
     line_fit::{LineFit, by_simplicity, line_fit},
     lines::LineData,
@@ -89,7 +90,7 @@ impl FamilyEstimator {
         let mut workspace = Workspace::of_thread();
         let mut starts = Vec::new();
         for &form in &forms {
-            starts.push(self.start(form, lines.as_ref(), &response, &prediction)?);
+            starts.push(self.start(form, lines.as_ref(), (&response, Grid::Usual), &prediction)?);
         }
         let noise = match self.with_little_noise(&prediction, &records, &mut starts, &mut workspace)? {
             Some(found) => {
@@ -224,7 +225,10 @@ impl FamilyEstimator {
         let clean = ArxResponse::without_noise(records);
         if let Some(clean) = &clean {
             for (form, coordinates) in &mut from {
-                coordinates.extend(self.start(*form, None, &clean.points, smooth)?.coordinates);
+                coordinates.extend(
+                    self.start(*form, None, (&clean.points, Grid::Dense), smooth)?
+                        .coordinates,
+                );
             }
         }
         let mut search = |prediction: &Prediction<'_>, from: &[Starts]| {
@@ -322,7 +326,7 @@ impl FamilyEstimator {
         &self,
         form: Form,
         lines: Option<&LineData<'_>>,
-        response: &[MeasuredResponse],
+        (response, grid): (&[MeasuredResponse], Grid),
         prediction: &Prediction<'_>,
     ) -> Result<Start, IdentError> {
         let of = |points| {
@@ -346,7 +350,8 @@ impl FamilyEstimator {
             start.lines = Some(fit);
         }
         if !response.is_empty() {
-            start.coordinates.push(of(response).fit(&self.search)?.coordinates);
+            let found = of(response).fit_from_grid(&self.search, grid)?;
+            start.coordinates.push(found.coordinates);
         }
         Ok(start)
     }

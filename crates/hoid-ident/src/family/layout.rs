@@ -134,6 +134,14 @@ impl Parametrisation for FamilyLayout {
         self.sample_time
     }
 
+    fn first_sample_begins(&self) -> f64 {
+        if self.intersample == Intersample::Auto {
+            -0.5
+        } else {
+            0.0
+        }
+    }
+
     fn orders(&self, nk: usize) -> Orders {
         Orders {
             na: 0,

@@ -14,7 +14,7 @@
 use hoid_model::Form;
 
 use super::{
-    coordinates,
+    coordinates::{self, Grid},
     intersample::Intersample,
     prediction::{EQUAL, NONE, Prediction},
 };
@@ -92,15 +92,17 @@ impl LittleNoise {
             .iter()
             .map(|(form, starts)| search.least(*form, starts, workspace));
         let mut ends: Vec<Option<End>> = ends.collect();
-        for _ in 0..ROUNDS {
+        for round in 0..ROUNDS {
             let Some((best, share)) = least_of(&ends).filter(|(_, share)| clean || *share < LITTLE) else {
                 break;
             };
+            // A response without noise is one of a form: where none has been found, not the best of them either.
+            let none_is_found = clean && round > 0 && share >= NONE;
             // Of a rest that is noise nothing is left to be found.
             let beside = (starts[best].0, ends[best].clone()?.coordinates);
             for ((form, _), end) in starts.iter().zip(&mut ends) {
                 let known = end.as_ref().map_or(f64::INFINITY, |end| end.share);
-                if known < NONE || known < WORSE * share {
+                if known < NONE || (known < WORSE * share && !none_is_found) {
                     continue;
                 }
                 let more = search.more_starts(*form, &beside, workspace);
@@ -194,7 +196,7 @@ impl Search<'_, '_> {
         let (prediction, neuromuscular) = (self.prediction, self.neuromuscular);
         let criterion = prediction.criterion((form, neuromuscular), (0, 0));
         let limits = coordinates::limits(form, neuromuscular, prediction.delay_range_s, prediction.sample_time);
-        let mut grid = coordinates::start_grid(form, neuromuscular, &limits);
+        let mut grid = coordinates::start_grid(form, neuromuscular, &limits, Grid::Usual);
         // The last coordinates of all forms are these.
         let tail = 1 + if neuromuscular { 2 } else { 0 };
         let of_other = &beside.1[beside.1.len() - tail..];

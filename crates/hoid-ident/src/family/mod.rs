@@ -39,6 +39,7 @@
 //! | `noise` | autoregressions: starts and orders of the noise model |
 //! | `prediction` | the prediction error fit of one form |
 //! | `prediction_fit` | what its search found |
+//! | `joint` | the prediction error fit with the lines beside it |
 //! | `clusters`, `covariances` | runs or blocks; the covariance by them |
 //! | `jackknife` | covariances from estimates without each part, and from a prior |
 //! | `sensitivity` | what the estimate owes to the choice of a noise model |
@@ -66,6 +67,7 @@ mod estimator;
 mod instrumental;
 mod intersample;
 mod jackknife;
+mod joint;
 mod judgement;
 mod layout;
 mod line_fit;

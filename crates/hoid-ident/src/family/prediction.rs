@@ -247,7 +247,7 @@ impl<'a> Prediction<'a> {
     }
 
     /// Loss, innovation variance, clusters and their inflation at a minimum.
-    fn judged(
+    pub(super) fn judged(
         &self,
         criterion: PhysicalCriterion<'a, FamilyLayout>,
         minimum: Minimum,
@@ -255,7 +255,8 @@ impl<'a> Prediction<'a> {
     ) -> Result<PredictionFit<'a>, IdentError> {
         let (n, states) = (criterion.residuals(), criterion.states());
         let penalty: f64 = criterion.penalty.iter().map(|p| p.at(&minimum.theta)).sum();
-        let mut squares = minimum.at.sum_of_squares - penalty;
+        let beside = criterion.beside_at(&minimum.theta, workspace).sum_of_squares;
+        let mut squares = minimum.at.sum_of_squares - penalty - beside;
         if self.noise_free().is_some() {
             squares = squares.max(self.rounding() * n as f64);
         }
@@ -272,6 +273,7 @@ impl<'a> Prediction<'a> {
             states,
             inflation: 1.0,
             ridge: 0.0,
+            weight_of_lines: 0.0,
             criterion,
             minimum,
             clusters,

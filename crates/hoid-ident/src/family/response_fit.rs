@@ -10,12 +10,18 @@
 //! 2012, chapter 9 (the sample maximum likelihood estimator; the errors of input and output
 //! together are those of their ratio).
 
+use std::borrow::Cow;
+
 use hoid_model::{
     Complex64, FamilyOperator, SampleTime,
     operator_family::{Coordinate, Form},
 };
 
-use super::{coordinates, intersample::Intersample, prior::OperatorPrior};
+use super::{
+    coordinates::{self, Grid},
+    intersample::Intersample,
+    prior::OperatorPrior,
+};
 use crate::{
     IdentError, SearchOptions, Termination,
     criterion::Workspace,
@@ -26,6 +32,8 @@ use crate::{
 
 /// Starts from which the search runs to its end.
 const SEARCHES: usize = 6;
+/// The same for a response that is known exactly, which has more minima that are near to nothing.
+const SEARCHES_OF_EXACT: usize = 30;
 
 /// A response at one frequency, and how well it is known.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -46,7 +54,7 @@ pub(super) struct ResponseCriterion<'p> {
     pub sample_time: SampleTime,
     /// What the error does between its samples.
     pub intersample: Intersample,
-    pub points: &'p [MeasuredResponse],
+    pub points: Cow<'p, [MeasuredResponse]>,
     pub limits: Vec<(f64, f64)>,
     pub penalty: Vec<Penalty>,
 }
@@ -76,7 +84,7 @@ impl<'p> ResponseCriterion<'p> {
             neuromuscular,
             sample_time,
             intersample,
-            points,
+            points: Cow::Borrowed(points),
             limits: coordinates::limits(form, neuromuscular, delay_range_s, sample_time),
             penalty: prior.penalties(form, neuromuscular),
         }
@@ -85,7 +93,7 @@ impl<'p> ResponseCriterion<'p> {
     /// The same with other points.
     pub fn with_points<'q>(&self, points: &'q [MeasuredResponse]) -> ResponseCriterion<'q> {
         ResponseCriterion {
-            points,
+            points: Cow::Borrowed(points),
             form: self.form,
             neuromuscular: self.neuromuscular,
             sample_time: self.sample_time,
@@ -100,13 +108,27 @@ impl<'p> ResponseCriterion<'p> {
     /// # Errors
     /// [`IdentError::NoFiniteLoss`].
     pub fn fit(&self, search: &SearchOptions) -> Result<ResponseMinimum, IdentError> {
-        let mut starts: Vec<(f64, Vec<f64>)> = coordinates::start_grid(self.form, self.neuromuscular, &self.limits)
+        self.fit_from_grid(search, Grid::Usual)
+    }
+
+    /// As [`Self::fit`], from the best points of another grid.
+    ///
+    /// # Errors
+    /// [`IdentError::NoFiniteLoss`].
+    pub fn fit_from_grid(&self, search: &SearchOptions, grid: Grid) -> Result<ResponseMinimum, IdentError> {
+        let searches = if grid == Grid::Dense {
+            SEARCHES_OF_EXACT
+        } else {
+            SEARCHES
+        };
+        let grid = coordinates::start_grid(self.form, self.neuromuscular, &self.limits, grid);
+        let mut starts: Vec<(f64, Vec<f64>)> = grid
             .into_iter()
             .filter_map(|mut start| Some((self.best_gain(&mut start)?, start)))
             .collect();
         starts.sort_by(|a, b| a.0.total_cmp(&b.0));
         let mut best: Option<Minimum> = None;
-        for (_, start) in starts.into_iter().take(SEARCHES) {
+        for (_, start) in starts.into_iter().take(searches) {
             let known = best.as_ref().map(|b| b.at.sum_of_squares);
             if let Some(found) = minimise(self, start, search, None, &mut Workspace::default())
                 && known.is_none_or(|known| found.at.sum_of_squares < known)
@@ -195,7 +217,7 @@ impl<'p> ResponseCriterion<'p> {
         x[0] = 1.0;
         let operator = FamilyOperator::new(self.form, self.neuromuscular, x).ok()?;
         let (mut cross, mut power) = (0.0, 0.0);
-        for point in self.points {
+        for point in self.points.iter() {
             let model = self.sampled(&operator, point.omega_rad_s);
             cross += (model.conj() * point.response).re / point.variance;
             power += model.norm_sqr() / point.variance;
@@ -217,7 +239,7 @@ impl Objective for ResponseCriterion<'_> {
             total.sum_of_squares = f64::NAN;
             return total;
         };
-        for point in self.points {
+        for point in self.points.iter() {
             let hold = self.intersample.response(point.omega_rad_s, self.sample_time);
             let model = operator.response_and_gradient(point.omega_rad_s);
             let weight = 2.0 / point.variance;

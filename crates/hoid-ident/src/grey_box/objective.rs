@@ -5,6 +5,8 @@
 //! `psi_eta' psi_eta = J' psi' psi J`, both summed over the records. nk moves with tau_e, the first
 //! residual that counts does not: the loss is a function of eta alone.
 
+use std::{fmt, sync::Arc};
+
 use crate::{
     IdentError, InitialState,
     criterion::{Criterion, Data, Workspace},
@@ -28,6 +30,38 @@ pub(crate) struct PhysicalCriterion<'a, P> {
     pub limits: Vec<(f64, f64)>,
     /// What is known before the data, in units of the residuals; none where there is nothing.
     pub penalty: Vec<Penalty>,
+    /// What else was measured of the operator that all records share.
+    pub beside: Option<Beside<'a>>,
+}
+
+/// Another criterion of the first elements of eta, added to the sum of squares with a weight.
+#[derive(Clone)]
+pub(crate) struct Beside<'a> {
+    pub criterion: Arc<dyn Objective + Send + Sync + 'a>,
+    /// How many elements of eta it is of.
+    pub elements: usize,
+    pub weight: f64,
+}
+
+impl fmt::Debug for Beside<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "Beside {{ weight: {} }}", self.weight)
+    }
+}
+
+impl Beside<'_> {
+    /// What it adds at eta to a linearisation of as many parameters.
+    pub fn add_to(&self, eta: &[f64], total: &mut Linearisation, workspace: &mut Workspace) {
+        let (p, q) = (eta.len(), self.elements);
+        let own = self.criterion.linearise(&eta[..q], workspace);
+        total.sum_of_squares += self.weight * own.sum_of_squares;
+        for i in 0..q {
+            total.descent[i] += self.weight * own.descent[i];
+            for j in 0..q {
+                total.gram[i * p + j] += self.weight * own.gram[i * q + j];
+            }
+        }
+    }
 }
 
 /// `v (g(eta_i) - mean)^2/s^2`, added to the sum of squares: a normal prior of g with the standard
@@ -100,7 +134,17 @@ impl<'a, P: Parametrisation> PhysicalCriterion<'a, P> {
             samples: None,
             limits,
             penalty: Vec::new(),
+            beside: None,
         }
+    }
+
+    /// What was measured besides, at eta: its part of the criterion; zeros where there is nothing.
+    pub fn beside_at(&self, eta: &[f64], workspace: &mut Workspace) -> Linearisation {
+        let mut own = Linearisation::empty(eta.len());
+        if let Some(beside) = &self.beside {
+            beside.add_to(eta, &mut own, workspace);
+        }
+        own
     }
 
     pub fn residuals(&self) -> usize {
@@ -168,9 +212,12 @@ impl<'a, P: Parametrisation> PhysicalCriterion<'a, P> {
     /// Moves from sample to sample as long as the loss falls.
     fn search_by_samples(&self, minimum: Minimum, options: &SearchOptions, workspace: &mut Workspace) -> Minimum {
         let (delays, ts) = (self.layout.delays(), self.layout.sample_time().s());
+        let begin = self.layout.first_sample_begins();
+        let place = |delay_s: f64| delay_s / ts - begin;
+        let border = |n: usize| (n as f64 + begin) * ts;
         let mut samples: Vec<usize> = delays
             .iter()
-            .map(|&i| (minimum.theta[i] / ts).floor().max(0.0) as usize)
+            .map(|&i| place(minimum.theta[i]).floor().max(0.0) as usize)
             .collect();
         let inside = |samples: &[usize], start: &Minimum, workspace: &mut Workspace| {
             let mut within = Self {
@@ -180,8 +227,7 @@ impl<'a, P: Parametrisation> PhysicalCriterion<'a, P> {
             let mut eta = start.theta.clone();
             for (&i, &sample) in delays.iter().zip(samples) {
                 let (low, high) = self.limits[i];
-                let border = |n: usize| (n as f64 * ts).clamp(low, high);
-                within.limits[i] = (border(sample), border(sample + 1));
+                within.limits[i] = (border(sample).clamp(low, high), border(sample + 1).clamp(low, high));
                 eta[i] = eta[i].clamp(within.limits[i].0, within.limits[i].1);
             }
             minimise(&within, eta, options, None, workspace)
@@ -191,7 +237,7 @@ impl<'a, P: Parametrisation> PhysicalCriterion<'a, P> {
         for _ in 0..100 {
             let mut moved = false;
             for (k, &i) in delays.iter().enumerate() {
-                let position = best.theta[i] / ts;
+                let position = place(best.theta[i]);
                 let neighbours = [
                     (position <= samples[k] as f64 + NEAR_BORDER)
                         .then(|| samples[k].checked_sub(1))
@@ -202,7 +248,7 @@ impl<'a, P: Parametrisation> PhysicalCriterion<'a, P> {
                     let mut there = samples.clone();
                     there[k] = neighbour;
                     let (low, high) = self.limits[i];
-                    if (neighbour + 1) as f64 * ts <= low || neighbour as f64 * ts >= high {
+                    if border(neighbour + 1) <= low || border(neighbour) >= high {
                         continue;
                     }
                     if let Some(found) = inside(&there, &best, workspace)
@@ -276,6 +322,9 @@ impl<P: Parametrisation> Objective for PhysicalCriterion<'_, P> {
         }
         for penalty in &self.penalty {
             penalty.add_to(eta, &mut total);
+        }
+        if let Some(beside) = &self.beside {
+            beside.add_to(eta, &mut total, workspace);
         }
         total
     }

@@ -47,6 +47,10 @@ pub(crate) trait Parametrisation: Clone {
     fn delay_of(&self, record: usize) -> usize;
     /// Time between two samples.
     fn sample_time(&self) -> SampleTime;
+    /// Delay at which the sample 0 begins, in samples: the model of a smooth error acts half a sample later.
+    fn first_sample_begins(&self) -> f64 {
+        0.0
+    }
     /// Orders of the polynomials at this delay of the first coefficient of B.
     fn orders(&self, nk: usize) -> Orders;
     /// Places in eta of the polynomials C that must be stable and have no limits of their own.

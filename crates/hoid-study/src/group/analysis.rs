@@ -125,12 +125,14 @@ pub(super) fn analyse_together(manifest: &Manifest, base: &Path, cell: &Cell<'_>
     if let Some(first) = records.first() {
         let tau_s = people[0].parameter("tau_e").map(|tau| tau.value);
         let nk = tau_s.map(|tau_s| run_orders::nk_of(tau_s, first.sample_time().s(), late_samples));
-        for structure in [Structure::Arx, Structure::BoxJenkins] {
+        // Their names were checked with the manifest.
+        for structure in analysis.settings.structures().unwrap_or_default() {
             if let Err(reason) = run_orders::choose(analysis.settings, &records, structure, nk, &mut analysis.rows) {
                 analysis.rows.failed(None, label_of(structure), &reason);
             }
         }
-        if cell.changes.is_none() && records.len() > 1 {
+        let fitted = analysis.settings.polynomials().unwrap_or_default();
+        if cell.changes.is_none() && records.len() > 1 && fitted.contains(&Structure::BoxJenkins) {
             analysis.box_jenkins_together(&records);
         }
     }
@@ -164,7 +166,8 @@ impl<'a> RunAnalysis<'a> {
         for (name, value) in of_record.into_iter().chain(change) {
             self.rows.row(Some(windows[2]), "record", name, Estimate::fixed(value));
         }
-        for structure in [Structure::Arx, Structure::BoxJenkins] {
+        // Names of structures and recursions were checked with the manifest.
+        for structure in self.settings.polynomials().unwrap_or_default() {
             let label = label_of(structure);
             let orders = match from_cell.orders(structure) {
                 Ok(orders) => *orders,
@@ -187,7 +190,6 @@ impl<'a> RunAnalysis<'a> {
                 }
             }
         }
-        // Their names were checked with the manifest.
         for method in self.settings.recursions().unwrap_or_default() {
             self.track(run, &windows, &method, from_cell);
         }

@@ -1,7 +1,7 @@
 //! What is done with each run: the keys of `[analysis]`.
 
 use hoid_ident::family::FamilyEstimator;
-use hoid_model::{Form, operator_family::Coordinate};
+use hoid_model::{Form, Structure, operator_family::Coordinate};
 use hoid_track::Method;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -22,6 +22,10 @@ pub struct AnalysisSettings {
     /// Recursions by name, as in `hoid track`. Default: adaptive, rls, rpem.
     #[schemars(extend("items" = serde_json::json!({ "enum": method_names() })))]
     pub methods: Vec<String>,
+    /// Polynomial models that are fitted beside the operator, in tables and figures: arx, bj, both or
+    /// none.
+    #[schemars(extend("items" = serde_json::json!({ "enum": POLYNOMIALS.map(Structure::name) })))]
+    pub polynomials: Vec<String>,
     /// Samples from one kept point of a trace to the next.
     pub trace_every: usize,
     /// Whether the grey box is fitted too.
@@ -43,6 +47,9 @@ pub struct AnalysisSettings {
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub response_at_rad_s: Vec<f64>,
 }
+
+/// The structures that a group may fit.
+const POLYNOMIALS: [Structure; 2] = [Structure::Arx, Structure::BoxJenkins];
 
 /// The form that held-out runs choose.
 const AUTO: &str = "auto";
@@ -66,6 +73,7 @@ impl Default for AnalysisSettings {
             nd: (1, 1),
             delay_s: (0.05, 0.6),
             methods: ["adaptive", "rls", "rpem"].map(str::to_owned).to_vec(),
+            polynomials: POLYNOMIALS.map(|structure| structure.name().to_owned()).to_vec(),
             trace_every: 16,
             grey_box: false,
             form: AUTO.to_owned(),
@@ -88,6 +96,36 @@ impl AnalysisSettings {
                 .map_err(|error| format!("analysis.methods: {error}"))
         };
         self.methods.iter().map(of).collect()
+    }
+
+    /// The polynomial models that are fitted, in their usual order.
+    ///
+    /// # Errors
+    /// A name of another structure, or of none.
+    pub(super) fn polynomials(&self) -> Result<Vec<Structure>, String> {
+        let names = POLYNOMIALS.map(Structure::name);
+        if let Some(name) = self.polynomials.iter().find(|name| !names.contains(&name.as_str())) {
+            let expected = names.join(", ");
+            return Err(format!(
+                "analysis.polynomials has {name:?}, expected some of {expected}"
+            ));
+        }
+        let asked = |structure: &Structure| self.polynomials.iter().any(|name| name == structure.name());
+        Ok(POLYNOMIALS.into_iter().filter(asked).collect())
+    }
+
+    /// The structures whose orders are needed: of the polynomial models, and of the recursions that start from one.
+    ///
+    /// # Errors
+    /// As [`Self::polynomials`] and [`Self::recursions`].
+    pub(super) fn structures(&self) -> Result<Vec<Structure>, String> {
+        let (fitted, recursions) = (self.polynomials()?, self.recursions()?);
+        let started = |structure: Structure| {
+            let mut from_fits = recursions.iter().filter(|method| !method.starts_itself());
+            from_fits.any(|method| method.usual_structure() == structure)
+        };
+        let needed = |structure: &Structure| fitted.contains(structure) || started(*structure);
+        Ok(POLYNOMIALS.into_iter().filter(needed).collect())
     }
 
     /// How the family is fitted, the form left to the data or given.
@@ -113,7 +151,7 @@ impl AnalysisSettings {
 
     /// Why the settings have no meaning.
     pub(super) fn check(&self) -> Result<(), String> {
-        self.recursions()?;
+        self.structures()?;
         self.family()?;
         if self.nd.0 == 0 || self.nd.0 > self.nd.1 || self.nd.1 > 20 {
             return Err(format!(

@@ -1,0 +1,221 @@
+//! The prediction error fit with the lines of the excitation as measurements of the response beside it.
+//!
+//! In a closed loop the prediction error fit is biased by as much as its noise model is wrong; the fit at the lines is
+//! not, and has larger errors. With H_P and H_L their responses, V_P and V_L the variances of these, the difference
+//! `d = (H_L - H_P)/H_P` has the variance `V_L - V_P` where nothing is wrong, for what is efficient is not correlated with
+//! it (J. A. Hausman, *Econometrica* 46 (1978) 1251-1271). If a bias of variance `tau^2` is in it besides, the part of d to
+//! go by is the one that leaves the least mean square,
+//!
+//! `s = tau^2/(tau^2 + V_L - V_P)`, `tau^2 = max(0, D - (V_L - V_P))`, so that `s = max(0, 1 - 1/q)`,
+//! `q = mean of |d|^2/(V_L - V_P)`
+//!
+//! over the band of manual control (E. J. Green and W. E. Strawderman, *J. American Statistical Association* 86 (1991)
+//! 1001-1006: an unbiased estimate that shrinks towards a biased one by as much as they agree).
+//!
+//! To go by a part of the difference of coordinates will not do: a gain, a lead and a lag make up for each other along
+//! a curve. So the lines become a part of the criterion,
+//!
+//! `sum eps^2 + kappa sigma^2 w chi^2`, `w = s/(1 - s) V_L/V_P`:
+//!
+//! where one coordinate is left, its minimum is at s of the way. What the lines do not tell is left to the samples.
+
+use std::{borrow::Cow, sync::Arc};
+
+use hoid_numerics::statistics::mean;
+
+use super::{
+    covariances::{BAND_RAD_S, covariances},
+    line_fit::LineFit,
+    lines::LineData,
+    prediction::Prediction,
+    prediction_fit::PredictionFit,
+    prior::OperatorPrior,
+    response_fit::{MeasuredResponse, ResponseCriterion},
+};
+use crate::{
+    criterion::Workspace,
+    grey_box::{objective::Beside, parametrisation::Parametrisation},
+};
+
+/// Part of V_L that `V_L - V_P` is at least: both are estimates.
+const LEAST_DIFFERENCE: f64 = 0.25;
+/// Runs from which on their scatter tells the variances of the lines: what one run differs by may be chance.
+const FEWEST_RUNS: usize = 3;
+/// Largest part of the way to the lines.
+const LARGEST_SHARE: f64 = 0.9;
+
+/// The fit with the lines beside it; `None` where both agree, or it has no end.
+pub(super) fn with_lines<'a>(
+    prediction: &Prediction<'a>,
+    fit: &PredictionFit<'a>,
+    (lines, data): (&LineFit, &LineData<'_>),
+    workspace: &mut Workspace,
+) -> Option<PredictionFit<'a>> {
+    if data.runs() < FEWEST_RUNS {
+        return None;
+    }
+    let layout = fit.layout();
+    // Lines that no operator of the form passes through are off by more than their variances.
+    let excess = lines.reduced_chi_squared().unwrap_or(1.0).max(1.0);
+    let weight = weight(fit, lines, excess)?;
+    let points: Vec<MeasuredResponse> = (data.points.iter())
+        .map(|point| MeasuredResponse {
+            variance: point.variance * excess,
+            ..*point
+        })
+        .collect();
+    let measured = ResponseCriterion {
+        points: Cow::Owned(points),
+        ..ResponseCriterion::new(
+            layout.form,
+            layout.neuromuscular,
+            &[],
+            &OperatorPrior::none(),
+            prediction.delay_range_s,
+            (layout.sample_time, layout.intersample),
+        )
+    };
+    let mut criterion = fit.criterion.clone();
+    criterion.beside = Some(Beside {
+        criterion: Arc::new(measured),
+        elements: layout.operator_elements(),
+        weight: weight * fit.innovation_variance * fit.inflation,
+    });
+    let minimum = criterion.search(fit.eta().to_vec(), &prediction.search, None, workspace)?;
+    let mut found = prediction.judged(criterion, minimum, workspace).ok()?;
+    (found.inflation, found.weight_of_lines) = (fit.inflation, weight);
+    Some(found)
+}
+
+/// w; `None` where it is zero, or a variance is not known.
+fn weight(fit: &PredictionFit<'_>, lines: &LineFit, excess: f64) -> Option<f64> {
+    let layout = fit.layout();
+    let (p, places) = (fit.parameters(), &layout.positions(0)[..layout.coordinates()]);
+    let operator = layout.operator(fit.eta(), 0).ok()?;
+    let clustered = covariances(fit)?.clustered;
+    let own: Vec<f64> = (places.iter())
+        .flat_map(|&i| places.iter().map(move |&j| i * p + j))
+        .map(|at| clustered[at])
+        .collect();
+    let by_lines = lines.by_lines.as_ref()?;
+    let variance = |of: &hoid_model::FamilyOperator, covariance: &[f64], omega: f64| {
+        let [[gain, _], [_, phase]] = of.response_and_gradient(omega).relative_covariance(covariance);
+        gain + phase
+    };
+    let (mut q, mut of_lines, mut of_prediction) = (Vec::new(), Vec::new(), Vec::new());
+    for omega in BAND_RAD_S {
+        let (here, there) = (operator.response(omega), lines.operator.response(omega));
+        let v_l = excess * variance(&lines.operator, by_lines, omega);
+        let v_p = variance(&operator, &own, omega);
+        q.push(((there - here) / here).norm_sqr() / (v_l - v_p).max(LEAST_DIFFERENCE * v_l));
+        of_lines.push(v_l);
+        of_prediction.push(v_p);
+    }
+    let share = (1.0 - 1.0 / mean(&q)).min(LARGEST_SHARE);
+    let weight = share / (1.0 - share) * mean(&of_lines) / mean(&of_prediction);
+    (weight.is_finite() && weight > 0.0).then_some(weight)
+}
+
+#[cfg(test)]
+mod tests {
+    use hoid_model::{
+        Detrend, FamilyOperator, Form, Record,
+        scenario::{Condition, Scenario},
+    };
+    use hoid_sim::{RunSeed, Simulator};
+
+    use super::*;
+    use crate::{
+        family::{FamilyEstimator, Intersample, layout::FamilyLayout},
+        grey_box::objective::PhysicalCriterion,
+        optimize::Objective,
+    };
+
+    const TRUTH: [f64; 5] = [0.09, 0.4, 2.420_368, -1.049_822, 0.28];
+
+    fn runs(n: u64) -> Vec<Record> {
+        let simulator = Simulator::new(&Scenario::condition(Condition::C1)).unwrap();
+        let run = |replication| {
+            let seed = RunSeed {
+                seed: 11,
+                replication,
+                ..RunSeed::default()
+            };
+            simulator.run(seed, false).unwrap()
+        };
+        (0..n).map(run).collect()
+    }
+
+    #[test]
+    fn the_lines_take_away_what_a_wrong_noise_model_adds() {
+        let truth = FamilyOperator::new(Form::Lead, true, &TRUTH).unwrap();
+        // The remnant for white: biased in the loop.
+        let fitted = |excitation: Option<&str>, nd: usize| {
+            let estimator = FamilyEstimator {
+                forms: vec![Form::Lead],
+                excitation: excitation.map(str::to_owned),
+                nd: nd..=nd,
+                prior: OperatorPrior::none(),
+                ..FamilyEstimator::default()
+            };
+            let fit = estimator.fit(&runs(4)).unwrap();
+            let found = &fit.operator(0).operator;
+            let off = BAND_RAD_S.map(|omega| (found.response(omega) / truth.response(omega) - 1.0).norm());
+            off.into_iter().fold(0.0, f64::max)
+        };
+        let (biased, with_lines) = (fitted(None, 0), fitted(Some("f_t"), 0));
+        assert!(with_lines < 0.7 * biased, "{with_lines} {biased}");
+        // With the right noise there is nothing to take away.
+        let (alone, with_lines) = (fitted(None, 6), fitted(Some("f_t"), 6));
+        assert!(with_lines < 1.3 * alone + 0.01, "{with_lines} {alone}");
+    }
+
+    #[test]
+    fn derivatives_agree_with_finite_differences() {
+        let record = runs(1).remove(0).detrended(Detrend::Mean);
+        let truth = FamilyOperator::new(Form::Lead, true, &TRUTH).unwrap();
+        let ts = record.sample_time();
+        let points = [0.8, 2.0, 5.0, 12.0].map(|omega_rad_s| MeasuredResponse {
+            omega_rad_s,
+            response: truth.response(omega_rad_s) * 1.1,
+            variance: 1e-4,
+        });
+        let limits = [(-10.0, 10.0); 5];
+        let layout = FamilyLayout::new((Form::Lead, true), (0, 2), 1, &[], &limits, (ts, Intersample::Auto));
+        let data = crate::criterion::Data::of(std::slice::from_ref(&record));
+        let mut criterion = PhysicalCriterion::new(layout, data, crate::InitialState::Estimate, 40);
+        let measured = ResponseCriterion::new(
+            Form::Lead,
+            true,
+            &points,
+            &OperatorPrior::none(),
+            (0.0, 1.0),
+            (ts, Intersample::Auto),
+        );
+        criterion.beside = Some(Beside {
+            criterion: Arc::new(measured),
+            elements: 5,
+            weight: 0.3,
+        });
+        let eta = [&TRUTH[..4], &[0.2837, -0.9, 0.1]].concat();
+        let mut workspace = Workspace::default();
+        let at = criterion.linearise(&eta, &mut workspace);
+        let beside = criterion.beside_at(&eta, &mut workspace);
+        assert!(beside.sum_of_squares > 0.0 && beside.sum_of_squares < at.sum_of_squares);
+        assert_eq!((beside.descent[5], beside.descent[6]), (0.0, 0.0));
+        for i in 0..eta.len() {
+            let mut value = |by: f64| {
+                let mut moved = eta.clone();
+                moved[i] += by;
+                criterion.linearise(&moved, &mut workspace).sum_of_squares
+            };
+            let difference = -(value(1e-6) - value(-1e-6)) / 4e-6;
+            let size = (at.gram[i * eta.len() + i] * at.sum_of_squares).sqrt();
+            assert!(
+                (at.descent[i] - difference).abs() < 1e-5 * size,
+                "{i}: {} {difference}",
+                at.descent[i]
+            );
+        }
+    }
+}
