@@ -14,7 +14,7 @@
 //! | `cargo xtask miri [ARGUMENT...]` | the boundary to C under Miri, arguments for its tests (module `miri`) |
 //! | `cargo xtask places [--dry or --dev]` | one run through every place in which hoid runs, as the table of the page "In your simulator" (module `places`) |
 //! | `cargo xtask bench [OPTION...]` | the tasks of the page "Speed beside others" beside the peers that are installed, or how cost grows (module `bench`) |
-//! | `cargo xtask slow NAME [ARGUMENT...]` | a study that takes too long for a test: `people-coverage`, `faults`, `faults-clean`, `tracker-faults`, `mutations`, `kills`, `latency`, `lab`, `lab-hour`, `lab-real`, `challenge`, `challenge-people` |
+//! | `cargo xtask slow NAME [ARGUMENT...]` | a study that takes too long for a test: `people-coverage`, `faults`, `faults-clean`, `tracker-faults`, `mutations`, `bombs`, `hostile`, `kills`, `full-disks`, `latency`, `lab`, `lab-hour`, `lab-real`, `challenge`, `challenge-people` |
 //!
 //! Little but the standard library: a chore must start at once on a fresh machine.
 #![allow(clippy::print_stdout, clippy::print_stderr)]
@@ -130,7 +130,7 @@ const fn slow_of(name: &'static str, package: &'static str, example: &'static st
     }
 }
 
-const SLOW: [Slow; 12] = [
+const SLOW: [Slow; 15] = [
     slow_of("people-coverage", "hoid", "people_coverage"),
     Slow {
         program: Some("hoid-cli"),
@@ -144,9 +144,18 @@ const SLOW: [Slow; 12] = [
         profile: "dev",
         ..slow_of("mutations", "hoid-io", "mutations")
     },
+    slow_of("bombs", "hoid-io", "bombs"),
+    Slow {
+        profile: "dev",
+        ..slow_of("hostile", "hoid-lab", "hostile")
+    },
     Slow {
         program: Some("hoid-cli"),
         ..slow_of("kills", "hoid-cli", "kills")
+    },
+    Slow {
+        program: Some("hoid-cli"),
+        ..slow_of("full-disks", "hoid-cli", "full_disks")
     },
     Slow {
         program: Some("hoid-cli"),

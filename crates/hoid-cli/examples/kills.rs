@@ -10,75 +10,22 @@
 
 #[path = "../tests/common/draw.rs"]
 mod draw;
+#[path = "../tests/common/interrupted.rs"]
+mod interrupted;
 
 use std::{
-    collections::BTreeMap,
     fs,
     path::{Path, PathBuf},
-    process::{Child, Command, ExitCode, Stdio},
+    process::{Child, ExitCode},
     thread,
     time::{Duration, Instant},
 };
 
 use draw::Draw;
+use interrupted::{Bench, GROUP, REPRODUCE, STUDY, beside_this, compare, files};
 
 /// Kills of one run before it is let to its end.
 const IN_A_ROW: usize = 5;
-
-const PLAN: &str = r#"
-name = "short"
-seed = 3
-replications = 12
-block = 1
-
-[[scenarios]]
-condition = ["C1", "C2"]
-remnant.noise_level = 0.1
-
-[[estimators]]
-name = "BJ"
-method = "fit"
-structure = "bj"
-orders.nd = [1]
-"#;
-
-/// What is killed: its name, its arguments before `--out`, those behind, and whether its blocks stand
-/// in `parts/` of the directory itself.
-struct Work {
-    name: &'static str,
-    arguments: &'static [&'static str],
-    resume: &'static [&'static str],
-    has_parts: bool,
-}
-
-const WORKS: [Work; 3] = [
-    Work {
-        name: "study",
-        arguments: &["study", "run", "plan.toml", "--jobs", "1"],
-        resume: &["--resume"],
-        has_parts: true,
-    },
-    Work {
-        name: "group",
-        arguments: &["group", "people", "--jobs", "1"],
-        resume: &["--resume"],
-        has_parts: true,
-    },
-    Work {
-        name: "reproduce",
-        arguments: &[
-            "reproduce",
-            "--only",
-            "table-2,fig-3,A.1",
-            "--replications",
-            "4",
-            "--jobs",
-            "1",
-        ],
-        resume: &[],
-        has_parts: false,
-    },
-];
 
 fn main() -> ExitCode {
     let (mut kills, mut damaged, mut seed, mut program, mut only) = (200, 50, 1, beside_this(), None);
@@ -95,14 +42,10 @@ fn main() -> ExitCode {
         }
     }
     let directory = tempfile::tempdir().unwrap();
-    let bench = Bench {
-        program,
-        at: directory.path().to_owned(),
-    };
-    bench.prepare();
+    let bench = Bench::new(program, directory.path());
     let mut draw = Draw(seed);
     let mut failures = Vec::new();
-    for (k, work) in WORKS.iter().enumerate() {
+    for (k, work) in [STUDY, GROUP, REPRODUCE].iter().enumerate() {
         if only.as_ref().is_some_and(|name| name != work.name) {
             continue;
         }
@@ -130,12 +73,11 @@ fn main() -> ExitCode {
             let begun = Instant::now();
             bench.whole(work, &name);
             took = took.max(begun.elapsed());
-            compare(
+            failures.extend(compare(
                 &expected,
                 &bench.place(work, &name),
                 &format!("{} {name}", work.name),
-                &mut failures,
-            );
+            ));
             fs::remove_dir_all(bench.place(work, &name)).unwrap();
         }
         let mut hit = 0;
@@ -153,7 +95,7 @@ fn main() -> ExitCode {
             bench.whole(work, &name);
             took = took.max(begun.elapsed());
             let told = format!("{} {name} ({})", work.name, what.unwrap_or("no block yet"));
-            compare(&expected, &bench.place(work, &name), &told, &mut failures);
+            failures.extend(compare(&expected, &bench.place(work, &name), &told));
             fs::remove_dir_all(bench.place(work, &name)).unwrap();
         }
         println!(
@@ -168,48 +110,6 @@ fn main() -> ExitCode {
         ExitCode::SUCCESS
     } else {
         ExitCode::FAILURE
-    }
-}
-
-/// The program, in a directory.
-struct Bench {
-    program: PathBuf,
-    at: PathBuf,
-}
-
-impl Bench {
-    /// The plan, and the recordings of a group.
-    fn prepare(&self) {
-        fs::write(self.at.join("plan.toml"), PLAN).unwrap();
-        let mut simulate = Command::new(&self.program);
-        simulate.args(["simulate-group", "--subjects", "2", "--conditions", "C1", "--runs", "1"]);
-        simulate.args(["--noise-level", "0.05", "--out", "people"]);
-        let done = simulate.current_dir(&self.at).stdout(Stdio::null()).status().unwrap();
-        assert!(done.success(), "simulate-group: {done}");
-    }
-
-    fn place(&self, work: &Work, name: &str) -> PathBuf {
-        self.at.join(format!("{}-{name}", work.name))
-    }
-
-    fn start(&self, work: &Work, name: &str) -> Child {
-        let mut command = Command::new(&self.program);
-        command
-            .args(work.arguments)
-            .args(work.resume)
-            .arg("--out")
-            .arg(self.place(work, name));
-        command
-            .current_dir(&self.at)
-            .stdout(Stdio::null())
-            .stderr(Stdio::null());
-        command.spawn().unwrap()
-    }
-
-    /// Runs to the end.
-    fn whole(&self, work: &Work, name: &str) {
-        let status = self.start(work, name).wait().unwrap();
-        assert!(status.success(), "{} {name}: {status}", work.name);
     }
 }
 
@@ -255,48 +155,4 @@ fn damage(parts: &Path, draw: &mut Draw) -> Option<&'static str> {
     };
     fs::write(path, bytes).unwrap();
     Some(what)
-}
-
-/// All files below a directory, by their paths. The page of a reproduction says how long its studies
-/// took, which is the one thing that differs.
-fn files(directory: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
-    let mut found = BTreeMap::new();
-    let mut open = vec![directory.to_owned()];
-    while let Some(folder) = open.pop() {
-        for entry in fs::read_dir(&folder).unwrap() {
-            let path = entry.unwrap().path();
-            if path.is_dir() {
-                open.push(path);
-                continue;
-            }
-            let mut bytes = fs::read(&path).unwrap();
-            if path.ends_with("index.html") {
-                let text = String::from_utf8(bytes).unwrap();
-                let timed = |line: &&str| !line.starts_with("<tr><th>") || !line.contains("studies/");
-                bytes = text.lines().filter(timed).collect::<Vec<_>>().join("\n").into_bytes();
-            }
-            found.insert(path.strip_prefix(directory).unwrap().to_owned(), bytes);
-        }
-    }
-    found
-}
-
-fn compare(expected: &BTreeMap<PathBuf, Vec<u8>>, directory: &Path, what: &str, failures: &mut Vec<String>) {
-    let found = files(directory);
-    for path in expected.keys().chain(found.keys()) {
-        match (expected.get(path), found.get(path)) {
-            (Some(a), Some(b)) if a == b => {}
-            (Some(_), Some(_)) => failures.push(format!("{what}: {} differs", path.display())),
-            (Some(_), None) => failures.push(format!("{what}: {} is missing", path.display())),
-            _ => failures.push(format!("{what}: {} is left over", path.display())),
-        }
-    }
-}
-
-/// The program that is built beside this example.
-fn beside_this() -> PathBuf {
-    let mut path = std::env::current_exe().unwrap();
-    path.pop();
-    path.pop();
-    path.join(format!("hoid{}", std::env::consts::EXE_SUFFIX))
 }

@@ -23,7 +23,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use mutations::{Case, case, originals::originals, readers};
+use mutations::{Case, case, originals::originals, readers, spent::Spent};
 
 /// That of the page; the tests have another.
 const SEED: u64 = 2026;
@@ -256,30 +256,6 @@ fn part(task: &Task, place: &Path, first: u64) {
 fn failed(task: &Task, number: u64, case: &Case, what: &str) {
     println!("case {number} ({}, .{}): {what}", case.name, case.extension);
     keep(task, number);
-}
-
-/// A time on the processor where the system tells it, else of the clock.
-struct Spent {
-    on_processor: Option<Duration>,
-    by_clock: Instant,
-}
-
-impl Spent {
-    fn now() -> Self {
-        let text = fs::read_to_string("/proc/self/schedstat").ok();
-        let nanoseconds = text.and_then(|text| text.split(' ').next()?.parse().ok());
-        Self {
-            on_processor: nanoseconds.map(Duration::from_nanos),
-            by_clock: Instant::now(),
-        }
-    }
-
-    fn elapsed(&self) -> Duration {
-        match (self.on_processor, Self::now().on_processor) {
-            (Some(then), Some(now)) => now.saturating_sub(then),
-            _ => self.by_clock.elapsed(),
-        }
-    }
 }
 
 /// Most of the address space that this process had, where the system says so.

@@ -6,7 +6,7 @@ use std::io::{self, Read as _};
 use std::path::Path;
 
 use crate::IoError;
-use crate::formats::longest_settings;
+use crate::formats::Settings;
 
 /// The text of a file.
 ///
@@ -32,16 +32,21 @@ pub fn read_settings(path: &Path) -> Result<String, IoError> {
 
 /// As [`read_settings`], with what the system would say.
 pub(crate) fn settings_text(path: &Path) -> io::Result<String> {
-    let longest = longest_settings();
+    let is_json = path
+        .extension()
+        .is_some_and(|ending| ending.eq_ignore_ascii_case("json"));
+    let kind = if is_json { Settings::Json } else { Settings::Toml };
+    let longest = kind.longest();
     let mut text = String::new();
     fs::File::open(path)?.take(longest + 1).read_to_string(&mut text)?;
     if text.len() as u64 <= longest {
         return Ok(text);
     }
     Err(io::Error::other(format!(
-        "more than {} MB of settings; where it is meant to be so long, set HOID_MAX_UNPACKED_MB in the environment to 32 times \
+        "more than {} MB of settings; where it is meant to be so long, set HOID_MAX_UNPACKED_MB in the environment to {} times \
          its MB",
-        longest >> 20
+        longest >> 20,
+        kind.share()
     )))
 }
 

@@ -335,7 +335,8 @@ impl Condition {
         Ok(())
     }
 
-    fn check(&self) -> Result<(), LabError> {
+    /// Checks that it can be run, and what its numbers may be.
+    pub(crate) fn check(&self) -> Result<(), LabError> {
         let wrong = |reason: String| Err(LabError::Message(reason));
         let name = &self.name;
         if name.is_empty() || name.len() > 40 || !name.bytes().all(|b| b.is_ascii_alphanumeric()) {
@@ -366,7 +367,7 @@ impl Condition {
         }
         let course = self.course()?;
         let (run_in, measured) = course.times_s();
-        if run_in + measured > LONGEST_S {
+        if !(0.0..=LONGEST_S).contains(&(run_in + measured)) {
             return wrong(format!(
                 "a run lasts {} s, expected at most {LONGEST_S}",
                 run_in + measured

@@ -90,6 +90,8 @@ struct Current {
     /// A run that was sent and has not begun.
     ready: Option<Ready>,
     run: Option<Running>,
+    /// The run that ended last: its page may not have heard of it yet, and go on for a moment.
+    over: Option<usize>,
     reporting: bool,
     pages: Pages,
     calibration: Option<Calibration>,
@@ -220,40 +222,14 @@ impl Lab {
                 "This window looks on; the session runs in another one.".to_owned(),
             ));
         }
-        match message {
-            FromPage::Hello { .. } => {}
-            FromPage::Consent { subject, agreed, cc0 } => shared.consent(&mut state, &subject, agreed, cc0)?,
-            FromPage::Resume { session } => shared.resume(&mut state, &session)?,
-            FromPage::Next {} => return shared.send_run(&mut state, id),
-            FromPage::Batch { number, batch } => return shared.take(&mut state, number, &batch),
-            FromPage::Abort { number } => {
-                state.running(number)?;
-                shared.end_run(&mut state, How::Interrupted, BTreeMap::new())?;
-            }
-            FromPage::Finish { number, counted } => {
-                let run = state.running(number)?;
-                if run.log.ticks() != run.begun.ticks {
-                    let (ticks, all) = (run.log.ticks(), run.begun.ticks);
-                    return Err(LabError::Order(format!(
-                        "the run has {ticks} of {all} ticks and cannot be finished"
-                    )));
-                }
-                if counted.len() > 16 || counted.values().any(|v| !v.is_finite()) {
-                    return Err(LabError::Message(
-                        "what the page counted is not a few numbers".to_owned(),
-                    ));
-                }
-                shared.end_run(&mut state, How::Finished, counted)?;
-                if state.session.as_ref().is_some_and(|session| session.next().is_none()) {
-                    shared.report(&mut state);
-                }
-            }
-            FromPage::Reports {} => shared.report(&mut state),
-            begin @ FromPage::Begin { .. } => shared.begin(&mut state, begin)?,
-        }
+        // Neither changes how the session stands.
+        let quiet = matches!(message, FromPage::Next {} | FromPage::Batch { .. });
+        let obeyed = shared.obey(&mut state, id, message);
         drop(state);
-        shared.tell_state();
-        Ok(())
+        if !quiet || obeyed.is_err() {
+            shared.tell_state();
+        }
+        obeyed
     }
 
     /// The session as one archive; nothing where there is none.
@@ -359,6 +335,27 @@ impl Shared {
                 session.save()
             }
             None => Ok(()),
+        }
+    }
+
+    /// Does what the page of the person says.
+    fn obey(self: &Arc<Self>, state: &mut Current, id: u64, message: FromPage) -> Result<(), LabError> {
+        match message {
+            FromPage::Hello { .. } => Ok(()),
+            FromPage::Consent { subject, agreed, cc0 } => self.consent(state, &subject, agreed, cc0),
+            FromPage::Resume { session } => self.resume(state, &session),
+            FromPage::Next {} => self.send_run(state, id),
+            begin @ FromPage::Begin { .. } => self.begin(state, begin),
+            FromPage::Batch { number, batch } => self.take(state, number, &batch),
+            FromPage::Abort { number } => {
+                state.running(number)?;
+                self.end_run(state, How::Interrupted, BTreeMap::new())
+            }
+            FromPage::Finish { number, counted } => self.finish(state, number, counted),
+            FromPage::Reports {} => {
+                self.report(state);
+                Ok(())
+            }
         }
     }
 

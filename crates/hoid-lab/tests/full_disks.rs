@@ -5,17 +5,16 @@
 #![cfg(target_os = "linux")]
 #![allow(clippy::unwrap_used)]
 
+#[path = "common/disk.rs"]
+mod disk;
+#[path = "common/person.rs"]
+mod person;
 #[path = "common/run.rs"]
 mod run;
 
-use std::{
-    collections::BTreeMap,
-    fs,
-    io::Write as _,
-    path::Path,
-    process::{Command, Stdio},
-};
+use std::{collections::BTreeMap, fs, path::Path};
 
+use disk::{Disk, copied, fill};
 use hoid_lab::{
     config::{Condition, Config, Signal},
     plant::InputMap,
@@ -23,6 +22,8 @@ use hoid_lab::{
     task::{Task, held_inputs},
     verify::check,
 };
+use person::Person;
+use serde_json::Value;
 
 const ROUNDS: usize = 200;
 const SMALLEST_KB: f64 = 64.0;
@@ -35,27 +36,6 @@ const MAP: InputMap = InputMap {
     dead: 0.0,
     gain: 1.0,
 };
-
-/// A disk of its own at a folder, for as long as it lives.
-struct Disk<'a>(&'a Path);
-
-impl<'a> Disk<'a> {
-    fn mount(at: &'a Path, kilobytes: usize) -> Option<Self> {
-        let size = format!("size={kilobytes}k");
-        let mount = Command::new("mount")
-            .args(["-t", "tmpfs", "-o", &size, "tmpfs"])
-            .arg(at)
-            .stderr(Stdio::null())
-            .status();
-        mount.is_ok_and(|status| status.success()).then_some(Self(at))
-    }
-}
-
-impl Drop for Disk<'_> {
-    fn drop(&mut self) {
-        let _ = Command::new("umount").arg(self.0).status();
-    }
-}
 
 fn config() -> Config {
     Config {
@@ -101,27 +81,6 @@ fn batches(task: &Task) -> Vec<Batch> {
             }
         })
         .collect()
-}
-
-/// Another takes all that is left.
-fn fill(ballast: &Path) {
-    let Ok(mut file) = fs::File::create(ballast) else {
-        return;
-    };
-    for part in [vec![0_u8; 1 << 16], vec![0; 1 << 10], vec![0; 7]] {
-        while file.write_all(&part).is_ok() {}
-    }
-}
-
-fn copied(from: &Path, to: &Path) {
-    fs::create_dir_all(to).unwrap();
-    for entry in fs::read_dir(from).unwrap().map(Result::unwrap) {
-        let target = to.join(entry.file_name());
-        match entry.file_type().unwrap().is_dir() {
-            true => copied(&entry.path(), &target),
-            false => drop(fs::copy(entry.path(), target).unwrap()),
-        }
-    }
 }
 
 /// What was told before the disk was full.
@@ -242,4 +201,54 @@ fn a_disk_that_fills_loses_nothing_that_was_told() {
         opened > ROUNDS / 2 && verified > ROUNDS / 4 && broken > ROUNDS / 4,
         "{opened} {verified} {broken}"
     );
+}
+
+/// The disk is full while a person tracks: the page is told at once, the run does not count, and the session goes on.
+#[test]
+fn a_run_that_meets_a_full_disk_is_ended_and_the_page_is_told() {
+    let at = tempfile::tempdir().unwrap();
+    let Some(_disk) = Disk::mount(at.path(), 2048) else {
+        eprintln!("skipped: no disk of its own can be mounted here");
+        return;
+    };
+    let mut person = Person::begin(at.path(), config());
+    let ballast = at.path().join("ballast");
+    person.next(1).unwrap();
+    person.track(1, 0..500).unwrap();
+    fill(&ballast);
+    let said = person.track(1, 500..4000).unwrap_err();
+    let told =
+        "run-01_ticks.csv: No space left on device (os error 28). The run was ended and does not count; make room";
+    assert!(said.contains(told), "{said}");
+    // What the page has sent meanwhile is of no account, and the pages see that nothing goes on.
+    person.track(1, 3000..3100).unwrap();
+    assert_eq!(person.state()["running"], Value::Null);
+    // As long as it is full none begins.
+    let said = person.next(2).unwrap_err();
+    assert!(said.contains("No space left") && said.contains("make room"), "{said}");
+    fs::remove_file(&ballast).unwrap();
+    let folder = at.path().join("sub-P01/ses-01");
+    let number = 1 + Stem::all(&folder).unwrap().last().unwrap().0;
+    person.next(number).unwrap();
+    person.track(number, 0..4000).unwrap();
+    // A run that cannot be closed is no verified one.
+    fill(&ballast);
+    let said = person.finish(number).unwrap_err();
+    assert!(said.contains("make room on the disk and begin it again"), "{said}");
+    assert_eq!(person.state()["next"], 0);
+    fs::remove_file(&ballast).unwrap();
+    person.next(number + 1).unwrap();
+    person.track(number + 1, 0..4000).unwrap();
+    person.finish(number + 1).unwrap();
+    assert_eq!(person.state()["next"], 1);
+    drop(person);
+    let session = Session::open(&folder).unwrap();
+    let verdict = |number: usize| {
+        let done = session.done.iter().find(|done| done.number == number);
+        done.map(|done| done.verdict.as_str())
+    };
+    for number in [1, number] {
+        assert_eq!(verdict(number), Some("unverified"), "run {number}");
+    }
+    assert_eq!(session.next(), Some(1));
 }

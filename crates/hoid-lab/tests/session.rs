@@ -330,6 +330,12 @@ fn numbers_of_files_are_no_places() {
     fs::write(&json, value.to_string()).unwrap();
     let said = check(&stem).unwrap().reasons();
     assert!(said.contains("do not fit each other"), "{said}");
+    // A preview of eleven days: nothing of its length is made.
+    let mut value: serde_json::Value = serde_json::from_str(&begun).unwrap();
+    value["condition"]["preview_s"] = serde_json::json!(1e6);
+    fs::write(&json, value.to_string()).unwrap();
+    let said = check(&stem).unwrap().reasons();
+    assert!(said.contains("the condition cannot be made again"), "{said}");
     let toml = session.folder.join("lab.toml");
     let facts = fs::read_to_string(&toml).unwrap();
     let other = facts.replacen("condition = 0", "condition = 9", 1);

@@ -33,7 +33,7 @@ use crate::{
 /// Share of the usual size within which a signal stands.
 const SHARE: f64 = 0.02;
 /// Stands of both signals, and of one of them, from which nothing arrives, s, and least samples of one.
-const BOTH_S: f64 = 1.0;
+pub(crate) const BOTH_S: f64 = 1.0;
 const ONE_S: f64 = 5.0;
 const LEAST: u64 = 20;
 /// Blocks after which the size of a signal is known, and those over which it is averaged.

@@ -1,23 +1,22 @@
 //! How much memory a file may take, whatever its format: a few bytes can be made to unpack to any length.
 //!
-//! A file of n bytes may unpack to `64 MB + 64 n`, at most 16 GB. [`UNPACKED`], a number of megabytes in the
-//! environment, raises both for files that are meant to be so. Settings (TOML, JSON) are held some thirty
-//! times their length while they are read: they have at most 10 MB, or a thirtieth of what is raised.
+//! A file of n bytes may unpack to `48 MB + 64 n`, at most 16 GB. [`UNPACKED`], a number of megabytes in the
+//! environment, raises both for files that are meant to be so. Settings are held many times their length while
+//! they are read, TOML up to a hundred times, JSON some: they have at most 2 and 10 MB, or a share of what is raised.
 
 use crate::IoError;
 
 /// What every file may unpack to, bytes. Readers hold values up to four times on their way (as they
 /// stand in the file, as numbers, as columns, in a survey): a file of a few bytes stays below 300 MB.
-const AT_LEAST: u64 = 1 << 26;
+const AT_LEAST: u64 = 48 << 20;
 /// And so many times its own length.
 const FACTOR: u64 = 64;
 /// No file unpacks to more.
 const CEILING: u64 = 16 << 30;
 /// The variable of the environment that raises what a file may unpack to, MB.
 const UNPACKED: &str = "HOID_MAX_UNPACKED_MB";
-/// Longest text of settings, bytes, and its share of what is raised.
-const SETTINGS: u64 = 10 << 20;
-const SETTINGS_SHARE: u64 = 32;
+/// What a text takes beside its characters, as it is held and copied.
+const TEXT: u64 = 64;
 /// Structures inside of structures, at most.
 pub(super) const MOST_NESTED: usize = 32;
 
@@ -54,6 +53,17 @@ impl Budget {
             }),
         }
     }
+
+    /// Takes what so many numbers take as [`f64`] beside the bytes each that they stand in.
+    pub(super) fn take_numbers(&mut self, count: usize, bytes_each: usize, file: &str) -> Result<(), IoError> {
+        let more = (size_of::<f64>() as u64).saturating_sub(bytes_each as u64);
+        self.take(more.saturating_mul(count as u64), file)
+    }
+
+    /// Takes what so many texts of so many bytes in all are held in, before they are.
+    pub(super) fn take_texts(&mut self, count: usize, bytes: usize, file: &str) -> Result<(), IoError> {
+        self.take(TEXT.saturating_mul(count as u64).saturating_add(bytes as u64), file)
+    }
 }
 
 /// What the environment allows, bytes.
@@ -62,9 +72,30 @@ fn raised() -> Option<u64> {
     megabytes.checked_mul(1 << 20)
 }
 
-/// Longest text of settings, bytes.
-pub(crate) fn longest_settings() -> u64 {
-    SETTINGS.max(raised().unwrap_or(0) / SETTINGS_SHARE)
+/// Texts of settings.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Settings {
+    Json,
+    Toml,
+}
+
+impl Settings {
+    /// Of how many bytes of what is raised such a text may have one.
+    pub(crate) fn share(self) -> u64 {
+        match self {
+            Self::Json => 32,
+            Self::Toml => 128,
+        }
+    }
+
+    /// Its greatest length, bytes.
+    pub(crate) fn longest(self) -> u64 {
+        let usual = match self {
+            Self::Json => 10 << 20,
+            Self::Toml => 2 << 20,
+        };
+        raised().map_or(usual, |raised| usual.max(raised / self.share()))
+    }
 }
 
 #[cfg(test)]
@@ -77,8 +108,9 @@ mod tests {
         let mut budget = Budget::of(31_128);
         assert!(budget.take(1 << 27, "a.mat").is_err());
         budget.take(1 << 25, "a.mat").unwrap();
-        budget.take(1 << 25, "a.mat").unwrap();
         assert!(budget.take(1 << 25, "a.mat").is_err());
+        // A million texts of a character.
+        assert!(Budget::of(1000).take_texts(1_000_000, 1_000_000, "a.mat").is_err());
         // What is large itself may unpack to more.
         Budget::of(10 << 20).take(1 << 29, "a.mat").unwrap();
         assert!(Budget::of(usize::MAX).take(CEILING + 1, "a.mat").is_err());

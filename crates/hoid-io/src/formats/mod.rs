@@ -28,7 +28,7 @@ mod packed;
 mod parquet;
 mod xdf;
 
-pub(crate) use budget::longest_settings;
+pub(crate) use budget::Settings;
 pub(crate) use csv::write_record as write_record_as_csv;
 pub(crate) use format::{ColumnsWriter, Format, Reading, RowWriter, Writing};
 pub(crate) use lookup::{bytes_of, format_to_write};

@@ -2,7 +2,8 @@
 // is killed, what is left behind. Usage: node main.mjs PROGRAM; PROGRAM is hoid with the feature lab.
 // With HOID_LAB_PICTURES=DIR every screen is drawn at 1200 and 400 pixels.
 import assert from "node:assert/strict";
-import { mkdtempSync, readFileSync, readdirSync, rmSync, writeFileSync } from "node:fs";
+import { spawnSync } from "node:child_process";
+import { mkdirSync, mkdtempSync, readFileSync, readdirSync, rmSync, writeFileSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { chromium } from "playwright-core";
@@ -249,6 +250,37 @@ const steps = {
     writeFileSync(join(session, ticks), lines.join("\n"));
     await show(/e of 1 ticks is not that of the controlled element, first at tick 4999/, "replay-corrupted");
     writeFileSync(join(session, ticks), text);
+  },
+
+  async "a disk that is full in the middle of a run"() {
+    const disk = join(folder, "disk");
+    mkdirSync(disk);
+    if (spawnSync("mount", ["-t", "tmpfs", "-o", "size=8m", "tmpfs", disk]).status !== 0) {
+      console.log("  skipped: no disk of its own can be mounted here");
+      return;
+    }
+    try {
+      const server = await lab(program, "--out", disk, "--config", config);
+      const page = await open(server.address, { time: "injected" });
+      await consent(page, "D1");
+      await startRun(page);
+      await page.evaluate(operator, { injected: true, until: 5000 });
+      const ballast = join(disk, "ballast");
+      spawnSync("dd", ["if=/dev/zero", `of=${ballast}`, "bs=64k"]);
+      await page.evaluate(operator, { injected: true });
+      await heading(page, "The run was ended early");
+      assert.ok((await page.evaluate(() => window.hoidLab.run.next)) < 60_000, "the run went on to its end");
+      await page.getByText(/No space left on device.*make room on the disk/).waitFor();
+      await picture(page, "full-disk");
+      rmSync(ballast);
+      await startRun(page);
+      await page.evaluate(operator, { injected: true });
+      await page.getByText("verified", { exact: true }).waitFor({ timeout: 90_000 });
+      await page.close();
+      await server.end();
+    } finally {
+      spawnSync("umount", [disk]);
+    }
   },
 
   async "a calibration"() {

@@ -19,6 +19,8 @@ let screen: "start" | "settings" | "ready" | "run" | "result" | "other" = "start
 let waiting: RunMessage | null = null;
 let verdict: { done: Done; measures: Measures } | null = null;
 let broken = "";
+/** Ends the run that goes on here. */
+let stop: (words: string) => void = () => {};
 /** The session goes on in another window. */
 let elsewhere = false;
 const plotsCanvas = h("canvas", { class: "plots", role: "img", "aria-label": "The estimate over time, with bands of two standard errors" });
@@ -79,7 +81,13 @@ function hear(message: FromServer): void {
       if (message.elsewhere) {
         elsewhere = true;
         show("", h("h1", {}, "This window looks on"), h("p", {}, message.words), button("Try here", () => location.reload()));
-      } else if (screen !== "run") {
+      } else if (screen === "run") {
+        // As where the disk is full: there is no use in going on.
+        stop(message.words);
+      } else if (screen === "result" && !verdict && !broken) {
+        broken = message.words;
+        result();
+      } else {
         document.getElementById("refused")?.remove();
         document.getElementById("main")?.prepend(h("p", { class: "box bad", id: "refused", role: "alert" }, message.words));
       }
@@ -94,7 +102,7 @@ function tables(numbers: Float64Array): void {
   verdict = null;
   broken = "";
   const given: Given = { message, tables: numbers };
-  start(wire, given, own, (_, words) => {
+  stop = start(wire, given, own, (_, words) => {
     broken = words;
     screen = "result";
     result();

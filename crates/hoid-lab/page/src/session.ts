@@ -15,8 +15,8 @@ export interface Given {
   tables: Float64Array;
 }
 
-/** Runs; `ended` hears whether the run reached its end. */
-export function start(wire: Wire, given: Given, own: Settings, ended: (finished: boolean, words: string) => void): void {
+/** Runs; `ended` hears whether the run reached its end. What it returns ends the run where the other side has. */
+export function start(wire: Wire, given: Given, own: Settings, ended: (finished: boolean, words: string) => void): (words: string) => void {
   const { message } = given;
   const canvas = h("canvas", { class: "task running", role: "img", "aria-label": "The task" });
   const count = h("p", { class: "count", "aria-live": "polite" }, "");
@@ -60,14 +60,14 @@ export function start(wire: Wire, given: Given, own: Settings, ended: (finished:
   document.addEventListener("visibilitychange", hidden);
   addEventListener("resize", sized);
 
-  function end(finished: boolean, words: string): void {
+  function end(finished: boolean, words: string, told = asked): void {
     if (over_) return;
     over_ = true;
     stopListening();
     removeEventListener("keydown", keys);
     document.removeEventListener("visibilitychange", hidden);
     removeEventListener("resize", sized);
-    if (asked) {
+    if (told) {
       wire.say({ type: "batch", number: message.number, batch: run.take() });
       const memory = (performance as { memory?: { usedJSHeapSize: number } }).memory?.usedJSHeapSize ?? 0;
       const counted = { synthetic_events: synthetic, memory_mb: Math.round(memory / 1e5) / 10 };
@@ -133,6 +133,7 @@ export function start(wire: Wire, given: Given, own: Settings, ended: (finished:
   }
 
   time.frame(frame);
+  return (words) => end(false, words, false);
 }
 
 /** The median time between frames, ms. */

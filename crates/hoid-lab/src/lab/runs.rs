@@ -13,6 +13,7 @@ use crate::{
     session::{Batch, Begun, How, Logged, RunLog, Session},
     task::{TICKS_PER_SAMPLE, Task},
     utc,
+    verify::Measures,
     wire::{FromPage, ToPage},
 };
 
@@ -83,6 +84,8 @@ impl Shared {
         let Some(Ready { planned, task, .. }) = ready else {
             return Err(LabError::Order(format!("run {number} was not asked for")));
         };
+        // Until the log is there.
+        state.over = Some(number);
         let session = session_of(state)?;
         let plan = &session.facts.plan[planned];
         let condition = session.facts.config.condition[plan.condition].clone();
@@ -106,7 +109,8 @@ impl Shared {
             phases: task.phases.clone(),
             condition,
         };
-        begun.write(&stem, &task)?;
+        begun.write(&stem, &task).map_err(not_taken)?;
+        let log = RunLog::create(&stem, task.ticks).map_err(not_taken)?;
         let live = LiveRun::new(&session.facts.config.method, begun.condition.course()?)?;
         let teller = Arc::downgrade(self);
         let live = start(live, &stem, move |line| {
@@ -115,7 +119,7 @@ impl Shared {
             }
         });
         state.run = Some(Running {
-            log: RunLog::create(&stem, task.ticks)?,
+            log,
             begun,
             stem,
             task,
@@ -125,6 +129,9 @@ impl Shared {
     }
 
     pub(super) fn take(&self, state: &mut Current, number: usize, batch: &Batch) -> Result<(), LabError> {
+        if state.run.is_none() && state.over == Some(number) {
+            return Ok(());
+        }
         state.running(number)?;
         let Some(run) = &mut state.run else { return Ok(()) };
         // First the estimate, which is waited for; the disk may take its time.
@@ -141,20 +148,39 @@ impl Shared {
             // An estimate that ended early is seen by the lines that lack.
             let _ = live.send(samples);
         }
-        let (file, source) = match run.log.append(batch) {
-            Err(LabError::File { file, source }) => (file, source),
+        let refused = match run.log.append(batch) {
+            Err(error @ LabError::File { .. }) => not_taken(error),
             other => return other,
         };
-        // What the disk does not take cannot be verified: the run is over, and the session goes on.
-        let closed = self.end_run(state, How::Interrupted, BTreeMap::new());
-        let later = if closed.is_ok() {
-            ""
-        } else {
-            " (its files are closed when the session is opened again)"
-        };
-        Err(LabError::Order(format!(
-            "{file}: {source}. The run was ended and does not count{later}; make room on the disk and begin it again"
-        )))
+        // What the disk does not take now is closed when the session is opened again.
+        let _ = self.end_run(state, How::Interrupted, BTreeMap::new());
+        Err(refused)
+    }
+
+    /// Ends a run that has all its ticks.
+    pub(super) fn finish(
+        self: &Arc<Self>,
+        state: &mut Current,
+        number: usize,
+        counted: BTreeMap<String, f64>,
+    ) -> Result<(), LabError> {
+        let run = state.running(number)?;
+        if run.log.ticks() != run.begun.ticks {
+            let (ticks, all) = (run.log.ticks(), run.begun.ticks);
+            return Err(LabError::Order(format!(
+                "the run has {ticks} of {all} ticks and cannot be finished"
+            )));
+        }
+        if counted.len() > 16 || counted.values().any(|v| !v.is_finite()) {
+            return Err(LabError::Message(
+                "what the page counted is not a few numbers".to_owned(),
+            ));
+        }
+        self.end_run(state, How::Finished, counted)?;
+        if state.session.as_ref().is_some_and(|session| session.next().is_none()) {
+            self.report(state);
+        }
+        Ok(())
     }
 
     /// Ends the run that goes on, if one does.
@@ -164,30 +190,45 @@ impl Shared {
         how: How,
         counted: BTreeMap<String, f64>,
     ) -> Result<(), LabError> {
-        let Some(mut run) = state.run.take() else { return Ok(()) };
-        run.live = None;
-        run.log.sync()?;
-        drop(run.log);
-        let Some(session) = &mut state.session else {
-            return Ok(());
-        };
-        let checked = session.end(&run.stem, how, counted)?;
-        let logged = Logged::read(&run.stem)?;
-        if logged.signals.e.len() > 2 * TICKS_PER_SAMPLE {
-            let record = record(&run.begun, &run.task, &logged)?;
-            hoid_io::write_record(&run.stem.file("beh.parquet"), &record)?;
-            if self.mode == Mode::Calibrate && how == How::Finished {
-                state.calibration = Some(calibrate::judge(&self.out, &record, &logged)?);
-            }
+        let Some(run) = state.run.take() else { return Ok(()) };
+        state.over = Some(run.begun.number);
+        let measures = self.close(state, run, how, counted).map_err(not_taken)?;
+        let done = state.session.as_ref().and_then(|session| session.done.last());
+        if let (Some(done), Some(measures)) = (done, &measures) {
+            self.tell(&ToPage::Verdict { done, measures }, |_, page| page.role.is_some());
         }
         if self.mode == Mode::Sessions {
             experiment::manifest(&self.out)?;
         }
-        if let Some(done) = session.done.last() {
-            let measures = &checked.measures;
-            self.tell(&ToPage::Verdict { done, measures }, |_, page| page.role.is_some());
-        }
         Ok(())
+    }
+
+    /// Writes what stands behind a run: first its record, so that a run that was told as verified has one.
+    fn close(
+        &self,
+        state: &mut Current,
+        mut run: Running,
+        how: How,
+        counted: BTreeMap<String, f64>,
+    ) -> Result<Option<Measures>, LabError> {
+        run.live = None;
+        run.log.sync()?;
+        drop(run.log);
+        let Some(session) = &mut state.session else {
+            return Ok(None);
+        };
+        let logged = Logged::read(&run.stem)?;
+        let record = (logged.signals.e.len() > 2 * TICKS_PER_SAMPLE)
+            .then(|| record(&run.begun, &run.task, &logged))
+            .transpose()?;
+        if let Some(record) = &record {
+            hoid_io::write_record(&run.stem.file("beh.parquet"), record)?;
+        }
+        let checked = session.end(&run.stem, how, counted)?;
+        if let (Mode::Calibrate, How::Finished, Some(record)) = (&self.mode, how, &record) {
+            state.calibration = Some(calibrate::judge(&self.out, record, &logged)?);
+        }
+        Ok(Some(checked.measures))
     }
 
     /// Makes the pages about the session, on a thread of its own.
@@ -213,6 +254,18 @@ impl Shared {
             shared.tell_state();
         });
     }
+}
+
+/// What the disk does not take cannot be verified: the run is over, and the session goes on.
+fn not_taken(error: LabError) -> LabError {
+    let what = match &error {
+        LabError::File { file, source } => format!("{file}: {source}"),
+        LabError::Io(error) => error.to_string(),
+        _ => return error,
+    };
+    LabError::Order(format!(
+        "{what}. The run was ended and does not count; make room on the disk and begin it again"
+    ))
 }
 
 fn session_of(state: &Current) -> Result<&Session, LabError> {

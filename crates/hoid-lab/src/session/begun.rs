@@ -199,6 +199,6 @@ fn write_json(path: &Path, value: &impl Serialize) -> Result<(), LabError> {
 }
 
 fn read_json<T: DeserializeOwned>(path: &Path) -> Result<T, LabError> {
-    serde_json::from_str(&hoid_io::read_text(path)?)
+    serde_json::from_str(&hoid_io::read_settings(path)?)
         .map_err(|error| LabError::damaged(path, format!("{error}; it is not as hoid lab wrote it")))
 }

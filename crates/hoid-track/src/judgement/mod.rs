@@ -18,6 +18,7 @@
 //! | `faults` | more than 10 % of the samples were faults |
 //! | `held-back` | outliers that the guard held back (a note), in more than 1 % of the samples (a doubt) |
 //! | `hostile-span` | spans that no tracking makes, at which the estimate stood still |
+//! | `learnt-at-rest` | e and u stand still for a second, and the guard that would hold the estimate there is off |
 //! | `restarted` | the guard began the estimate again |
 //! | `steps-in-signals` | jumps of e or u that stayed (a note) |
 //! | `gain-sign` | K_e is significantly positive in some rows and negative in others |
@@ -85,6 +86,7 @@ impl Trace {
         all.extend(self.covariance_finding(&rows));
         all.extend(self.count_findings());
         all.extend(self.guard_findings());
+        all.extend(self.learnt_at_rest(record));
         all.extend(self.idle_finding(record));
         all.extend(self.supposed_finding());
         all.extend(self.not_followed(record));

@@ -5,7 +5,8 @@ use hoid_ident::judgement::{is_open, leads_backwards, operator_step};
 use hoid_model::{Finding, Record};
 
 use crate::{
-    guard::{GuardAction, GuardKind, TrackFault},
+    guard::{GuardAction, GuardChoice, GuardKind, TrackFault},
+    standing::BOTH_S,
     trace::Trace,
 };
 
@@ -72,6 +73,27 @@ impl Trace {
             ));
         }
         all
+    }
+
+    /// Where e and u stand still and the estimate goes on, which was asked for: nothing arrives there, and its error
+    /// bars go to zero with the innovations ([`crate::standing`]).
+    pub(super) fn learnt_at_rest(&self, record: &Record) -> Option<Finding> {
+        if self.options().method.inner().guard() != Some(GuardChoice::No) {
+            return None;
+        }
+        let (e, u) = (record.input(), record.output());
+        let begins = |k: usize| k == 0 || e.get(k - 1) != e.get(k) || u[k - 1] != u[k];
+        let begun: Vec<usize> = (0..u.len()).filter(|k| begins(*k)).chain([u.len()]).collect();
+        let longest = begun.windows(2).max_by_key(|of| of[1] - of[0])?;
+        let [from, to] = [longest[0], longest[1]].map(|k| record.time_s(k));
+        (to - from >= BOTH_S).then(|| {
+            Finding::doubt(
+                "learnt-at-rest",
+                format!(
+                    "neither e nor u moves at {from:.2} to {to:.2} s and the estimate goes on there: its error bars shrink by what                      tells nothing; leave the guard as it is by default, which holds it"
+                ),
+            )
+        })
     }
 
     /// What the last seconds of the record say against the last row: a delay that is another now, or an

@@ -52,6 +52,25 @@ fn a_change_inside_the_start_span_is_told() {
     }
 }
 
+/// The recursion of the text, without a guard, told 11.3293 ± .0096 rad/s of a person who had gone.
+#[test]
+fn a_rest_from_which_is_learnt_is_a_doubt() {
+    let record = simulated(Condition::C1);
+    let stopped = |name: &str, values: &[f64]| {
+        let values = (0..values.len()).map(|k| values[k.min(4100)]).collect();
+        Channel::new(name, "", values)
+    };
+    let (e, u) = (stopped("e", record.input()), stopped("u", record.output()));
+    let gone = Record::new(record.sample_time(), e, u).unwrap();
+    for (record, guard, told) in [(&gone, "no", true), (&gone, "yes", false), (&record, "no", false)] {
+        let options = TrackOptions::usual(Method::rpem(), 29)
+            .with(&[("guard", guard)])
+            .unwrap();
+        let verdict = judged(record, &options);
+        assert_eq!(kinds(&verdict).contains(&"learnt-at-rest"), told, "{guard}: {verdict}");
+    }
+}
+
 #[test]
 fn a_method_that_starts_itself_says_what_it_supposes() {
     let record = simulated(Condition::C1);

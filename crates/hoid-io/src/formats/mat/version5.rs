@@ -181,9 +181,11 @@ impl Reader<'_> {
                 self.structure(parts, count, place)
             }
             CHAR => {
+                let bytes = parts.clone().next().map_or(0, |element| element.bytes.len());
+                // They are taken apart into characters of four bytes.
+                let rows = dims.first().map_or(1, |rows| (*rows).min(bytes));
+                self.budget.take_texts(rows, 5 * bytes, self.file)?;
                 let texts = texts(&mut parts, &dims, count)?;
-                self.budget
-                    .take(texts.iter().map(|text| text.len() as u64).sum(), self.file)?;
                 self.push(place, place.path, Value::Texts(texts))
             }
             SPARSE => self.unread(place, "a sparse matrix"),
@@ -223,9 +225,9 @@ impl Reader<'_> {
             return Err(format!("{found} bytes for {count} numbers of {} bytes", kind.size()).into());
         }
         self.budget.take(element.bytes.len() as u64, self.file)?;
+        self.budget.take_numbers(count, kind.size(), self.file)?;
         let numbers = Numbers::new(element.bytes.to_vec(), kind, parts.big_endian);
         if kind.is_whole() && (DOUBLE..=SINGLE).contains(&class) {
-            self.budget.take(8 * count as u64, self.file)?;
             return Ok(Numbers::from_f64(&numbers.values()));
         }
         Ok(numbers)

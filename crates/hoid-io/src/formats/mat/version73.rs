@@ -135,6 +135,12 @@ impl Reader<'_> {
             return self.references(dataset, class == "cell", (parent, path), depth);
         }
         self.budget.take(bytes, self.file)?;
+        let rows = dims.first().map_or(1, |rows| (*rows).min(count as usize));
+        match kind {
+            DType::U16 if class == "char" => self.budget.take_texts(rows, 0, self.file)?,
+            DType::String => self.budget.take_texts(count as usize, 0, self.file)?,
+            _ => {}
+        }
         let value = match kind {
             DType::U16 if class == "char" => Value::Texts(texts(&self.all::<u16>(dataset, path)?, &dims)),
             DType::F64 => self.array::<f64>(dataset, path, Kind::F64, dims)?,

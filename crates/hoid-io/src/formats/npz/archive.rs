@@ -62,8 +62,9 @@ fn members(bytes: &[u8], file: &str) -> Result<Contents, IoError> {
         if data.len() as u64 != size {
             return Err(damaged(&format!("{} bytes or more, expected {size}", data.len())));
         }
-        let found = npy::entries(data, name, false).map_err(|error| match error {
+        let found = npy::entries(data, name, false, (&mut budget, file)).map_err(|error| match error {
             NpyError::NoMagic(what) | NpyError::Damaged(what) => damaged(&what),
+            NpyError::Other(error) => error,
         })?;
         entries.extend(found);
     }

@@ -3,7 +3,9 @@
 use std::rc::Rc;
 
 use super::header::{self, Descr, Header};
+use crate::IoError;
 use crate::formats::arrays::{Array, Entry, Kind, MOMENTS, Numbers, Value};
+use crate::formats::budget::Budget;
 use crate::results::Values;
 use crate::wording::shown;
 
@@ -18,6 +20,13 @@ const ALIGNMENT: usize = 64;
 pub(super) enum NpyError {
     NoMagic(String),
     Damaged(String),
+    Other(IoError),
+}
+
+impl From<IoError> for NpyError {
+    fn from(error: IoError) -> Self {
+        Self::Other(error)
+    }
 }
 
 /// The type of an item: `<f8` and so on.
@@ -110,8 +119,14 @@ impl Item {
 
 /// What stands in an array: one entry, or one for each field, at the top level where there is no
 /// other array.
-pub(super) fn entries(bytes: Vec<u8>, name: &str, alone: bool) -> Result<Vec<Entry>, NpyError> {
+pub(super) fn entries(
+    bytes: Vec<u8>,
+    name: &str,
+    alone: bool,
+    (budget, file): (&mut Budget, &str),
+) -> Result<Vec<Entry>, NpyError> {
     let (header, at) = header_of(&bytes)?;
+    unpacked(&header, budget, file)?;
     let data = || bytes[at..].to_vec();
     let entries = match &header.descr {
         Descr::Plain(descr) => {
@@ -127,6 +142,26 @@ pub(super) fn entries(bytes: Vec<u8>, name: &str, alone: bool) -> Result<Vec<Ent
             .collect(),
     };
     Ok(entries)
+}
+
+/// What the items take as they are read, beside the bytes that they stand in.
+fn unpacked(header: &Header, budget: &mut Budget, file: &str) -> Result<(), IoError> {
+    let count = header
+        .shape
+        .iter()
+        .fold(1_usize, |count, side| count.saturating_mul(*side));
+    let mut take = |descr: &str| match Item::of(descr) {
+        Item::Numbers { kind, .. } => budget.take_numbers(count, kind.size(), file),
+        Item::Unicode { .. } | Item::Bytes { .. } => budget.take_texts(count, 0, file),
+        Item::Clock { .. } => budget.take_numbers(count, 0, file),
+        Item::Unread { .. } => Ok(()),
+    };
+    match &header.descr {
+        Descr::Plain(descr) => take(descr),
+        Descr::Fields(fields) => (fields.iter())
+            .filter_map(|(_, descr)| descr.as_deref())
+            .try_for_each(take),
+    }
 }
 
 fn header_of(bytes: &[u8]) -> Result<(Header, usize), NpyError> {
@@ -189,10 +224,7 @@ fn plain(item: &Item, header: &Header, data: Vec<u8>) -> Result<Value, NpyError>
             dims: header.shape.clone(),
             last_fastest: !header.fortran_order,
         }),
-        // Texts of no length, of which there may be any number.
-        Item::Unicode { length: 0, .. } | Item::Bytes { length: 0 } if count > LONGEST_HEADER => {
-            return Err(NpyError::Damaged(format!("{count} texts without a character")));
-        }
+        // Of no length there may be any number.
         Item::Unicode { length: 0, .. } | Item::Bytes { length: 0 } => Value::Texts(vec![String::new(); count]),
         Item::Unicode { big_endian, .. } => {
             Value::Texts(data.chunks_exact(size).map(|text| unicode(text, *big_endian)).collect())

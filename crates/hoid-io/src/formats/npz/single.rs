@@ -3,11 +3,13 @@
 use super::npy::{NpyError, entries};
 use crate::IoError;
 use crate::formats::arrays::{Contents, Indexing};
+use crate::formats::budget::Budget;
 
 /// The one array in an NPY file; it is named as `numpy.savez` names an array without a name. The
 /// fields of a structured array are columns of their own.
 pub(super) fn read(bytes: Vec<u8>, file: &str) -> Result<Contents, IoError> {
-    let entries = entries(bytes, "arr_0", true).map_err(|error| match error {
+    let mut budget = Budget::of(bytes.len());
+    let entries = entries(bytes, "arr_0", true, (&mut budget, file)).map_err(|error| match error {
         NpyError::NoMagic(found) => IoError::WrongFormat {
             file: file.to_owned(),
             format: "NPY",
@@ -18,6 +20,7 @@ pub(super) fn read(bytes: Vec<u8>, file: &str) -> Result<Contents, IoError> {
             file: file.to_owned(),
             found,
         },
+        NpyError::Other(error) => error,
     })?;
     Ok(Contents::new(entries, Indexing::Python))
 }

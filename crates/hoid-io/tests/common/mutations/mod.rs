@@ -12,12 +12,14 @@
 //! | `inside` | what is packed in them, out and in |
 //! | `mutate` | the mutations |
 //! | `readers` | all readers over one file, and what must hold |
+//! | `spent` | what a case costs |
 
 pub mod draw;
 pub mod inside;
 pub mod mutate;
 pub mod originals;
 pub mod readers;
+pub mod spent;
 
 use draw::Draw;
 use mutate::mutated;

@@ -1,0 +1,46 @@
+//! `study`, `group` and `track` on 200 disks each that are full before all is written. The numbers of the page "Damaged
+//! inputs and kills".
+//!
+//! `cargo xtask slow full-disks [ROUNDS] [SEED]`, on Linux, as an administrator.
+#![allow(clippy::unwrap_used, clippy::print_stdout)]
+
+#[path = "../../hoid-lab/tests/common/disk.rs"]
+#[allow(dead_code)]
+mod disk;
+#[path = "../tests/common/draw.rs"]
+#[allow(dead_code)]
+mod draw;
+#[path = "../tests/common/full_disks.rs"]
+mod full_disks;
+#[path = "../tests/common/interrupted.rs"]
+mod interrupted;
+
+use std::process::ExitCode;
+
+use draw::Draw;
+use full_disks::rounds;
+use interrupted::{Bench, GROUP, STUDY, TRACK, beside_this};
+
+fn main() -> ExitCode {
+    let number = |k: usize, usual: u64| std::env::args().nth(k).map_or(usual, |text| text.parse().unwrap());
+    let (count, mut draw) = (number(1, 200) as usize, Draw(number(2, 1)));
+    let directory = tempfile::tempdir().unwrap();
+    let bench = Bench::new(beside_this(), directory.path());
+    let mut failed = false;
+    for work in [STUDY, GROUP, TRACK] {
+        let Some(outcome) = rounds(&bench, &work, count, &mut draw) else {
+            println!("skipped: no disk of its own can be mounted here");
+            return ExitCode::SUCCESS;
+        };
+        println!(
+            "{}: {} of {count} disks were full, {} whole blocks on them; {} failures",
+            work.name,
+            outcome.full,
+            outcome.blocks,
+            outcome.failures.len()
+        );
+        outcome.failures.iter().for_each(|failure| println!("{failure}"));
+        failed |= !outcome.failures.is_empty();
+    }
+    if failed { ExitCode::FAILURE } else { ExitCode::SUCCESS }
+}

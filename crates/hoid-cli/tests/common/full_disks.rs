@@ -1,0 +1,85 @@
+//! `study`, `group` and `track` on disks that are full before all is written: what stands there is whole, the blocks
+//! before the fault are not lost, and on another disk the command goes on to the files of a run that nothing befell.
+//!
+//! A disk of a size drawn between a page and what a whole run takes at most is full at a write drawn alike.
+
+use std::fs;
+
+use crate::{
+    disk::{Disk, copied},
+    draw::Draw,
+    interrupted::{Bench, Work, compare, files},
+};
+
+/// A page of a disk, kB.
+const PAGE_KB: usize = 4;
+
+/// How it went.
+#[derive(Debug, Default)]
+pub struct Outcome {
+    /// Rounds whose disk was full.
+    pub full: usize,
+    /// Whole blocks that stood there.
+    pub blocks: usize,
+    pub failures: Vec<String>,
+}
+
+/// So many rounds of a work; none where no disk of its own can be mounted.
+pub fn rounds(bench: &Bench, work: &Work, count: usize, draw: &mut Draw) -> Option<Outcome> {
+    let whole = bench.place(work, "whole");
+    fs::create_dir_all(&whole).unwrap();
+    bench.whole(work, "whole");
+    let expected = files(&whole);
+    let bytes = |all: &std::collections::BTreeMap<_, Vec<u8>>| all.values().map(Vec::len).sum::<usize>();
+    // Blocks stand beside the tables that are made of them.
+    let largest_kb = PAGE_KB * (expected.len() + 2) + (1 + usize::from(work.has_parts)) * bytes(&expected) / 1024;
+    let at = bench.at.join("disk");
+    fs::create_dir_all(&at).unwrap();
+    let mut outcome = Outcome::default();
+    for round in 0..count {
+        let kilobytes = PAGE_KB * (1 + draw.below(largest_kb / PAGE_KB));
+        let disk = Disk::mount(&at, kilobytes)?;
+        let what = format!("{} {round}, {kilobytes} kB", work.name);
+        let mut fail = |said: String| outcome.failures.push(format!("{what}: {said}"));
+        let run = bench.command(work, &at).output().unwrap();
+        let said = String::from_utf8_lossy(&run.stderr).into_owned();
+        let place = bench.place(work, "moved");
+        copied(&at, &place);
+        drop(disk);
+        if run.status.success() {
+            compare(&expected, &place, &what).into_iter().for_each(&mut fail);
+            fs::remove_dir_all(&place).unwrap();
+            continue;
+        }
+        outcome.full += 1;
+        if run.status.code() != Some(1) || !said.contains("No space left") || !said.contains("make room") {
+            fail(format!("{}: {said}", run.status));
+        }
+        let left = files(&place);
+        for (path, bytes) in &left {
+            let name = path.file_name().unwrap().to_string_lossy();
+            if name.starts_with('.') {
+                fail(format!("{name} is left"));
+            } else if name == "study.json" || name == "group.json" {
+                // How far it is.
+                if serde_json::from_slice::<serde_json::Value>(bytes).is_err() {
+                    fail(format!("{name} is not whole"));
+                }
+            } else if expected.get(path).is_some_and(|whole| whole != bytes) {
+                fail(format!("{} is not whole", path.display()));
+            }
+        }
+        outcome.blocks += left
+            .keys()
+            .filter(|path| path.to_string_lossy().ends_with("-seal.json"))
+            .count();
+        let again = bench.command(work, &place).output().unwrap();
+        let said = String::from_utf8_lossy(&again.stderr).into_owned();
+        if !again.status.success() || said.contains("damaged") {
+            fail(format!("goes on with {}: {said}", again.status));
+        }
+        compare(&expected, &place, &what).into_iter().for_each(&mut fail);
+        fs::remove_dir_all(&place).unwrap();
+    }
+    Some(outcome)
+}

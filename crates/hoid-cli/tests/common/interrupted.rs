@@ -1,0 +1,185 @@
+//! Commands that end before they are done, and what they leave: their works, the program in a directory, the files
+//! of one run against those of another.
+// Each study uses its own part of this.
+#![allow(dead_code, clippy::unwrap_used)]
+
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    fs,
+    path::{Path, PathBuf},
+    process::{Child, Command, Stdio},
+};
+
+const PLAN: &str = r#"
+name = "short"
+seed = 3
+replications = 12
+block = 1
+
+[[scenarios]]
+condition = ["C1", "C2"]
+remnant.noise_level = 0.1
+
+[[estimators]]
+name = "BJ"
+method = "fit"
+structure = "bj"
+orders.nd = [1]
+"#;
+
+/// What is interrupted.
+pub struct Work {
+    pub name: &'static str,
+    /// Before `--out`.
+    pub arguments: &'static [&'static str],
+    /// What lets it go on.
+    pub resume: &'static [&'static str],
+    /// Whether its blocks stand in `parts/` of the directory itself.
+    pub has_parts: bool,
+    /// What of its place is given to `--out`.
+    pub out: &'static str,
+}
+
+/// Blocks that stand in `parts/`.
+pub const STUDY: Work = Work {
+    name: "study",
+    arguments: &["study", "run", "plan.toml", "--jobs", "1"],
+    resume: &["--resume"],
+    has_parts: true,
+    out: "",
+};
+
+/// The same.
+pub const GROUP: Work = Work {
+    name: "group",
+    arguments: &["group", "people", "--jobs", "1"],
+    resume: &["--resume"],
+    has_parts: true,
+    out: "",
+};
+
+/// Several studies.
+pub const REPRODUCE: Work = Work {
+    name: "reproduce",
+    arguments: &[
+        "reproduce",
+        "--only",
+        "table-2,fig-3,A.1",
+        "--replications",
+        "4",
+        "--jobs",
+        "1",
+    ],
+    resume: &[],
+    has_parts: false,
+    out: "",
+};
+
+/// One file.
+pub const TRACK: Work = Work {
+    name: "track",
+    arguments: &["track", "c1.csv", "--method", "rls", "--nk", "29"],
+    resume: &[],
+    has_parts: false,
+    out: "trace.csv",
+};
+
+/// The program, in a directory.
+pub struct Bench {
+    pub program: PathBuf,
+    pub at: PathBuf,
+}
+
+impl Bench {
+    /// With a plan, the recordings of a group and one of C1.
+    pub fn new(program: PathBuf, at: &Path) -> Self {
+        let bench = Self {
+            program,
+            at: at.to_owned(),
+        };
+        fs::write(at.join("plan.toml"), PLAN).unwrap();
+        let group = "simulate-group --subjects 2 --conditions C1 --runs 1 --noise-level 0.05 --out people";
+        for line in [group, "simulate --condition C1 --seed 1 --out c1.csv"] {
+            let mut simulate = Command::new(&bench.program);
+            simulate.args(line.split(' ')).current_dir(at).stdout(Stdio::null());
+            let done = simulate.status().unwrap();
+            assert!(done.success(), "{line}: {done}");
+        }
+        bench
+    }
+
+    pub fn place(&self, work: &Work, name: &str) -> PathBuf {
+        self.at.join(format!("{}-{name}", work.name))
+    }
+
+    /// The command that has its results at a place.
+    pub fn command(&self, work: &Work, place: &Path) -> Command {
+        let mut command = Command::new(&self.program);
+        command.args(work.arguments).args(work.resume).arg("--out");
+        command.arg(if work.out.is_empty() {
+            place.to_owned()
+        } else {
+            place.join(work.out)
+        });
+        command.current_dir(&self.at);
+        command
+    }
+
+    pub fn start(&self, work: &Work, name: &str) -> Child {
+        let mut command = self.command(work, &self.place(work, name));
+        command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap()
+    }
+
+    /// Runs to the end.
+    pub fn whole(&self, work: &Work, name: &str) {
+        let status = self.start(work, name).wait().unwrap();
+        assert!(status.success(), "{} {name}: {status}", work.name);
+    }
+}
+
+/// All files below a directory, by their paths. The page of a reproduction says how long its studies
+/// took, which is the one thing that differs.
+pub fn files(directory: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
+    let mut found = BTreeMap::new();
+    let mut open = vec![directory.to_owned()];
+    while let Some(folder) = open.pop() {
+        for entry in fs::read_dir(&folder).unwrap() {
+            let path = entry.unwrap().path();
+            if path.is_dir() {
+                open.push(path);
+                continue;
+            }
+            let mut bytes = fs::read(&path).unwrap();
+            if path.ends_with("index.html") {
+                let text = String::from_utf8(bytes).unwrap();
+                let timed = |line: &&str| !line.starts_with("<tr><th>") || !line.contains("studies/");
+                bytes = text.lines().filter(timed).collect::<Vec<_>>().join("\n").into_bytes();
+            }
+            found.insert(path.strip_prefix(directory).unwrap().to_owned(), bytes);
+        }
+    }
+    found
+}
+
+/// In what the files below a directory are not those expected.
+pub fn compare(expected: &BTreeMap<PathBuf, Vec<u8>>, directory: &Path, what: &str) -> Vec<String> {
+    let found = files(directory);
+    let differs = |path: &PathBuf| {
+        Some(match (expected.get(path), found.get(path)) {
+            (Some(a), Some(b)) if a == b => return None,
+            (Some(_), Some(_)) => format!("{what}: {} differs", path.display()),
+            (Some(_), None) => format!("{what}: {} is missing", path.display()),
+            _ => format!("{what}: {} is left over", path.display()),
+        })
+    };
+    let all: BTreeSet<&PathBuf> = expected.keys().chain(found.keys()).collect();
+    all.into_iter().filter_map(differs).collect()
+}
+
+/// The program that is built beside this example.
+pub fn beside_this() -> PathBuf {
+    let mut path = std::env::current_exe().unwrap();
+    path.pop();
+    path.pop();
+    path.join(format!("hoid{}", std::env::consts::EXE_SUFFIX))
+}

@@ -1,0 +1,73 @@
+//! Files of a few bytes to two megabytes that unpack, or say that they unpack, to any size, and what all readers have to
+//! make of them: values or an error in words, in bounded memory.
+//!
+//! Bomb `k` of a format is the same bytes on every machine.
+//!
+//! | file | what it holds |
+//! |---|---|
+//! | `zeros` | zeros that are packed, of any length, in no time |
+//! | `parquet`, `npz`, `mat`, `hdf5`, `xdf`, `texts` | the bombs of a format |
+
+pub mod hdf5;
+pub mod mat;
+pub mod npz;
+pub mod parquet;
+pub mod texts;
+pub mod xdf;
+pub mod zeros;
+
+use std::{fs, path::Path, time::Duration};
+
+use hoid_io::{read_any_scenario, read_fit};
+
+use crate::mutations::{
+    draw::Draw,
+    readers::{self, Answers},
+    spent::Spent,
+};
+
+/// Makes a bomb.
+type Maker = fn(&mut Draw) -> Vec<u8>;
+
+/// The formats, with the endings that their readers go by.
+pub const FORMATS: [(&str, &str, Maker); 7] = [
+    ("Parquet", "parquet", parquet::bomb),
+    ("NPZ", "npz", npz::bomb),
+    ("MAT", "mat", mat::bomb),
+    ("HDF5", "mat", hdf5::bomb),
+    ("XDF", "xdf", xdf::bomb),
+    ("TOML", "toml", texts::toml),
+    ("JSON", "json", texts::json),
+];
+
+/// Bomb `number` of a format at a path, given to all its readers; how long they took.
+pub fn burst(path: &Path, maker: Maker, number: u64) -> (Answers, Duration) {
+    let bytes = maker(&mut Draw::new(54, number));
+    fs::write(path, &bytes).unwrap();
+    let length = bytes.len();
+    drop(bytes);
+    forget_peak();
+    let start = Spent::now();
+    let settings = |refused: bool| Answers {
+        read: u64::from(!refused),
+        refused: u64::from(refused),
+    };
+    let answers = match path.extension().and_then(|ending| ending.to_str()) {
+        Some("toml") => settings(read_any_scenario(path).is_err()),
+        Some("json") => settings(read_fit(path).is_err()),
+        _ => readers::all(path, length, number),
+    };
+    (answers, start.elapsed())
+}
+
+/// What was before a bomb is not of it, on systems that can tell.
+fn forget_peak() {
+    let _ = fs::write("/proc/self/clear_refs", "5");
+}
+
+/// Most memory of the process, kB, on systems that tell.
+pub fn peak_kb() -> Option<u64> {
+    let status = fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find(|line| line.starts_with("VmHWM"))?;
+    line.split_whitespace().nth(1)?.parse().ok()
+}

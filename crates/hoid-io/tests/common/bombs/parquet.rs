@@ -1,0 +1,205 @@
+//! Parquet: pages that lie, runs of millions of values, columns and groups without number.
+
+use std::sync::Arc;
+
+use parquet::{
+    basic::{Compression, GzipLevel},
+    data_type::{ByteArray, ByteArrayType, DoubleType, Int64Type},
+    file::{
+        metadata::{FileMetaData, ParquetMetaDataReader, ParquetMetaDataWriter},
+        properties::WriterProperties,
+        writer::SerializedFileWriter,
+    },
+    schema::parser::parse_message_type,
+};
+
+use super::zeros::{self, MEGABYTE};
+use crate::mutations::draw::Draw;
+
+/// Rows of a row group.
+pub const GROUP: usize = 1 << 18;
+/// Encodings of the format.
+const PLAIN: u64 = 0;
+const RUN_LENGTHS: u64 = 3;
+
+/// A page of which anything can be said.
+pub struct Page<'a> {
+    pub compression: Compression,
+    pub optional: bool,
+    pub values: u64,
+    pub unpacked: u64,
+    pub packed: &'a [u8],
+}
+
+/// One of them.
+pub fn bomb(draw: &mut Draw) -> Vec<u8> {
+    let gzip = || Compression::GZIP(GzipLevel::default());
+    let megabytes = 1 << (4 + draw.below(8));
+    let values = 1 << (20 + draw.below(12));
+    match draw.below(9) {
+        // It unpacks to more than it says.
+        0 => page(&Page {
+            compression: gzip(),
+            optional: false,
+            values: 100,
+            unpacked: 800,
+            packed: &zeros::gzip(megabytes),
+        }),
+        // It says more than it holds.
+        1 => page(&Page {
+            compression: *draw.one_of(&[
+                gzip(),
+                Compression::SNAPPY,
+                Compression::LZ4_RAW,
+                Compression::UNCOMPRESSED,
+            ]),
+            optional: false,
+            values,
+            unpacked: (8 * values).min(i32::MAX as u64),
+            packed: &[0; 20],
+        }),
+        // It holds what it says.
+        2 => page(&Page {
+            compression: gzip(),
+            optional: false,
+            values: (megabytes * MEGABYTE / 8) as u64,
+            unpacked: (megabytes * MEGABYTE).min(i32::MAX as usize) as u64,
+            packed: &zeros::gzip(megabytes),
+        }),
+        // One run of nulls.
+        3 => {
+            let mut run = Vec::new();
+            number(&mut run, values << 1);
+            run.push(0);
+            let packed = [&(run.len() as u32).to_le_bytes()[..], &run].concat();
+            page(&Page {
+                compression: Compression::UNCOMPRESSED,
+                optional: true,
+                values,
+                unpacked: packed.len() as u64,
+                packed: &packed,
+            })
+        }
+        4 => columns(10_001 + draw.below(10_000)),
+        5 => groups("message m { required double e; }", 1000 + draw.below(4000), 0),
+        6 => groups("message m { required binary e (UTF8); }", 1, 1 << (10 + draw.below(9))),
+        7 => groups(
+            "message m { required int64 t (TIMESTAMP_MICROS); }",
+            1 + draw.below(48),
+            GROUP,
+        ),
+        _ => groups(
+            "message m { required double e; required double u; }",
+            1 + draw.below(32),
+            GROUP,
+        ),
+    }
+}
+
+/// So many groups of the same values, which the format writes once.
+pub fn groups(schema: &str, groups: usize, rows: usize) -> Vec<u8> {
+    let mut writer = writer(schema, Compression::UNCOMPRESSED, true);
+    for _ in 0..groups {
+        let mut group = writer.next_row_group().unwrap();
+        while let Some(mut column) = group.next_column().unwrap() {
+            use parquet::column::writer::ColumnWriter as W;
+            let written = match column.untyped() {
+                W::DoubleColumnWriter(_) => column.typed::<DoubleType>().write_batch(&vec![0.0; rows], None, None),
+                W::Int64ColumnWriter(_) => column.typed::<Int64Type>().write_batch(&vec![7; rows], None, None),
+                _ => {
+                    let texts = vec![ByteArray::from("x".repeat(4000).as_str()); rows];
+                    column.typed::<ByteArrayType>().write_batch(&texts, None, None)
+                }
+            };
+            written.unwrap();
+            column.close().unwrap();
+        }
+        group.close().unwrap();
+    }
+    writer.into_inner().unwrap()
+}
+
+/// So many columns without a row.
+pub fn columns(count: usize) -> Vec<u8> {
+    let each: String = (0..count).map(|k| format!("required double c{k}; ")).collect();
+    groups(&format!("message m {{ {each} }}"), 0, 0)
+}
+
+fn writer(schema: &str, compression: Compression, dictionary: bool) -> SerializedFileWriter<Vec<u8>> {
+    let properties = WriterProperties::builder()
+        .set_compression(compression)
+        .set_dictionary_enabled(dictionary)
+        .build();
+    let schema = Arc::new(parse_message_type(schema).unwrap());
+    SerializedFileWriter::new(Vec::new(), schema, Arc::new(properties)).unwrap()
+}
+
+/// A number as the heads of pages have them (Thrift, compact: a sign at the lowest bit, seven bits a byte).
+fn signed(page: &mut Vec<u8>, value: u64) {
+    number(page, value << 1);
+}
+
+fn number(page: &mut Vec<u8>, mut rest: u64) {
+    while rest >= 0x80 {
+        page.push(rest as u8 | 0x80);
+        rest >>= 7;
+    }
+    page.push(rest as u8);
+}
+
+/// A file of one column, e, of one page.
+pub fn page(of: &Page) -> Vec<u8> {
+    let schema = match of.optional {
+        true => "message m { optional double e; }",
+        false => "message m { required double e; }",
+    };
+    let mut writer = writer(schema, of.compression, false);
+    let mut group = writer.next_row_group().unwrap();
+    let mut column = group.next_column().unwrap().unwrap();
+    let levels = of.optional.then_some(&[1_i16; 100][..]);
+    column
+        .typed::<DoubleType>()
+        .write_batch(&[0.0; 100], levels, None)
+        .unwrap();
+    column.close().unwrap();
+    group.close().unwrap();
+    let honest = bytes::Bytes::from(writer.into_inner().unwrap());
+    // PageHeader { type 0, unpacked, packed, DataPageHeader { values, encoding, levels by runs } }.
+    let mut page = vec![0x15, 0, 0x15];
+    signed(&mut page, of.unpacked);
+    page.push(0x15);
+    signed(&mut page, of.packed.len() as u64);
+    page.extend([0x2c, 0x15]);
+    signed(&mut page, of.values);
+    for encoding in [PLAIN, RUN_LENGTHS, RUN_LENGTHS] {
+        page.push(0x15);
+        signed(&mut page, encoding);
+    }
+    page.extend([0, 0]);
+    page.extend(of.packed);
+    let metadata = ParquetMetaDataReader::new().parse_and_finish(&honest).unwrap();
+    let group = metadata.row_group(0).clone();
+    let chunk = group.column(0).clone().into_builder();
+    let chunk = chunk
+        .set_data_page_offset(4)
+        .set_num_values(of.values as i64)
+        .set_total_compressed_size(page.len() as i64)
+        .set_total_uncompressed_size(of.unpacked as i64)
+        .set_column_index_offset(None)
+        .set_offset_index_offset(None)
+        .build()
+        .unwrap();
+    let rows = of.values as i64;
+    let group = group
+        .into_builder()
+        .set_num_rows(rows)
+        .set_column_metadata(vec![chunk])
+        .build()
+        .unwrap();
+    let told = metadata.file_metadata();
+    let told = FileMetaData::new(told.version(), rows, None, None, told.schema_descr_ptr(), None);
+    let metadata = parquet::file::metadata::ParquetMetaData::new(told, vec![group]);
+    let mut file = [b"PAR1".as_slice(), &page].concat();
+    ParquetMetaDataWriter::new(&mut file, &metadata).finish().unwrap();
+    file
+}

@@ -1,0 +1,95 @@
+//! XDF: channels, samples, texts and streams without number, leaps in time, nested headers.
+
+use crate::mutations::draw::Draw;
+
+const HEADER: u16 = 2;
+const SAMPLES: u16 = 3;
+const OFFSET: u16 = 4;
+
+/// One of them.
+pub fn bomb(draw: &mut Draw) -> Vec<u8> {
+    let mut file = b"XDF:".to_vec();
+    let large = 1_u64 << (10 + draw.below(21));
+    let many = 1 << (10 + draw.below(7));
+    let kind = *draw.one_of(&["double64", "int8", "string", "float32"]);
+    match draw.below(8) {
+        // Channels that are not there, and samples.
+        0 => {
+            chunk(&mut file, HEADER, &header(1, large, kind, "100", ""));
+            chunk(&mut file, SAMPLES, &samples(&large.to_le_bytes(), &[0; 64]));
+        }
+        1 => {
+            chunk(&mut file, HEADER, &header(1, 2, kind, "100", ""));
+            chunk(&mut file, SAMPLES, &samples(&u64::MAX.to_le_bytes(), &[0; 64]));
+        }
+        // Texts of any length, and without any.
+        2 => {
+            chunk(&mut file, HEADER, &header(1, 1, "string", "0", ""));
+            let text = [&[0, 8][..], &large.to_le_bytes()].concat();
+            chunk(&mut file, SAMPLES, &samples(&1_u64.to_le_bytes(), &text));
+        }
+        3 => {
+            let count = 8 * many;
+            chunk(&mut file, HEADER, &header(1, 1, "string", "100", ""));
+            chunk(
+                &mut file,
+                SAMPLES,
+                &samples(&(count as u64).to_le_bytes(), &[0, 1, 0].repeat(count)),
+            );
+        }
+        // A byte each.
+        4 => {
+            let count = 8 * many;
+            chunk(&mut file, HEADER, &header(1, 2, "int8", "1e-3", ""));
+            chunk(
+                &mut file,
+                SAMPLES,
+                &samples(&(count as u64).to_le_bytes(), &vec![0; 3 * count]),
+            );
+        }
+        // Elements in elements.
+        5 => {
+            let nested = ["<a>".repeat(many), "</a>".repeat(many)].concat();
+            chunk(&mut file, HEADER, &header(1, 2, kind, "100", &nested));
+        }
+        6 => (0..many as u32 / 4).for_each(|id| chunk(&mut file, HEADER, &header(id, 2, kind, "100", ""))),
+        // A leap of years between two samples, and as many offsets of the clock.
+        _ => {
+            chunk(&mut file, HEADER, &header(1, 2, "int8", "1e6", ""));
+            let at = |t: f64| [&[8][..], &t.to_le_bytes(), &[1, 2]].concat();
+            let two = [at(0.0), at(0.01), at(large as f64), at(1e300)].concat();
+            chunk(&mut file, SAMPLES, &samples(&4_u64.to_le_bytes(), &two));
+            for k in 0..many {
+                let offset = [
+                    &1_u32.to_le_bytes()[..],
+                    &(k as f64).to_le_bytes(),
+                    &1e300_f64.to_le_bytes(),
+                ]
+                .concat();
+                chunk(&mut file, OFFSET, &offset);
+            }
+        }
+    }
+    file
+}
+
+fn chunk(file: &mut Vec<u8>, tag: u16, content: &[u8]) {
+    file.push(4);
+    file.extend((content.len() as u32 + 2).to_le_bytes());
+    file.extend(tag.to_le_bytes());
+    file.extend(content);
+}
+
+/// Samples of stream 1 behind their number.
+fn samples(count: &[u8; 8], bytes: &[u8]) -> Vec<u8> {
+    [&1_u32.to_le_bytes()[..], &[8], count, bytes].concat()
+}
+
+fn header(id: u32, channels: u64, kind: &str, hz: &str, more: &str) -> Vec<u8> {
+    let text = format!(
+        "<info><name>s{id}</name><channel_count>{channels}</channel_count><nominal_srate>{hz}</nominal_srate><channel_format>\
+         {kind}</channel_format><desc><channels><channel><label>e</label></channel><channel><label>u</label></channel>\
+         </channels>{more}</desc></info>"
+    );
+    [&id.to_le_bytes()[..], text.as_bytes()].concat()
+}

@@ -1,0 +1,30 @@
+//! What a case costs, on a machine that has other work.
+
+use std::{
+    fs,
+    time::{Duration, Instant},
+};
+
+/// A time on the processor where the system tells it, else of the clock.
+pub struct Spent {
+    on_processor: Option<Duration>,
+    by_clock: Instant,
+}
+
+impl Spent {
+    pub fn now() -> Self {
+        let text = fs::read_to_string("/proc/self/schedstat").ok();
+        let nanoseconds = text.and_then(|text| text.split(' ').next()?.parse().ok());
+        Self {
+            on_processor: nanoseconds.map(Duration::from_nanos),
+            by_clock: Instant::now(),
+        }
+    }
+
+    pub fn elapsed(&self) -> Duration {
+        match (self.on_processor, Self::now().on_processor) {
+            (Some(then), Some(now)) => now.saturating_sub(then),
+            _ => self.by_clock.elapsed(),
+        }
+    }
+}

@@ -1,0 +1,69 @@
+//! A million messages to the lab, files of sessions and numbers of saved trackers, each changed: no panic, caught or not.
+//! The numbers of the page "Damaged inputs and kills".
+//!
+//! `cargo xtask slow hostile [CASES] [FIRST] [SEED]`; built with overflow checks on, as the tests are.
+#![allow(clippy::unwrap_used, clippy::print_stdout)]
+
+#[allow(dead_code)]
+#[path = "../../hoid-cli/tests/common/draw.rs"]
+mod draw;
+#[path = "../tests/common/hostile.rs"]
+mod hostile;
+#[path = "../tests/common/person.rs"]
+mod person;
+
+use std::{
+    panic::{self, AssertUnwindSafe},
+    process::ExitCode,
+    sync::atomic::{AtomicUsize, Ordering},
+    thread,
+    time::{Duration, Instant},
+};
+
+use hostile::Hostile;
+
+/// What one case may take.
+const LIMIT: Duration = Duration::from_secs(2);
+/// Panics, those that are caught among them.
+static PANICS: AtomicUsize = AtomicUsize::new(0);
+
+fn main() -> ExitCode {
+    let number = |k: usize, usual: u64| std::env::args().nth(k).map_or(usual, |text| text.parse().unwrap());
+    let (cases, first, seed) = (number(1, 1_000_000), number(2, 0), number(3, 2026));
+    panic::set_hook(Box::new(|info| {
+        if PANICS.fetch_add(1, Ordering::Relaxed) < 100 {
+            println!("{info}");
+        }
+    }));
+    let jobs = thread::available_parallelism().map_or(1, |n| n.get() as u64);
+    let begun = Instant::now();
+    let part = |job: u64| {
+        let mut hostile = Hostile::new();
+        let mut slowest = (Duration::ZERO, 0);
+        for number in (first..first + cases).filter(|number| number / 4 % jobs == job) {
+            let start = Instant::now();
+            if panic::catch_unwind(AssertUnwindSafe(|| hostile.case(seed, number))).is_err() {
+                println!("case {number}: a panic");
+                hostile = Hostile::new();
+            }
+            slowest = slowest.max((start.elapsed(), number));
+        }
+        slowest
+    };
+    let slowest = thread::scope(|scope| {
+        let parts: Vec<_> = (0..jobs).map(|job| scope.spawn(move || part(job))).collect();
+        parts.into_iter().map(|part| part.join().unwrap()).max().unwrap()
+    });
+    let panics = PANICS.load(Ordering::Relaxed);
+    println!(
+        "{cases} cases of seed {seed} in {:.0} s: {panics} panics; slowest {:.2} s (case {})",
+        begun.elapsed().as_secs_f64(),
+        slowest.0.as_secs_f64(),
+        slowest.1
+    );
+    if panics == 0 && slowest.0 < LIMIT {
+        ExitCode::SUCCESS
+    } else {
+        ExitCode::FAILURE
+    }
+}

@@ -1,0 +1,52 @@
+//! A disk of a size, and how it fills.
+
+use std::{
+    fs,
+    io::Write as _,
+    path::Path,
+    process::{Command, Stdio},
+};
+
+/// A disk of its own at a folder, for as long as it lives: a `tmpfs`, which Linux lets an administrator mount.
+pub struct Disk<'a>(&'a Path);
+
+impl<'a> Disk<'a> {
+    /// None where none can be mounted.
+    pub fn mount(at: &'a Path, kilobytes: usize) -> Option<Self> {
+        let size = format!("size={kilobytes}k");
+        let mount = Command::new("mount")
+            .args(["-t", "tmpfs", "-o", &size, "tmpfs"])
+            .arg(at)
+            .stderr(Stdio::null())
+            .status();
+        mount.is_ok_and(|status| status.success()).then_some(Self(at))
+    }
+}
+
+impl Drop for Disk<'_> {
+    fn drop(&mut self) {
+        let _ = Command::new("umount").arg(self.0).status();
+    }
+}
+
+/// Another takes all that is left.
+pub fn fill(ballast: &Path) {
+    let Ok(mut file) = fs::File::create(ballast) else {
+        return;
+    };
+    for part in [vec![0_u8; 1 << 16], vec![0; 1 << 10], vec![0; 7]] {
+        while file.write_all(&part).is_ok() {}
+    }
+}
+
+/// All that stands there, elsewhere.
+pub fn copied(from: &Path, to: &Path) {
+    fs::create_dir_all(to).unwrap();
+    for entry in fs::read_dir(from).unwrap().map(Result::unwrap) {
+        let target = to.join(entry.file_name());
+        match entry.file_type().unwrap().is_dir() {
+            true => copied(&entry.path(), &target),
+            false => drop(fs::copy(entry.path(), target).unwrap()),
+        }
+    }
+}

@@ -1,0 +1,361 @@
+//! What nobody says to a lab, files of sessions as nobody wrote them, and trackers restored from numbers that were changed
+//! and sealed again: each has an answer, and none panics, not even where it is caught.
+//!
+//! Case `k` of a seed is the same on every machine.
+#![allow(clippy::unwrap_used)]
+
+use std::{
+    fs,
+    path::{Path, PathBuf},
+    sync::mpsc::channel,
+};
+
+use hoid_io::file_names;
+use hoid_lab::{
+    Config, Lab, Mode,
+    config::{Condition, Signal},
+    session::{Session, Stem},
+    verify::check,
+    wire::FromPage,
+};
+use hoid_model::{
+    Record, Structure,
+    scenario::{Condition as OfText, Scenario},
+};
+use hoid_sim::{RunSeed, Simulator};
+use hoid_track::{Live, Method, Sample, TrackOptions, Tracker, WarmUp, sealed};
+use serde_json::{Value, json};
+
+use crate::{
+    draw::Draw,
+    person::{self, Person},
+};
+
+/// Ticks of a run.
+const TICKS: usize = 500;
+/// Messages of one lab.
+const OF_A_LAB: usize = 200;
+/// Samples that a restored tracker takes.
+const SAMPLES: usize = 25;
+
+/// Numbers at which places, lengths and sums go wrong.
+const EXTREMES: [f64; 16] = [
+    0.0,
+    -0.0,
+    -1.0,
+    0.5,
+    1.0,
+    3.0,
+    1e3,
+    1e6,
+    4_294_967_296.0,
+    1e18,
+    1e300,
+    -1e300,
+    5e-324,
+    f64::NAN,
+    f64::INFINITY,
+    f64::NEG_INFINITY,
+];
+
+/// The same, and what is no number, as JSON has them.
+fn extreme(draw: &mut Draw) -> Value {
+    match draw.below(12) {
+        0 => Value::Null,
+        1 => json!("x".repeat(1 << draw.below(12))),
+        2 => json!([]),
+        3 => json!({}),
+        4 => json!(u64::MAX),
+        5 => json!(i64::MIN),
+        6 => json!(draw.below(TICKS)),
+        7 => json!([1.0, 1.0, 1e300, 1.0]),
+        8 => json!(true),
+        _ => json!(EXTREMES[draw.below(EXTREMES.len())]),
+    }
+}
+
+/// What is tried.
+pub struct Hostile {
+    directory: tempfile::TempDir,
+    session: PathBuf,
+    files: Vec<String>,
+    person: Person,
+    said: usize,
+    record: Record,
+    trackers: Vec<(TrackOptions, Vec<f64>)>,
+    warm_up: Vec<f64>,
+}
+
+fn config() -> Config {
+    Config {
+        condition: vec![Condition {
+            target: Some(Signal::default()),
+            measurement_s: 0.3,
+            run_in_s: 0.2,
+            runs: 2,
+            ..Condition::default()
+        }],
+        ..Config::default()
+    }
+}
+
+impl Hostile {
+    pub fn new() -> Self {
+        let directory = tempfile::tempdir().unwrap();
+        let out = directory.path().join("good");
+        let mut good = Person::begin(&out, config());
+        good.next(1).unwrap();
+        good.track(1, 0..TICKS).unwrap();
+        good.finish(1).unwrap();
+        good.next(2).unwrap();
+        good.track(2, 0..100).unwrap();
+        drop(good);
+        let session = out.join("sub-P01/ses-01");
+        let record = Simulator::new(&Scenario::condition(OfText::C4)).unwrap();
+        let record = record.run(RunSeed::default(), false).unwrap();
+        let (trackers, warm_up) = saved(&record);
+        Self {
+            files: file_names(&session).unwrap(),
+            session,
+            person: Person::begin(&directory.path().join("lab-0"), config()),
+            directory,
+            said: 0,
+            record,
+            trackers,
+            warm_up,
+        }
+    }
+
+    /// A case: two of four a tracker, one messages, one files.
+    pub fn case(&mut self, seed: u64, number: u64) {
+        let mut draw = Draw(seed ^ number.wrapping_mul(0xd134_2543_de82_ef95));
+        match number % 4 {
+            0 => self.messages(&mut draw),
+            1 => self.damaged(&mut draw),
+            _ => self.restored(&mut draw),
+        }
+    }
+
+    /// Some messages to a lab that is as earlier ones have left it.
+    fn messages(&mut self, draw: &mut Draw) {
+        if self.said % OF_A_LAB == OF_A_LAB - 1 {
+            let out = self.directory.path().join(format!("lab-{}", self.said));
+            self.person = Person::begin(&out, config());
+        }
+        self.said += 1;
+        let number = 1 + draw.below(3);
+        for _ in 0..1 + draw.below(6) {
+            let (first, length) = (draw.below(TICKS), draw.below(60));
+            let mut message = match draw.below(10) {
+                0 => json!({"type": "hello", "role": "person", "browser": {"screen": "1 x 1"}}),
+                1 => json!({"type": "consent", "subject": "P02", "agreed": true, "cc0": true}),
+                2 => json!({"type": "resume", "session": "sub-P01/ses-01"}),
+                3 | 4 => json!({"type": "next"}),
+                5 | 6 => person::begin(number),
+                7 => person::batch(number, [0, first][draw.below(2)], &vec![0.5; length]),
+                8 => json!({"type": "finish", "number": number, "counted": {"synthetic_events": 0.0}}),
+                _ => json!({"type": "abort", "number": number}),
+            };
+            if message["type"] == "batch" && draw.below(2) == 0 {
+                message["batch"]["events"] = json!([[3, 2.5, 2.75, 512.0], [4, 3.5, 3.75, 400.0]]);
+                message["batch"]["frames"] = json!([[1.0, 2.0, 2, 0.5]]);
+            }
+            if draw.below(2) == 0 {
+                change(&mut message, draw);
+            }
+            let mut text = message.to_string().into_bytes();
+            if draw.below(8) == 0 {
+                bytes(&mut text, draw);
+            }
+            // What is no message ends at the door.
+            if let Ok(message) = serde_json::from_slice::<FromPage>(&text) {
+                let _ = self.person.lab.hear(self.person.page, message);
+            }
+        }
+    }
+
+    /// A session one file of which is another, opened, judged and shown.
+    fn damaged(&mut self, draw: &mut Draw) {
+        let at = self.directory.path().join("damaged/sub-P01/ses-01");
+        let _ = fs::remove_dir_all(&at);
+        fs::create_dir_all(&at).unwrap();
+        for name in &self.files {
+            fs::copy(self.session.join(name), at.join(name)).unwrap();
+        }
+        for _ in 0..1 + draw.below(2) {
+            damage(&at.join(&self.files[draw.below(self.files.len())]), draw);
+        }
+        let shown = |folder: &Path| {
+            let out = folder.ancestors().nth(2).unwrap();
+            let Ok(lab) = Lab::open(out, config(), Mode::Replay(folder.to_owned()), None) else {
+                return;
+            };
+            let page = lab.join(channel().0);
+            let hello = serde_json::from_value(json!({"type": "hello", "role": "experimenter"})).unwrap();
+            let _ = lab.hear(page, hello);
+            for name in ["1.json", "2.json"] {
+                let _ = lab.data(name);
+            }
+            let _ = lab.export();
+        };
+        shown(&at);
+        if let Ok(session) = Session::open(&at) {
+            let _ = (session.next(), session.new_number());
+            for (_, stem) in Stem::all(&at).unwrap() {
+                let _ = check(&stem);
+            }
+        }
+    }
+
+    /// A tracker, or a warm-up, from other numbers under a right seal.
+    fn restored(&mut self, draw: &mut Draw) {
+        let which = draw.below(self.trackers.len() + 1);
+        let saved = self.trackers.get(which).map_or(&self.warm_up, |(_, numbers)| numbers);
+        let mut numbers = saved[..saved.len() - 1].to_vec();
+        for _ in 0..1 + draw.below(4) {
+            let at = draw.below(numbers.len());
+            match draw.below(8) {
+                0 => numbers[at] = f64::from_bits(numbers[at].to_bits() ^ (1 << draw.below(64))),
+                1 => numbers[at] = f64::from_bits(draw.bits()),
+                2 => numbers.swap(at, draw.below(saved.len() - 1)),
+                3 => numbers[at] += 1.0,
+                _ => numbers[at] = EXTREMES[draw.below(EXTREMES.len())],
+            }
+        }
+        let sample_time = self.record.sample_time();
+        let numbers = sealed(numbers);
+        let from = 2700 + draw.below(1000);
+        let sample = |k: usize| Sample {
+            e: self.record.input()[k],
+            u: if k % 20 == 3 { f64::NAN } else { self.record.output()[k] },
+            reference: None,
+        };
+        let Some((options, _)) = self.trackers.get(which) else {
+            if let Some(warm_up) = WarmUp::restored(sample_time, &numbers) {
+                let mut live = Live::Collecting(warm_up);
+                let usual = TrackOptions::usual(Method::adaptive(), 29);
+                for k in from..from + SAMPLES {
+                    live.update(sample(k), &|_| Ok((usual.clone(), None)));
+                }
+                live.saved();
+            }
+            return;
+        };
+        if let Ok(mut tracker) = Tracker::restored(options, sample_time, &numbers) {
+            for k in from..from + SAMPLES {
+                tracker.update(sample(k), true);
+            }
+            let _ = (
+                tracker.operator(),
+                tracker.covariance(),
+                tracker.response(3.0),
+                tracker.saved(),
+            );
+        }
+    }
+}
+
+/// Trackers that have run, and a warm-up.
+fn saved(record: &Record) -> (Vec<(TrackOptions, Vec<f64>)>, Vec<f64>) {
+    let span = record.span(0.0, 20.0).unwrap();
+    let bj = Structure::BoxJenkins;
+    let of = |method| TrackOptions::new(method, bj, bj.operator_orders(29));
+    let all = [
+        TrackOptions::new(Method::rls(), Structure::Arx, Structure::Arx.operator_orders(29)),
+        of(Method::rpem()),
+        of(Method::rpem()).with(&[("track_delay", "0.2..0.35")]).unwrap(),
+        of(Method::physical()).with(&[("track_delay", "0.2..0.35")]).unwrap(),
+        of(Method::multiple_model()),
+        TrackOptions::usual(Method::adaptive(), 29)
+            .with(&[("replay", "5")])
+            .unwrap(),
+        of(Method::ekf()),
+        of(Method::ukf()),
+        of(Method::fused()),
+        of(Method::window()).with(&[("refit", "200")]).unwrap(),
+    ];
+    let sample = |k: usize| Sample {
+        e: record.input()[k],
+        u: record.output()[k],
+        reference: None,
+    };
+    let run = |options: TrackOptions| {
+        let mut tracker = Tracker::new(&options, Some(&span), record.sample_time()).unwrap();
+        (2000..2700).for_each(|k| {
+            tracker.update(sample(k), true);
+        });
+        let numbers = tracker.saved();
+        (options, numbers)
+    };
+    let usual = of(Method::physical());
+    let mut live = Live::new(&usual, 2000, record.sample_time()).unwrap();
+    for k in 0..100 {
+        live.update(sample(k), &|_| Ok((usual.clone(), None)));
+    }
+    (all.into_iter().map(run).collect(), live.saved().1)
+}
+
+/// One value of a message becomes another, goes or comes.
+fn change(value: &mut Value, draw: &mut Draw) {
+    let deeper = draw.below(4) > 0;
+    match value {
+        Value::Object(map) if deeper && !map.is_empty() => {
+            let key = map.keys().nth(draw.below(map.len())).cloned().unwrap();
+            match draw.below(8) {
+                0 => drop(map.remove(&key)),
+                1 => drop(map.insert(format!("{key}x"), json!(1))),
+                _ => change(&mut map[&key], draw),
+            }
+        }
+        Value::Array(all) if deeper && !all.is_empty() => {
+            let at = draw.below(all.len());
+            match draw.below(4) {
+                0 => drop(all.remove(at)),
+                1 => all.insert(at, all[at].clone()),
+                _ => change(&mut all[at], draw),
+            }
+        }
+        other => *other = extreme(draw),
+    }
+}
+
+/// A byte, an end, a part of a text, or a number in it.
+fn bytes(text: &mut Vec<u8>, draw: &mut Draw) {
+    if text.is_empty() {
+        return;
+    }
+    let at = draw.below(text.len());
+    let end = (at + 1 + draw.below(40)).min(text.len());
+    match draw.below(6) {
+        0 => text[at] ^= 1 << draw.below(8),
+        1 => text.truncate(at),
+        2 => drop(text.drain(at..end)),
+        3 => {
+            let part = text[at..end].to_vec();
+            text.splice(at..at, part);
+        }
+        _ => {
+            let is_number = |byte: &u8| byte.is_ascii_digit() || b"+-.e".contains(byte);
+            let Some(start) = (at..text.len()).find(|k| text[*k].is_ascii_digit()) else {
+                return;
+            };
+            let length = text[start..].iter().take_while(|byte| is_number(byte)).count();
+            text.splice(start..start + length, extreme(draw).to_string().into_bytes());
+        }
+    }
+}
+
+/// A file is gone, or is another: where it is JSON a value of it, else bytes.
+fn damage(path: &Path, draw: &mut Draw) {
+    let Ok(mut whole) = fs::read(path) else { return };
+    let json = serde_json::from_slice::<Value>(&whole);
+    match json {
+        _ if draw.below(12) == 0 => return drop(fs::remove_file(path)),
+        Ok(mut value) if draw.below(4) > 0 => {
+            (0..1 + draw.below(2)).for_each(|_| change(&mut value, draw));
+            whole = value.to_string().into_bytes();
+        }
+        _ => (0..1 + draw.below(3)).for_each(|_| bytes(&mut whole, draw)),
+    }
+    fs::write(path, whole).unwrap();
+}

@@ -1,0 +1,89 @@
+//! A page that keeps to the rules, without a server between: its person does nothing, so that e is the target.
+// Each file of tests uses its own part of this.
+#![allow(dead_code, clippy::unwrap_used)]
+
+use std::{
+    ops::Range,
+    path::Path,
+    sync::mpsc::{Receiver, channel},
+};
+
+use hoid_lab::{Config, Lab, Mode, lab::Outgoing, wire::FromPage};
+use serde_json::{Value, json};
+
+/// Ticks of a batch.
+const BATCH: usize = 50;
+
+pub struct Person {
+    pub lab: Lab,
+    pub page: u64,
+    heard: Receiver<Outgoing>,
+    target: Vec<f64>,
+}
+
+impl Person {
+    /// Who has said yes.
+    pub fn begin(out: &Path, config: Config) -> Self {
+        let lab = Lab::open(out, config, Mode::Sessions, None).unwrap();
+        let (sender, heard) = channel();
+        let page = lab.join(sender);
+        let person = Self {
+            lab,
+            page,
+            heard,
+            target: Vec::new(),
+        };
+        person.say(json!({"type": "hello", "role": "person"})).unwrap();
+        let consent = json!({"type": "consent", "subject": "P01", "agreed": true, "cc0": false});
+        person.say(consent).unwrap();
+        person
+    }
+
+    pub fn say(&self, message: Value) -> Result<(), String> {
+        let message: FromPage = serde_json::from_value(message).map_err(|error| error.to_string())?;
+        self.lab.hear(self.page, message).map_err(|error| error.to_string())
+    }
+
+    /// Begins the next run, which has this number.
+    pub fn next(&mut self, number: usize) -> Result<(), String> {
+        self.say(json!({"type": "next"}))?;
+        let tables = self.heard.try_iter().filter_map(|outgoing| match outgoing {
+            Outgoing::Binary(bytes) => Some(bytes),
+            Outgoing::Text(_) => None,
+        });
+        let eight = |eight: &[u8]| f64::from_le_bytes(eight.try_into().unwrap());
+        self.target = tables.last().unwrap().chunks_exact(8).map(eight).collect();
+        self.say(begin(number))
+    }
+
+    /// Ticks of a run.
+    pub fn track(&self, number: usize, ticks: Range<usize>) -> Result<(), String> {
+        ticks
+            .step_by(BATCH)
+            .try_for_each(|first| self.say(batch(number, first, &self.target[first..first + BATCH])))
+    }
+
+    pub fn finish(&self, number: usize) -> Result<(), String> {
+        self.say(json!({"type": "finish", "number": number}))
+    }
+
+    /// How the session stands, as the page was told last.
+    pub fn state(&self) -> Value {
+        let states = self.heard.try_iter().filter_map(|outgoing| match outgoing {
+            Outgoing::Text(text) => serde_json::from_str::<Value>(&text).ok(),
+            Outgoing::Binary(_) => None,
+        });
+        states.filter(|told| told["type"] == "state").last().unwrap()
+    }
+}
+
+pub fn begin(number: usize) -> Value {
+    json!({"type": "begin", "number": number, "device": "mouse", "clock": "injected", "refresh_ms": 16.7, "zero_ms": 1.0,
+        "input": {"centre": 512.0, "span": 300.0, "dead": 0.0, "gain": 1.0}})
+}
+
+/// Ticks of a hand that rests.
+pub fn batch(number: usize, first: usize, e: &[f64]) -> Value {
+    json!({"type": "batch", "number": number,
+        "batch": {"first": first, "u": vec![0.0; e.len()], "e": e, "events": [], "frames": []}})
+}
