@@ -155,7 +155,7 @@ pub(super) fn method_names() -> impl TypedValueParser<Value = String> {
         let MethodSpec { name, help, .. } = method.spec();
         PossibleValue::new(name).help(help).aliases(method.earlier_name())
     };
-    PossibleValuesParser::new(Method::all().into_iter().map(value)).map(|name| name.to_lowercase())
+    PossibleValuesParser::new(hoid::survey::methods().into_iter().map(value)).map(|name| name.to_lowercase())
 }
 
 fn parse_count(text: &str) -> Result<usize, String> {

@@ -1,12 +1,12 @@
 #![allow(clippy::unwrap_used)]
 use super::*;
-use crate::TrackOptions;
-use crate::{Method, StartAt, track};
+use crate::{methods, multiple_model};
 use hoid_model::{
     Channel, SampleTime,
     scenario::{Condition, Scenario},
 };
 use hoid_sim::{RunSeed, Simulator};
+use hoid_track::{StartAt, TrackOptions, track};
 
 fn side(eta: [f64; OPERATOR], scale: f64, weight: f64) -> Side {
     // Positive: a unit matrix and a rank-one matrix.
@@ -67,9 +67,9 @@ fn options() -> TrackOptions {
     TrackOptions {
         start: StartAt::Span(Some((0.0, 30.72))),
         ..TrackOptions::new(
-            Method::multiple_model().with("smooth", "true").unwrap(),
-            Method::multiple_model().usual_structure(),
-            Method::multiple_model().usual_orders(29),
+            multiple_model().with("smooth", "true").unwrap(),
+            multiple_model().usual_structure(),
+            multiple_model().usual_orders(29),
         )
     }
 }
@@ -139,7 +139,7 @@ fn a_record_with_faults_and_one_that_is_too_short() {
 
 #[test]
 fn other_methods_have_no_two_sided_estimate() {
-    for method in Method::all().into_iter().filter(|m| *m != Method::multiple_model()) {
+    for method in methods().into_iter().filter(|m| *m != multiple_model()) {
         let name = method.name();
         assert!(method.with("smooth", "true").is_err(), "{name}");
     }

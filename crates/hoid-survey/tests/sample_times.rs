@@ -41,7 +41,7 @@ fn refused_as_it_should_be(error: &IdentError, ts: f64) -> bool {
 
 #[test]
 fn every_method_takes_samples_or_says_that_the_sample_time_is_too_long() {
-    for method in Method::all() {
+    for method in hoid_survey::methods() {
         for ts in sample_times() {
             let sample_time = SampleTime::new(ts).unwrap();
             for options in starts(&TrackOptions::told_nothing(method.clone(), sample_time)) {
@@ -68,7 +68,7 @@ fn a_start_from_a_span_and_a_plan_say_so_too() {
         let sample_time = SampleTime::new(ts).unwrap();
         let (e, u) = (0..400).map(signals).unzip();
         let record = Record::new(sample_time, Channel::new("e", "", e), Channel::new("u", "", u)).unwrap();
-        for method in Method::all() {
+        for method in hoid_survey::methods() {
             let options = TrackOptions::usual(method.clone(), 2);
             let made = Tracker::new(&options, Some(&record), sample_time);
             assert!(refused_as_it_should_be(&made.unwrap_err(), ts), "{method} at {ts} s");

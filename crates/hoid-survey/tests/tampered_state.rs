@@ -38,10 +38,10 @@ fn saved() -> &'static Saved {
         let all = [
             TrackOptions::new(Method::rls(), Structure::Arx, Structure::Arx.operator_orders(29)),
             of(Method::rpem()),
-            of(Method::physical()),
-            of(Method::multiple_model()),
-            of(Method::ekf()),
-            of(Method::window()).with(&[("refit", "400")]).unwrap(),
+            of(hoid_survey::physical()),
+            of(hoid_survey::multiple_model()),
+            of(hoid_survey::ekf()),
+            of(hoid_survey::window()).with(&[("refit", "400")]).unwrap(),
         ];
         let sample = |k: usize| Sample {
             e: record.input()[k],
@@ -56,8 +56,8 @@ fn saved() -> &'static Saved {
             let numbers = tracker.saved();
             (options, numbers)
         };
-        let mut live = Live::new(&of(Method::physical()), 2000, record.sample_time()).unwrap();
-        let keep = of(Method::physical());
+        let mut live = Live::new(&of(hoid_survey::physical()), 2000, record.sample_time()).unwrap();
+        let keep = of(hoid_survey::physical());
         for k in 0..100 {
             live.update(sample(k), &|_| Ok((keep.clone(), None)));
         }

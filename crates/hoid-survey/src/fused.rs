@@ -22,16 +22,12 @@ use hoid_model::{Orders, SampleTime, Structure};
 
 use hoid_ident::{IdentError, settings, settings::Bounds};
 
-use super::rpem::LIMIT;
-use crate::{
-    gain::{self, Gain, Scaled},
-    kernel::{Kernel, Plan},
-    memory::{Memory, MemoryOptions},
-    method::{About, RecursiveMethod, check_operator_orders},
-    recursion::{Recursion, Sample, StepOutcome},
-    setup::Setup,
-    shared_options::StabilityOptions,
-    start::StartState,
+use hoid_track::{
+    Memory, MemoryOptions, Sample, StabilityOptions,
+    building::{
+        About, Gain, Kernel, Plan, Recursion, RecursiveMethod, Scaled, Setup, StartState, StepOutcome, USUAL_LIMIT,
+        bounded, check_operator_orders, error_bars,
+    },
 };
 
 /// Coefficients of B.
@@ -102,7 +98,7 @@ impl RecursiveMethod for FusedOptions {
     }
 
     fn limit(&self) -> f64 {
-        self.limit.unwrap_or(LIMIT)
+        self.limit.unwrap_or(USUAL_LIMIT)
     }
 
     fn stable(&self) -> Stable {
@@ -176,7 +172,7 @@ impl FusedRecursion {
             nf: 0,
         };
         let gain = Gain::new(&linear, &start, sample_time, false)?;
-        let bars = gain::error_bars(&linear, &start, sample_time)?;
+        let bars = error_bars(&linear, &start, sample_time)?;
         let values = [start.values[0], start.values[1]];
         let rls = Rls::new(shape, values, gain, bars).ok_or_else(|| IdentError::BadStart {
             reason: "it has no coefficients of B".to_owned(),
@@ -236,7 +232,7 @@ impl Recursion for FusedRecursion {
         // eps of an output of zero is the prediction with its sign changed.
         let y = self.filtered(0.0);
         let predicted = -self.rls.step_without_update(x, y).innovation;
-        self.remember(crate::past::bounded(predicted));
+        self.remember(bounded(predicted));
     }
 
     fn scale_covariance(&mut self, factor: f64) -> bool {

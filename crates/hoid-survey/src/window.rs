@@ -23,15 +23,11 @@ use hoid_ident::{
     settings::{Bounds, Value},
 };
 
-use super::rpem::short_for_b;
-use crate::{
-    memory::Memory,
-    method::{About, RecursiveMethod, bad},
-    past::bounded,
-    predictor::Predictor,
-    recursion::{Recursion, Sample, StepOutcome},
-    setup::{Setup, StartAt},
-    start::StartState,
+use hoid_track::{
+    Memory, Sample, StartAt,
+    building::{
+        About, Predictor, Recursion, RecursiveMethod, Setup, StartState, StepOutcome, bad, bounded, short_for_b,
+    },
 };
 
 /// Fits from the last theta between two comparisons with the estimator's own starts.
@@ -81,6 +77,14 @@ impl RecursiveMethod for WindowOptions {
             (_, 0) => Err(bad("the samples between two fits", "0".to_owned(), "1 or more")),
             _ => Ok(()),
         }
+    }
+
+    fn check_at(&self, sample_time: SampleTime) -> Result<(), IdentError> {
+        self.window.lambda(sample_time).map(|_| ())
+    }
+
+    fn fits_anew(&self) -> bool {
+        true
     }
 
     fn build(

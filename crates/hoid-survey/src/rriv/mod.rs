@@ -42,10 +42,11 @@ use hoid_core::{
 use hoid_ident::{IdentError, linalg::dot};
 use hoid_model::Orders;
 
-use crate::{
-    past::{Past, bounded, weighted},
-    recursion::{Recursion, Sample, StepOutcome},
+use hoid_track::{
+    Sample,
+    building::{Past, Recursion, StepOutcome, bounded, weighted},
 };
+
 use filters::{Filtered, Parts, Simulated, fill_f};
 use forgetting::{Forgetting, ROOM};
 use laguerre::Following;

@@ -3,7 +3,7 @@
 
 use hoid_model::Orders;
 
-use crate::past::{Past, bounded, weighted};
+use hoid_track::building::{Past, bounded, weighted};
 
 /// A signal and what D/F makes of it.
 #[derive(Debug, Clone)]

@@ -1,22 +1,19 @@
 //! The recursive prediction-error method in the operator's parameters: its gradient is that of the
 //! polynomials times the Jacobian of theta.
 
+mod recursion;
+
 use std::collections::BTreeMap;
 
 use hoid_core::recursion::Stable;
 use hoid_ident::{Constraint, IdentError, settings};
 use hoid_model::{SampleTime, Structure};
 
-use super::rpem::LIMIT;
-use crate::{
-    guard::{GuardChoice, GuardOptions},
-    kernel::{Kernel, Plan},
-    memory::Memory,
-    method::{About, RecursiveMethod, check_delay, check_operator_orders},
-    recursion::Recursion,
-    setup::Setup,
-    shared_options::{BoundOptions, DelayOptions, GainOptions, StabilityOptions},
-    start::StartState,
+use hoid_track::{
+    BoundOptions, DelayOptions, GainOptions, GuardChoice, GuardOptions, Memory, StabilityOptions,
+    building::{
+        About, Plan, Recursion, RecursiveMethod, Setup, StartState, USUAL_LIMIT, check_delay, check_operator_orders,
+    },
 };
 
 settings! {
@@ -70,7 +67,7 @@ impl RecursiveMethod for PhysicalOptions {
         from: &StartState,
         sample_time: SampleTime,
     ) -> Result<Box<dyn Recursion>, IdentError> {
-        Plan::new(setup, from, sample_time).build(Kernel::Physical)
+        recursion::build(&Plan::new(setup, from, sample_time))
     }
 
     fn is_physical(&self) -> bool {
@@ -86,7 +83,7 @@ impl RecursiveMethod for PhysicalOptions {
     }
 
     fn limit(&self) -> f64 {
-        self.gain.limit_or(LIMIT)
+        self.gain.limit_or(USUAL_LIMIT)
     }
 
     fn stable(&self) -> Stable {

@@ -12,7 +12,7 @@ use hoid_core::{
     ud_covariance::UdCovariance,
 };
 
-use crate::gain::ROOM_WITHOUT_FIT;
+use hoid_track::building::ROOM_WITHOUT_FIT;
 
 /// Room for parameters.
 pub(crate) const ROOM: usize = 16;

@@ -7,7 +7,7 @@
 //! the noise of the past alone, and of that one part in memory over filters.
 
 use super::forgetting::Forgetting;
-use crate::past::{bounded, weighted};
+use hoid_track::building::{bounded, weighted};
 
 /// Number of filters. A loop remembers a second or two: 16 filters with a time constant of 16
 /// samples span about 500.

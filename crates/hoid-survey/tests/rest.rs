@@ -124,7 +124,7 @@ fn through(options: &TrackOptions, record: &Record, stand: Stand, length_s: f64)
 }
 
 fn all_options() -> Vec<TrackOptions> {
-    let mut all: Vec<TrackOptions> = Method::all()
+    let mut all: Vec<TrackOptions> = hoid_survey::methods()
         .into_iter()
         .map(|method| TrackOptions::usual(method, DELAY))
         .collect();
@@ -236,9 +236,9 @@ fn the_time_without_excitation_is_a_finding() {
     for method in [
         Method::rls(),
         Method::rpem(),
-        Method::rriv(),
-        Method::window(),
-        Method::fused(),
+        hoid_survey::rriv(),
+        hoid_survey::window(),
+        hoid_survey::fused(),
     ] {
         let options = TrackOptions::usual(method.clone(), DELAY);
         let trace = track(&with_rest, &options, 50).unwrap();

@@ -3,19 +3,17 @@
 use hoid_core::{
     bounds::within,
     delay::DelayLine,
-    multiple_model::prior::OPERATOR,
     state::{State, visit_all},
 };
 use hoid_ident::IdentError;
 use hoid_model::{SampleTime, uncertainty::OperatorEstimate};
 
-use super::belief::{Belief, ETA, Model, N};
-use crate::{
-    recursion::{Recursion, Sample, StepOutcome},
-    reported::Reported,
-    setup::Setup,
-    start::{self, StartState},
+use hoid_track::{
+    Sample,
+    building::{OPERATOR, Recursion, Reported, Setup, StartState, StepOutcome, physical_bounds},
 };
+
+use super::belief::{Belief, ETA, Model, N};
 
 /// Takes a sample into what is believed; the innovation and its variance as expected.
 pub(super) type Update = fn(&Model, &mut Belief, f64, f64) -> [f64; 2];
@@ -85,7 +83,7 @@ impl JointFilter {
             model,
             first: belief,
             belief,
-            bounds: start::physical_bounds::<OPERATOR>(setup, sample_time)?,
+            bounds: physical_bounds::<OPERATOR>(setup, sample_time)?,
             delay: DelayLine::new(vec![0.0; setup.orders.nk]),
             reported: Reported::new(from, setup.orders.nk, sample_time),
             expected: from.variance,

@@ -100,7 +100,7 @@ fn the_response_of_physical_has_the_delay_of_its_row() {
     let physical = TrackOptions {
         start: StartAt::Span(Some((0.0, 30.72))),
         at_rad_s: vec![2.5],
-        ..TrackOptions::usual(Method::physical(), NK)
+        ..TrackOptions::usual(hoid_survey::physical(), NK)
     };
     // A memory that lets the delay go.
     let options = physical

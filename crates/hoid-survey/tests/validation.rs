@@ -65,7 +65,7 @@ fn the_vaf_of_a_trace_that_stays_is_that_of_its_model() {
 #[test]
 fn the_best_of_the_grid_is_taken() {
     let (record, other) = (run(0.1, 3), run(0.1, 4));
-    for method in [Method::rls(), Method::rpem(), Method::physical()] {
+    for method in [Method::rls(), Method::rpem(), hoid_survey::physical()] {
         let (chosen, choice) = choose_covariance(&record, &other, &options(method.clone())).unwrap();
         assert_eq!(choice.candidates.len(), COVARIANCES.len());
         assert_eq!(chosen.method.covariance(), Some(choice.covariance));
@@ -101,7 +101,7 @@ fn what_cannot_choose_is_refused_with_what_to_do() {
         found.contains("covariance: found 0.1") && found.contains("one of the two"),
         "{found}"
     );
-    for method in [Method::adaptive(), Method::multiple_model(), Method::window()] {
+    for method in [Method::adaptive(), hoid_survey::multiple_model(), hoid_survey::window()] {
         let found = says(&other, &options(method.clone()));
         assert!(
             found.contains(method.name()) && found.contains("rls or rpem"),
@@ -180,7 +180,7 @@ fn the_covariance_shrinks_where_less_is_explained() {
             .to_string()
     };
     assert!(says(&other, options(Method::rpem())).contains("6000 samples"));
-    assert!(says(&record, options(Method::window())).contains("rls or rpem"));
+    assert!(says(&record, options(hoid_survey::window())).contains("rls or rpem"));
     let tracked = options(Method::rpem()).with(&[("track_delay", "0.2..0.4")]).unwrap();
     assert!(says(&record, tracked).contains("without track_delay"));
     // A second run in which nothing happens says nothing.

@@ -6,36 +6,34 @@
 //! The numbers were set on conditions C3 and C5 with remnants of order 2 and 3; the errors change
 //! by a tenth or less when any of them is halved or doubled.
 
+mod smoother;
+
 use std::{collections::BTreeMap, ops::RangeInclusive};
 
 use hoid_core::{
     delay::DelayLine,
     innovation_variance::InnovationVariance,
     multiple_model::{
-        MultipleModelFilter,
-        hypothesis::Hypothesis,
+        MultipleModelFilter, change as kernel_change,
+        hypothesis::{self as kernel, Hypothesis},
         prior::{ChangePrior, DelayPrior, OPERATOR},
         response::Signals,
     },
     state::{State, visit_all},
 };
 use hoid_model::{
-    SampleTime, Structure,
+    Record, SampleTime, Structure,
     uncertainty::{Estimate, OperatorEstimate},
 };
 
 use hoid_ident::{Constraint, IdentError, settings, settings::Bounds};
 
-use crate::{
-    change::Change,
-    guard::{GuardChoice, GuardOptions},
-    memory::Memory,
-    method::{About, RecursiveMethod, bad as bad_option, check_delay, check_operator_orders},
-    recursion::{Recursion, Sample, StepOutcome},
-    reported::Reported,
-    setup::{Setup, StartAt},
-    shared_options::{BoundOptions, DelayOptions},
-    start::{self, StartState},
+use hoid_track::{
+    BoundOptions, Change, DelayOptions, GuardChoice, GuardOptions, Memory, Sample, StartAt,
+    building::{
+        About, Causal, Recursion, RecursiveMethod, Reported, Setup, StartState, StepOutcome, TwoSided,
+        bad as bad_option, check_delay, check_operator_orders, physical_bounds,
+    },
 };
 
 /// Room for hypotheses where the delay is known, where it is not, and the largest order of the
@@ -184,6 +182,10 @@ impl RecursiveMethod for MultipleModelOptions {
         self.smooth
     }
 
+    fn two_sided(&self, record: &Record, causal: &Causal, from: &StartState) -> Result<Vec<TwoSided>, IdentError> {
+        smoother::smooth(self, record, causal, from)
+    }
+
     fn guard(&self) -> Option<GuardChoice> {
         self.guard.guard.or(Some(GuardChoice::Yes))
     }
@@ -241,7 +243,7 @@ fn delays(setup: &Setup, sample_time: SampleTime) -> RangeInclusive<usize> {
 /// What is supposed of changes, in samples.
 ///
 /// # Errors
-/// As [`start::physical_bounds`].
+/// As [`physical_bounds`].
 pub(crate) fn change_prior(
     options: &MultipleModelOptions,
     setup: &Setup,
@@ -251,7 +253,7 @@ pub(crate) fn change_prior(
     let spacing = (SPACING_S / ts).round().max(1.0);
     Ok(ChangePrior {
         sample_time: ts,
-        bounds: start::physical_bounds::<OPERATOR>(setup, sample_time)?,
+        bounds: physical_bounds::<OPERATOR>(setup, sample_time)?,
         birth_interval: spacing as u32,
         // Where samples are further apart than changes are supposed to be, half of them.
         hazard: (ts / BETWEEN_CHANGES_S).min(0.5 / spacing),
@@ -365,6 +367,37 @@ impl<const M: usize> MultipleModelRecursion<M> {
     }
 }
 
+/// A change of the kernel in seconds, with the delay tau_e before and after.
+fn declared(change: &kernel_change::Change, tau_e_s: [Estimate; 2], sample_time: SampleTime) -> Change {
+    let (before, now) = (&change.before, &change.after);
+    let pair = |i: usize| {
+        let of = |b: &kernel::Snapshot| {
+            if i < 2 {
+                b.gain_covariance[i]
+            } else {
+                b.neuromuscular_variance[i - 2]
+            }
+        };
+        [before, now].map(|b| Estimate::with_variance(b.eta[i], of(b)))
+    };
+    let lead = |b: &kernel::Snapshot| {
+        (b.eta[0] * b.eta[1] + b.gain_covariance[2]) / (b.eta[0] * b.eta[0] + b.gain_covariance[0])
+    };
+    Change {
+        seconds_ago: change.samples_ago as f64 * sample_time.s(),
+        odds: change.log_odds,
+        k_e: pair(0),
+        k_e_dot: pair(1),
+        omega_nm_rad_s: pair(2),
+        zeta_nm: pair(3),
+        tau_e_s,
+        t_l_s: [lead(before), lead(now)],
+        innovation_variance: [before.innovation_variance, now.innovation_variance],
+        z: change.z,
+        of_operator: false,
+    }
+}
+
 impl<const M: usize> State for MultipleModelRecursion<M> {
     fn visit(&mut self, each: &mut dyn FnMut(&mut f64)) {
         visit_all(&mut [&mut *self.model, &mut self.delay, &mut self.reported], each);
@@ -421,6 +454,6 @@ impl<const M: usize> Recursion for MultipleModelRecursion<M> {
     fn change(&self) -> Option<Change> {
         let change = self.model.bank().change()?;
         let tau_e_s = [change.before, change.after].map(|b| self.delay_s(b.delay));
-        Some(Change::new(&change, tau_e_s, self.sample_time))
+        Some(declared(&change, tau_e_s, self.sample_time))
     }
 }

@@ -4,13 +4,9 @@ use hoid_ident::{IdentError, iv::FORCING_CHANNEL, settings};
 use hoid_model::{Record, SampleTime, Structure};
 
 use super::{RefinedRecursion, RefinedStart};
-use crate::{
-    memory::{Memory, MemoryOptions},
-    method::{About, RecursiveMethod, bad},
-    methods::rpem::short_for_b,
-    recursion::Recursion,
-    setup::Setup,
-    start::StartState,
+use hoid_track::{
+    Memory, MemoryOptions,
+    building::{About, Recursion, RecursiveMethod, Setup, StartState, bad, short_for_b},
 };
 
 settings! {

@@ -35,15 +35,10 @@ use hoid_core::multiple_model::{
 use hoid_model::Record;
 use hoid_numerics::{cholesky, products::dot};
 
-use crate::{
-    Trace,
-    methods::{Method, MultipleModelOptions, change_prior, first_hypothesis, outside},
-    reported::Reported,
-    setup::Setup,
-    start::StartState,
-    trace::{pack, packed_len},
-};
 use hoid_ident::IdentError;
+use hoid_track::building::{Causal, Reported, Setup, StartState, TwoSided};
+
+use super::{MultipleModelOptions, change_prior, first_hypothesis, outside};
 
 /// Room for hypotheses, and time between two births, s.
 const HYPOTHESES: usize = 64;
@@ -97,45 +92,34 @@ pub(crate) struct Joined {
 /// Output and signals behind the whitening filter; `None` where they are not known.
 type Seen = Option<(f64, Signals)>;
 
-/// Replaces the estimates of a causal trace of a record by two-sided ones.
+/// The two-sided estimates of the rows of a causal run.
 ///
 /// # Errors
 /// [`IdentError::BadStart`] for a start that cannot be used.
-pub(crate) fn smooth(record: &Record, trace: &mut Trace, from: &StartState) -> Result<(), IdentError> {
-    let (options, setup) = (trace.options.clone(), trace.options.setup()?);
-    let Method::MultipleModel(own) = &options.method else {
-        return Ok(());
-    };
-    let rows = kept_rows(record.len(), trace.every);
-    let about = trace.operator.last().map_or([from.values[2], from.values[3]], |o| {
+pub(super) fn smooth(
+    own: &MultipleModelOptions,
+    record: &Record,
+    causal: &Causal,
+    from: &StartState,
+) -> Result<Vec<TwoSided>, IdentError> {
+    let about = causal.last.map_or([from.values[2], from.values[3]], |o| {
         [o.omega_nm_rad_s.value, o.zeta_nm.value]
     });
-    let joined = two_sided(record, own, &setup, options.largest, from, about, &rows)?;
-    let mut reported = Reported::new(from, options.orders.nk, record.sample_time());
+    let joined = two_sided(record, own, &causal.setup, causal.largest, from, about, &causal.rows)?;
+    let mut reported = Reported::new(from, causal.setup.orders.nk, record.sample_time());
     let p = reported.theta().len();
-    let mut covariance = vec![0.0; p * p];
-    trace.theta.clear();
-    trace.covariance.clear();
-    trace.covariance.reserve(rows.len() * packed_len(p));
-    trace.operator.clear();
-    trace.innovation_variance.clear();
-    for row in &joined {
-        reported.set(row.eta);
-        reported.covariance(&row.covariance, &mut covariance);
-        trace.theta.extend_from_slice(reported.theta());
-        pack(&covariance, p, &mut trace.covariance);
-        let operator = reported.operator(row.eta, &row.covariance, lead(row));
-        trace.operator.push(operator);
-        trace.innovation_variance.push(row.variance);
-    }
-    trace.updated_from_s = record.time_s(0);
-    Ok(())
-}
-
-/// The samples of which a trace has rows.
-fn kept_rows(samples: usize, every: usize) -> Vec<usize> {
-    let kept = |k: &usize| (k + 1).is_multiple_of(every) || k + 1 == samples;
-    (0..samples).filter(kept).collect()
+    let mut row = |of: &Joined| {
+        let mut covariance = vec![0.0; p * p];
+        reported.set(of.eta);
+        reported.covariance(&of.covariance, &mut covariance);
+        TwoSided {
+            theta: reported.theta().to_vec(),
+            covariance,
+            operator: reported.operator(of.eta, &of.covariance, lead(of)),
+            innovation_variance: of.variance,
+        }
+    };
+    Ok(joined.iter().map(&mut row).collect())
 }
 
 /// The mixtures of pairs at the samples asked for, ascending.

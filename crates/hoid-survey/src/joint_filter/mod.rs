@@ -34,15 +34,12 @@ use std::collections::BTreeMap;
 use hoid_ident::{Constraint, IdentError, settings};
 use hoid_model::{SampleTime, Structure};
 
-use super::multiple_model::check_model_of_change;
-use crate::{
-    memory::Memory,
-    method::{About, RecursiveMethod},
-    recursion::Recursion,
-    setup::Setup,
-    shared_options::BoundOptions,
-    start::StartState,
+use hoid_track::{
+    BoundOptions, Memory,
+    building::{About, Recursion, RecursiveMethod, Setup, StartState},
 };
+
+use crate::multiple_model::check_model_of_change;
 
 use filter::JointFilter;
 

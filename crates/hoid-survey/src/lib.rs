@@ -1,0 +1,48 @@
+//! The recursive methods of the literature beside those of hoid: for comparison.
+//!
+//! Each follows the source that its file names, and is a [`Method`](hoid_track::Method) as the default is: the tracker,
+//! the guard, saved states, traces and verdicts of [`hoid_track`] are those of all. This crate sees all
+//! methods, and holds the one list of their names.
+//!
+//! ```
+//! use hoid_model::scenario::{Condition, Scenario};
+//! use hoid_sim::{RunSeed, Simulator};
+//! use hoid_track::{TrackOptions, track};
+//!
+//! let simulator = Simulator::new(&Scenario::condition(Condition::C4))?;
+//! let record = simulator.run(RunSeed::default(), false)?;
+//! let physical = hoid_survey::method("physical")?;
+//! let options = TrackOptions::usual(physical, 29).with(&[("memory_of", "K_e=4s")])?;
+//! let trace = track(&record, &options, 100)?;
+//!
+//! // The task changes at 40.96 s, and K_e_dot rises from .036 to .084 s.
+//! let last = trace.operator(trace.len() - 1)?;
+//! assert!((last.k_e_dot.value - 0.084).abs() < 0.02);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! | module | method |
+//! |---|---|
+//! | `registry` | [`methods()`]: all methods, those of [`hoid_track`] too, by name |
+//! | `physical` | `physical`: the prediction-error method in the operator's parameters |
+//! | `window` | `window`: a batch fit of the last seconds, again and again |
+//! | `rriv` | `rriv`: recursive refined instrumental variable |
+//! | `multiple_model` | `multiple-model`: a bank of hypotheses of when the person changed; its two-sided estimate |
+//! | `fused` | `fused`: least squares for B with the poles of the prediction-error method |
+//! | `joint_filter` | `ekf`, `ukf`: Kalman filters of state and parameters |
+
+mod fused;
+mod joint_filter;
+mod multiple_model;
+mod physical;
+mod registry;
+mod rriv;
+mod window;
+
+pub use fused::FusedOptions;
+pub use joint_filter::{EkfOptions, UkfOptions};
+pub use multiple_model::MultipleModelOptions;
+pub use physical::PhysicalOptions;
+pub use registry::{ekf, fused, method, methods, multiple_model, physical, registry, renamed, rriv, set, ukf, window};
+pub use rriv::RrivOptions;
+pub use window::WindowOptions;
