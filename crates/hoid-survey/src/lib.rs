@@ -30,9 +30,11 @@
 //! | `multiple_model` | `multiple-model`: a bank of hypotheses of when the person changed; its two-sided estimate |
 //! | `fused` | `fused`: least squares for B with the poles of the prediction-error method |
 //! | `joint_filter` | `ekf`, `ukf`: Kalman filters of state and parameters |
+//! | `known_noise` | what methods have in common that know the noise model from a batch fit |
 
 mod fused;
 mod joint_filter;
+mod known_noise;
 mod multiple_model;
 mod physical;
 mod registry;

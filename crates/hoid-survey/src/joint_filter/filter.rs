@@ -13,6 +13,8 @@ use hoid_track::{
     building::{OPERATOR, Recursion, Reported, Setup, StartState, StepOutcome, physical_bounds},
 };
 
+use crate::known_noise::lead_of;
+
 use super::belief::{Belief, ETA, Model, N};
 
 /// Takes a sample into what is believed; the innovation and its variance as expected.
@@ -213,9 +215,6 @@ impl Recursion for JointFilter {
 
     fn operator(&self) -> Option<OperatorEstimate> {
         let (eta, c) = (self.eta(), self.of_eta());
-        let t_l = eta[1] / eta[0];
-        let of_ratio = c[1][1] - 2.0 * t_l * c[0][1] + t_l * t_l * c[0][0];
-        let lead = [t_l, of_ratio.max(0.0) / (eta[0] * eta[0])];
-        Some(self.reported.operator(eta, &c, lead))
+        Some(self.reported.operator(eta, &c, lead_of(eta, &c)))
     }
 }

@@ -39,7 +39,7 @@ use hoid_track::{
     building::{About, Recursion, RecursiveMethod, Setup, StartState},
 };
 
-use crate::multiple_model::check_model_of_change;
+use crate::known_noise::check_model_of_change;
 
 use filter::JointFilter;
 

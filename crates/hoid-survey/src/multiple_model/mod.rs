@@ -6,18 +6,15 @@
 //! The numbers were set on conditions C3 and C5 with remnants of order 2 and 3; the errors change
 //! by a tenth or less when any of them is halved or doubled.
 
+mod prior;
 mod smoother;
 
-use std::{collections::BTreeMap, ops::RangeInclusive};
+use std::collections::BTreeMap;
 
 use hoid_core::{
     delay::DelayLine,
-    innovation_variance::InnovationVariance,
     multiple_model::{
-        MultipleModelFilter, change as kernel_change,
-        hypothesis::{self as kernel, Hypothesis},
-        prior::{ChangePrior, DelayPrior, OPERATOR},
-        response::Signals,
+        MultipleModelFilter, change as kernel_change, hypothesis as kernel, prior::OPERATOR, response::Signals,
     },
     state::{State, visit_all},
 };
@@ -29,61 +26,21 @@ use hoid_model::{
 use hoid_ident::{Constraint, IdentError, settings, settings::Bounds};
 
 use hoid_track::{
-    BoundOptions, Change, DelayOptions, GuardChoice, GuardOptions, Memory, Sample, StartAt,
+    BoundOptions, Change, DelayOptions, GuardChoice, GuardOptions, Memory, Sample,
     building::{
         About, Causal, Recursion, RecursiveMethod, Reported, Setup, StartState, StepOutcome, TwoSided,
-        bad as bad_option, check_delay, check_operator_orders, physical_bounds,
+        bad as bad_option,
     },
 };
 
-/// Room for hypotheses where the delay is known, where it is not, and the largest order of the
-/// noise model.
+use crate::known_noise::{LARGEST_ND, check_model_of_change};
+use prior::{bad, change_prior, delays, first_hypothesis, outside};
+
+/// Room for hypotheses where the delay is known, and where it is not.
 const HYPOTHESES: usize = 16;
 const WITH_DELAYS: usize = 48;
-pub(crate) const LARGEST_ND: usize = 8;
 /// Standard deviations beyond which an innovation moves the estimate no further.
 const LIMIT: f64 = 3.5;
-/// Time between two births, s.
-const SPACING_S: f64 = 0.32;
-/// Mean time between two changes, s.
-const BETWEEN_CHANGES_S: f64 = 60.0;
-/// Change of K_e and of K_e_dot to be expected, in the units of [`ChangePrior::gain_jump`].
-const JUMP: [f64; 2] = [0.15, 0.5];
-/// Drift of the gains in one second, in the same units.
-const DRIFT: f64 = 0.005;
-/// The drift just after a change, for K_e and K_e_dot in the same units, for omega_nm and zeta_nm
-/// in those of a change of them; and how long it lasts, s.
-const UNREST: [f64; OPERATOR] = [0.05, 0.25, 0.2, 0.2];
-const UNREST_FOR_S: f64 = 3.0;
-/// Relative change of omega_nm and of zeta_nm to be expected, how many births there are for one of
-/// this kind, and its odds against the other.
-const NEUROMUSCULAR: [f64; 2] = [0.25, 0.4];
-const WHOLE_EVERY: u32 = 4;
-const WHOLE_ODDS: f64 = 0.3;
-/// Crossover at which the gains are compared, rad/s.
-const CROSSOVER_RAD_S: f64 = 2.0;
-/// Memory of the innovation variance, and what of it is left after a change, s.
-const LEVEL_MEMORY_S: f64 = 20.0;
-const DOUBT_S: f64 = 1.0;
-/// Births for which a hypothesis is kept whatever it foretells.
-const PROTECTED_BIRTHS: f64 = 4.0;
-/// Age from which a hypothesis can say what changed, s.
-const SETTLED_S: f64 = 0.5;
-/// A hypothesis of up to this age stands for a change, s.
-const RECENT_S: f64 = 4.0;
-
-/// Births for one time at which other delays are proposed, how many of them, the odds of a change
-/// of the delay against one of the gains alone, its standard deviation in s, and the probability of
-/// a delay next to the likeliest.
-const DELAYS_EVERY: u32 = 4;
-const DELAYS_PROPOSED: usize = 8;
-const DELAY_ODDS: f64 = 1.0;
-const DELAY_JUMP_S: f64 = 0.05;
-const NEIGHBOUR: f64 = 0.15;
-/// What 0.01 s of delay is worth in K_e, K_e_dot, omega_nm and zeta_nm, in the units of
-/// [`DelayPrior::error_per_sample`].
-const WORTH: [f64; OPERATOR] = [0.01, 0.03, 0.04, 0.08];
-
 /// Order of the noise model when none is named: the odds need innovations that are white.
 const USUAL_ND: usize = 6;
 
@@ -183,7 +140,7 @@ impl RecursiveMethod for MultipleModelOptions {
     }
 
     fn two_sided(&self, record: &Record, causal: &Causal, from: &StartState) -> Result<Vec<TwoSided>, IdentError> {
-        smoother::smooth(self, record, causal, from)
+        smoother::smooth(self.alarm, record, causal, from)
     }
 
     fn guard(&self) -> Option<GuardChoice> {
@@ -205,116 +162,6 @@ impl RecursiveMethod for MultipleModelOptions {
     fn retain(&mut self, known: &dyn Fn(&str) -> bool) {
         self.bounds.bound.retain(|key, _| known(key));
     }
-}
-
-/// Checks what a method needs that has a model of how the person changes.
-///
-/// # Errors
-/// [`IdentError::BadOption`].
-pub(crate) fn check_model_of_change(name: &str, setup: &Setup) -> Result<(), IdentError> {
-    check_operator_orders(name, setup)?;
-    check_delay(&setup.orders)?;
-    let o = &setup.orders;
-    if !(o.nc == 0 && o.nd <= LARGEST_ND) {
-        return Err(bad_option(
-            &format!("the noise model of {name}"),
-            format!("nc={},nd={}", o.nc, o.nd),
-            "nc = 0 and nd of at most 8",
-        ));
-    }
-    if !matches!(setup.start, StartAt::Span(_)) {
-        return Err(bad_option(
-            &format!("the start of {name}"),
-            "no batch fit".to_owned(),
-            "the batch fit of a span, whose noise model and covariance it needs",
-        ));
-    }
-    Ok(())
-}
-
-/// The delays in question, in samples of nk: nk itself, or those of the range that is tracked.
-fn delays(setup: &Setup, sample_time: SampleTime) -> RangeInclusive<usize> {
-    match setup.track_delay_s {
-        None => setup.orders.nk..=setup.orders.nk,
-        Some((low, high)) => sample_time.nk(low)..=sample_time.nk(high),
-    }
-}
-
-/// What is supposed of changes, in samples.
-///
-/// # Errors
-/// As [`physical_bounds`].
-pub(crate) fn change_prior(
-    options: &MultipleModelOptions,
-    setup: &Setup,
-    sample_time: SampleTime,
-) -> Result<ChangePrior, IdentError> {
-    let ts = sample_time.s();
-    let spacing = (SPACING_S / ts).round().max(1.0);
-    Ok(ChangePrior {
-        sample_time: ts,
-        bounds: physical_bounds::<OPERATOR>(setup, sample_time)?,
-        birth_interval: spacing as u32,
-        // Where samples are further apart than changes are supposed to be, half of them.
-        hazard: (ts / BETWEEN_CHANGES_S).min(0.5 / spacing),
-        gain_jump: JUMP,
-        gain_drift: DRIFT * ts.sqrt(),
-        transient_drift: UNREST.map(|u| u * ts.sqrt()),
-        transient_time_constant: UNREST_FOR_S / ts,
-        neuromuscular_jump: NEUROMUSCULAR,
-        neuromuscular_every: WHOLE_EVERY,
-        neuromuscular_odds: WHOLE_ODDS,
-        crossover: CROSSOVER_RAD_S,
-        residuals_after_change: (DOUBT_S / ts).max(4.0),
-        pruning_age: (PROTECTED_BIRTHS * spacing) as u64,
-        outlier_limit: setup.limit,
-        settling_time: (SETTLED_S / ts).round() as u64,
-        change_window: (RECENT_S / ts).round().max(2.0 * spacing) as u64,
-        log_odds_threshold: options.alarm,
-        delay: match delays(setup, sample_time).count() {
-            1 => DelayPrior::KNOWN,
-            count => DelayPrior {
-                count,
-                propose_every: DELAYS_EVERY,
-                change_odds: DELAY_ODDS,
-                proposals: DELAYS_PROPOSED,
-                jump: DELAY_JUMP_S / ts,
-                neighbour_probability: NEIGHBOUR,
-                error_per_sample: WORTH.map(|w| w * ts / 0.01),
-            },
-        },
-    })
-}
-
-/// The first hypothesis, from the batch fit of the start span, its covariance so many times larger.
-///
-/// # Errors
-/// [`IdentError::BadStart`] without a fit, or where it lies outside the bounds.
-pub(crate) fn first_hypothesis(
-    from: &StartState,
-    times: f64,
-    sample_time: SampleTime,
-) -> Result<Hypothesis, IdentError> {
-    if !from.from_fit {
-        return Err(bad(
-            "multiple-model needs the noise model of a batch fit; start it from the fit of a span",
-        ));
-    }
-    let p = from.values.len();
-    let covariance = std::array::from_fn(|i| std::array::from_fn(|j| times * from.variance * from.spread[i * p + j]));
-    let memory = (LEVEL_MEMORY_S / sample_time.s()).max(10.0);
-    let level = InnovationVariance::new(from.variance, from.residuals.clamp(1.0, memory), 1.0 - 1.0 / memory);
-    Hypothesis::new(std::array::from_fn(|i| from.values[i]), &covariance, level).ok_or_else(outside)
-}
-
-fn bad(reason: &str) -> IdentError {
-    IdentError::BadStart {
-        reason: reason.to_owned(),
-    }
-}
-
-pub(crate) fn outside() -> IdentError {
-    bad("it lies outside the bounds of the physical parameters, or its covariance is not positive")
 }
 
 /// The bank with its filters and its delay line, which is as long as the shortest delay.
@@ -344,8 +191,9 @@ impl<const M: usize> MultipleModelRecursion<M> {
         let first = first_hypothesis(from, 1.0, sample_time)?.with_extra_delay(nk - shortest);
         let d = &from.values[OPERATOR..];
         let memory = vec![[0.0; 6]; delays.count()];
-        let model = MultipleModelFilter::with_delays(first, d, change_prior(options, setup, sample_time)?, memory)
-            .ok_or_else(outside)?;
+        let model =
+            MultipleModelFilter::with_delays(first, d, change_prior(options.alarm, setup, sample_time)?, memory)
+                .ok_or_else(outside)?;
         Ok(Self {
             model: Box::new(model),
             delay: DelayLine::new(vec![0.0; shortest]),

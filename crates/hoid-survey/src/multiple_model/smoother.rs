@@ -38,7 +38,7 @@ use hoid_numerics::{cholesky, products::dot};
 use hoid_ident::IdentError;
 use hoid_track::building::{Causal, Reported, Setup, StartState, TwoSided};
 
-use super::{MultipleModelOptions, change_prior, first_hypothesis, outside};
+use super::prior::{change_prior, first_hypothesis, outside};
 
 /// Room for hypotheses, and time between two births, s.
 const HYPOTHESES: usize = 64;
@@ -97,7 +97,7 @@ type Seen = Option<(f64, Signals)>;
 /// # Errors
 /// [`IdentError::BadStart`] for a start that cannot be used.
 pub(super) fn smooth(
-    own: &MultipleModelOptions,
+    alarm: f64,
     record: &Record,
     causal: &Causal,
     from: &StartState,
@@ -105,7 +105,7 @@ pub(super) fn smooth(
     let about = causal.last.map_or([from.values[2], from.values[3]], |o| {
         [o.omega_nm_rad_s.value, o.zeta_nm.value]
     });
-    let joined = two_sided(record, own, &causal.setup, causal.largest, from, about, &causal.rows)?;
+    let joined = two_sided(record, alarm, &causal.setup, causal.largest, from, about, &causal.rows)?;
     let mut reported = Reported::new(from, causal.setup.orders.nk, record.sample_time());
     let p = reported.theta().len();
     let mut row = |of: &Joined| {
@@ -125,7 +125,7 @@ pub(super) fn smooth(
 /// The mixtures of pairs at the samples asked for, ascending.
 fn two_sided(
     record: &Record,
-    options: &MultipleModelOptions,
+    alarm: f64,
     setup: &Setup,
     largest: f64,
     from: &StartState,
@@ -134,7 +134,7 @@ fn two_sided(
 ) -> Result<Vec<Joined>, IdentError> {
     let sample_time = record.sample_time();
     let spacing = (SPACING_S / sample_time.s()).round().max(1.0);
-    let usual = change_prior(options, setup, sample_time)?;
+    let usual = change_prior(alarm, setup, sample_time)?;
     let supposed = ChangePrior {
         birth_interval: spacing as u32,
         hazard: usual.hazard.min(0.5 / spacing),
