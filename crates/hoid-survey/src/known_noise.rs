@@ -35,6 +35,18 @@ pub(crate) fn check_model_of_change(name: &str, setup: &Setup) -> Result<(), Ide
     Ok(())
 }
 
+/// As [`check_model_of_change`], of a method whose noise model is of order 1.
+///
+/// # Errors
+/// [`IdentError::BadOption`].
+pub(crate) fn check_first_order(name: &str, setup: &Setup) -> Result<(), IdentError> {
+    check_model_of_change(name, setup)?;
+    match setup.orders.nd {
+        1 => Ok(()),
+        nd => Err(bad(&format!("the noise model of {name}"), format!("nd={nd}"), "nd = 1")),
+    }
+}
+
 /// T_L = K_e_dot/K_e, and its variance to first order, `d T_L = (d K_e_dot - T_L d K_e)/K_e`.
 pub(crate) fn lead_of(eta: [f64; OPERATOR], c: &[[f64; OPERATOR]; OPERATOR]) -> [f64; 2] {
     let t_l = eta[1] / eta[0];

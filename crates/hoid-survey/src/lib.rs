@@ -29,22 +29,33 @@
 //! | `rriv` | `rriv`: recursive refined instrumental variable |
 //! | `multiple_model` | `multiple-model`: a bank of hypotheses of when the person changed; its two-sided estimate |
 //! | `fused` | `fused`: least squares for B with the poles of the prediction-error method |
+//! | [`kernel`] | the arithmetic of a sample of `physical` and `multiple-model` |
 //! | `joint_filter` | `ekf`, `ukf`: Kalman filters of state and parameters |
+//! | `dual_ekf` | `dual-ekf`: two Kalman filters that take turns, of state and of parameters |
+//! | `linear_network` | `linear-network`: one linear layer that learns the gains |
 //! | `known_noise` | what methods have in common that know the noise model from a batch fit |
 
+mod dual_ekf;
 mod fused;
 mod joint_filter;
+pub mod kernel;
 mod known_noise;
+mod linear_network;
 mod multiple_model;
 mod physical;
 mod registry;
 mod rriv;
 mod window;
 
+pub use dual_ekf::DualEkfOptions;
 pub use fused::FusedOptions;
 pub use joint_filter::{EkfOptions, UkfOptions};
+pub use linear_network::LinearNetworkOptions;
 pub use multiple_model::MultipleModelOptions;
 pub use physical::PhysicalOptions;
-pub use registry::{ekf, fused, method, methods, multiple_model, physical, registry, renamed, rriv, set, ukf, window};
+pub use registry::{
+    dual_ekf, ekf, fused, is_for_comparison, linear_network, method, methods, multiple_model, physical, registry,
+    renamed, rriv, set, ukf, window,
+};
 pub use rriv::RrivOptions;
 pub use window::WindowOptions;

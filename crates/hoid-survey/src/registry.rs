@@ -4,7 +4,10 @@
 use hoid_ident::{IdentError, settings::MethodSpec};
 use hoid_track::{AdaptiveOptions, Method, RlsOptions, RpemOptions, building::bad};
 
-use crate::{EkfOptions, FusedOptions, MultipleModelOptions, PhysicalOptions, RrivOptions, UkfOptions, WindowOptions};
+use crate::{
+    DualEkfOptions, EkfOptions, FusedOptions, LinearNetworkOptions, MultipleModelOptions, PhysicalOptions, RrivOptions,
+    UkfOptions, WindowOptions,
+};
 
 macro_rules! methods {
     ($($(#[doc = $doc:literal])+ $name:ident = $options:ty),+ $(,)?) => {
@@ -34,6 +37,11 @@ methods! {
     ekf = EkfOptions,
     /// Unscented Kalman filter of state and physical parameters: Box-Jenkins with nc = 0.
     ukf = UkfOptions,
+    /// Two extended Kalman filters that take turns, of state and of physical parameters: Box-Jenkins with
+    /// nc = 0 and nd = 1.
+    dual_ekf = DualEkfOptions,
+    /// A linear layer that learns K_e and K_e_dot: Box-Jenkins with nc = 0 and nd = 1.
+    linear_network = LinearNetworkOptions,
 }
 
 /// All methods with their defaults, in the order of help.
@@ -49,7 +57,16 @@ pub fn methods() -> Vec<Method> {
         fused(),
         ekf(),
         ukf(),
+        dual_ekf(),
+        linear_network(),
     ]
+}
+
+/// True for a method of this crate: help in short does without it.
+pub fn is_for_comparison(method: &Method) -> bool {
+    ![Method::rls(), Method::rpem(), Method::default()]
+        .iter()
+        .any(|own| own.name() == method.name())
 }
 
 /// What is known of each method: what command line, plans, Python and the book read.

@@ -7,7 +7,7 @@ use hoid_model::{
 };
 use hoid_sim::{RunSeed, Simulator};
 
-use hoid_survey::{ekf, fused, multiple_model, physical, rriv, ukf, window};
+use hoid_survey::{dual_ekf, ekf, fused, linear_network, multiple_model, physical, rriv, ukf, window};
 use hoid_track::{Method, Sample, TrackOptions, Tracker, sealed};
 
 fn record() -> Record {
@@ -39,6 +39,9 @@ fn a_restored_tracker_goes_on_with_the_same_digits() {
         of(fused()),
         of(ekf()),
         of(ukf()),
+        of(dual_ekf()),
+        of(dual_ekf()).with(&[("pade", "2")]).unwrap(),
+        of(linear_network()),
         of(window()).with(&[("refit", "400")]).unwrap(),
         of(rriv()).with(&[("instruments", "f_t")]).unwrap(),
         of(physical()).with(&[("track_delay", "0.2..0.35")]).unwrap(),
@@ -107,6 +110,9 @@ fn numbers_that_were_changed_and_sealed_again_end_nothing() {
             .with(&[("replay", "5")])
             .unwrap(),
         of(ekf()),
+        of(dual_ekf()),
+        of(dual_ekf()).with(&[("pade", "2")]).unwrap(),
+        of(linear_network()),
         of(fused()),
         of(window()).with(&[("refit", "200")]).unwrap(),
     ];

@@ -28,9 +28,15 @@ pub const TEXT_PLANS: &[NamedPlan] = named![
     "lead-change",
 ];
 
+/// The recursive methods of the survey on the same runs.
+pub const SURVEY: &NamedPlan = &NamedPlan {
+    name: "survey",
+    text: include_str!("../plans/survey.toml"),
+};
+
 /// All named plans: those of the reference text, and those of what goes beyond it.
 pub fn named_plans() -> impl Iterator<Item = &'static NamedPlan> {
-    TEXT_PLANS.iter().chain(PLANS)
+    TEXT_PLANS.iter().chain(PLANS).chain([SURVEY])
 }
 
 /// The named plan of a name.

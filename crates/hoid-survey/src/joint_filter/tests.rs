@@ -5,7 +5,7 @@ use super::{
     filter::power,
     ukf,
 };
-use hoid_core::multiple_model::response::Response;
+use crate::kernel::multiple_model::response::Response;
 
 const MODEL: Model = Model {
     ts: 0.01,

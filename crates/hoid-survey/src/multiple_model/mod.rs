@@ -1,4 +1,4 @@
-//! The bank of hypotheses of the real-time kernel ([`hoid_core::multiple_model`]) behind the face of a
+//! The bank of hypotheses of the real-time kernel ([`crate::kernel::multiple_model`]) behind the face of a
 //! recursion: what it supposes of a person, in seconds.
 //!
 //! Where the delay is tracked, other delays are proposed every 1.28 s.
@@ -13,9 +13,6 @@ use std::collections::BTreeMap;
 
 use hoid_core::{
     delay::DelayLine,
-    multiple_model::{
-        MultipleModelFilter, change as kernel_change, hypothesis as kernel, prior::OPERATOR, response::Signals,
-    },
     state::{State, visit_all},
 };
 use hoid_model::{
@@ -33,7 +30,12 @@ use hoid_track::{
     },
 };
 
-use crate::known_noise::{LARGEST_ND, check_model_of_change};
+use crate::{
+    kernel::multiple_model::{
+        MultipleModelFilter, change as kernel_change, hypothesis as kernel, prior::OPERATOR, response::Signals,
+    },
+    known_noise::{LARGEST_ND, check_model_of_change},
+};
 use prior::{bad, change_prior, delays, first_hypothesis, outside};
 
 /// Room for hypotheses where the delay is known, and where it is not.

@@ -2,16 +2,15 @@
 
 use std::ops::RangeInclusive;
 
-use hoid_core::{
-    innovation_variance::InnovationVariance,
-    multiple_model::{
-        hypothesis::Hypothesis,
-        prior::{ChangePrior, DelayPrior, OPERATOR},
-    },
-};
+use hoid_core::innovation_variance::InnovationVariance;
 use hoid_ident::IdentError;
 use hoid_model::SampleTime;
 use hoid_track::building::{Setup, StartState, physical_bounds};
+
+use crate::kernel::multiple_model::{
+    hypothesis::Hypothesis,
+    prior::{ChangePrior, DelayPrior, OPERATOR},
+};
 
 /// Time between two births, s.
 const SPACING_S: f64 = 0.32;

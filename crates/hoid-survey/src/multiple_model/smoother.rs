@@ -1,7 +1,7 @@
 //! The two-sided estimate of a recorded run: what all of its samples say of the operator at each of
 //! them.
 //!
-//! Behind the whitening filter the model of [`hoid_core::multiple_model`] has no dynamics:
+//! Behind the whitening filter the model of [`crate::kernel::multiple_model`] has no dynamics:
 //! `y(t) = K_e psi_1 + K_e_dot psi_2 + eps`, with signals that the record gives once for all. The
 //! bank of hypotheses may therefore be run over it from either end. At t the run from the front
 //! says `p(eta_t | y_1..y_t) = sum_f P(f) N(m_f, P_f)`, where f says when the person changed last,
@@ -25,7 +25,7 @@
 //!
 //! There is time for more hypotheses here: one is born every 0.08 s, and there is room for 64.
 
-use hoid_core::multiple_model::{
+use crate::kernel::multiple_model::{
     bank::Bank,
     hypothesis::Hypothesis,
     prior::{ChangePrior, OPERATOR},

@@ -4,7 +4,6 @@
 use hoid_core::{
     adaptation::Adaptation,
     delay::DelayLine,
-    physical::{PhysicalModel, PhysicalRpem},
     shape::{AnyShape, FixedShape, Shape},
     state::State,
 };
@@ -14,6 +13,8 @@ use hoid_track::{
     Sample,
     building::{Delay, Plan, Recursion, Scaled, StepOutcome, physical_bounds, scaled, too_many},
 };
+
+use crate::kernel::physical::{PhysicalModel, PhysicalRpem};
 
 /// Builds the recursion: the smallest room that holds its parameters, and the orders in its type where
 /// they are those of the operator.

@@ -2,8 +2,8 @@
 //!
 //! `eta = [K_e, K_e_dot, omega_nm, zeta_nm, c.., d..]`, or with the delay
 //! `[K_e, K_e_dot, omega_nm, zeta_nm, tau_e, c.., d..]`. The predictor is that of Box-Jenkins with
-//! the polynomials `theta(eta)` of the exact zero-order hold ([`crate::held_operator`]); its
-//! gradient is `psi_eta = (d theta/d eta)' psi_theta`. The step is that of [`crate::rpem`], but
+//! the polynomials `theta(eta)` of the exact zero-order hold ([`hoid_core::held_operator`]); its
+//! gradient is `psi_eta = (d theta/d eta)' psi_theta`. The step is that of [`hoid_core::rpem`], but
 //! each factor of forgetting now belongs to a quantity of which the user knows how fast it changes:
 //! operators adapt their gains, and hardly their neuromuscular system.
 //!
@@ -13,9 +13,9 @@
 //! With the delay as a parameter `tau_e = l Ts + delta`, B has three coefficients behind
 //! `nk = l + 1` samples; as tau_e grows over a whole sample, B moves on along the past input that
 //! the predictor keeps, without a transient. The model is continuous there, its derivative has a
-//! kink (see [`crate::held_operator`]).
+//! kink (see [`hoid_core::held_operator`]).
 
-use crate::{
+use hoid_core::{
     adaptation::Adaptation,
     bounds::within,
     error_bars::{ErrorBars, ErrorPropagation},
@@ -74,8 +74,8 @@ struct Polynomials<const N: usize> {
     whole_samples: usize,
 }
 
-crate::state!([const N: usize] Polynomials<N> { theta, jacobian, whole_samples });
-crate::state!([S, const N: usize, const K: usize, const L: usize, A: crate::state::State] PhysicalRpem<S, N, K, L, A> {
+hoid_core::state!([const N: usize] Polynomials<N> { theta, jacobian, whole_samples });
+hoid_core::state!([S, const N: usize, const K: usize, const L: usize, A: hoid_core::state::State] PhysicalRpem<S, N, K, L, A> {
     predictor, eta, polynomials, psi, adaptation, bars, restarts,
 });
 

@@ -2,22 +2,20 @@
 //! are not as they should be.
 #![allow(clippy::unwrap_used)]
 
+#[path = "../../hoid-core/tests/common/mod.rs"]
 mod common;
+#[path = "common/operator.rs"]
+mod operator;
 
-use common::{
-    Noise,
-    operator::{self, S1, TS, diagonal},
+use common::Noise;
+use hoid_core::{held_operator::held_operator, innovation_variance::InnovationVariance};
+use hoid_survey::kernel::multiple_model::{
+    MultipleModelFilter,
+    hypothesis::Hypothesis,
+    prior::{ChangePrior, DelayPrior},
+    response::Response,
 };
-use hoid_core::{
-    held_operator::held_operator,
-    innovation_variance::InnovationVariance,
-    multiple_model::{
-        MultipleModelFilter,
-        hypothesis::Hypothesis,
-        prior::{ChangePrior, DelayPrior},
-        response::Response,
-    },
-};
+use operator::{S1, TS, diagonal};
 
 const S2: [f64; 4] = [0.07, 0.084, 11.25, 0.35];
 

@@ -76,7 +76,7 @@ pub(super) fn delayed_second_order(
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
-    use num_complex::Complex64;
+    use hoid_model::Complex64;
 
     use super::*;
 

@@ -11,7 +11,7 @@ use super::{
     response::{Response, Signals},
     signal_ring::{DelayedSignals, SignalRing},
 };
-use crate::{bounds::within, recursion::Step};
+use hoid_core::{bounds::within, recursion::Step};
 
 /// Samples between two moves of the linearisation point.
 const RELINEARISE_EVERY: u64 = 64;
@@ -34,7 +34,7 @@ pub struct MultipleModelFilter<const M: usize, const D: usize, B = [Signals; 1]>
     restarts: u64,
 }
 
-crate::state!([const M: usize, const D: usize, B: AsMut<[Signals]>] MultipleModelFilter<M, D, B> {
+hoid_core::state!([const M: usize, const D: usize, B: AsMut<[Signals]>] MultipleModelFilter<M, D, B> {
     bank, response, ring, d, order, u, past, restarts,
 }, bounded);
 

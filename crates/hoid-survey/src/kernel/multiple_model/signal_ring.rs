@@ -17,7 +17,7 @@ impl<'a> DelayedSignals<'a> {
     /// Of a delay that is known.
     pub fn known(signals: &'a Signals) -> Self {
         Self {
-            ring: core::slice::from_ref(signals),
+            ring: std::slice::from_ref(signals),
             newest: 0,
         }
     }
@@ -44,7 +44,7 @@ pub struct SignalRing<B> {
     newest: usize,
 }
 
-impl<B: AsMut<[Signals]>> crate::state::State for SignalRing<B> {
+impl<B: AsMut<[Signals]>> hoid_core::state::State for SignalRing<B> {
     fn visit(&mut self, each: &mut dyn FnMut(&mut f64)) {
         self.memory.as_mut().visit(each);
         self.newest.visit(each);
@@ -86,7 +86,7 @@ impl<B: AsRef<[Signals]> + AsMut<[Signals]>> SignalRing<B> {
     }
 
     /// All signals in memory.
-    pub fn iter_mut(&mut self) -> core::slice::IterMut<'_, Signals> {
+    pub fn iter_mut(&mut self) -> std::slice::IterMut<'_, Signals> {
         self.memory.as_mut().iter_mut()
     }
 }

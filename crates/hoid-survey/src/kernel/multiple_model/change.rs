@@ -19,7 +19,7 @@ use super::{
     hypothesis::{Hypothesis, Snapshot},
     prior::{ChangePrior, OPERATOR},
 };
-use crate::state::{State, visit_all};
+use hoid_core::state::{State, visit_all};
 
 /// A change that was declared.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -48,7 +48,7 @@ pub struct ChangeDetector {
     change: Option<Change>,
 }
 
-crate::state!([] Change { samples_ago, log_odds, before, after, z });
+hoid_core::state!([] Change { samples_ago, log_odds, before, after, z });
 
 impl State for ChangeDetector {
     fn visit(&mut self, each: &mut dyn FnMut(&mut f64)) {

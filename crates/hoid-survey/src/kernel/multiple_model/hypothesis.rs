@@ -22,7 +22,7 @@ use super::{
     prior::{ChangePrior, OPERATOR},
     response::Signals,
 };
-use crate::{innovation_variance::InnovationVariance, state::State, ud_covariance::UdCovariance};
+use hoid_core::{innovation_variance::InnovationVariance, state::State, ud_covariance::UdCovariance};
 
 /// Variances and signals beyond this would overflow in products.
 pub(super) const LARGEST: f64 = 1e60;
@@ -71,19 +71,17 @@ pub struct Snapshot {
     pub delay: [f64; 2],
 }
 
-crate::state!([] Hypothesis { eta, covariance, innovation_variance, probability, born, neuromuscular_changed, extra_delay, before, least_variance });
-crate::state!([] Snapshot { eta, gain_covariance, neuromuscular_variance, innovation_variance, delay });
+hoid_core::state!([] Hypothesis { eta, covariance, innovation_variance, probability, born, neuromuscular_changed, extra_delay, before, least_variance });
+hoid_core::state!([] Snapshot { eta, gain_covariance, neuromuscular_variance, innovation_variance, delay });
 
-/// A slot of the bank: whether there is a hypothesis, and its numbers.
-impl State for Option<Hypothesis> {
-    fn visit(&mut self, each: &mut dyn FnMut(&mut f64)) {
-        let mut is_there = self.is_some();
-        is_there.visit(each);
-        // A hypothesis that is restored into an empty slot replaces all of these numbers.
-        *self = is_there.then(|| self.take().unwrap_or_else(Hypothesis::empty));
-        if let Some(hypothesis) = self {
-            hypothesis.visit(each);
-        }
+/// The numbers of a slot of the bank: whether there is a hypothesis, and its own.
+pub(super) fn visit_slot(slot: &mut Option<Hypothesis>, each: &mut dyn FnMut(&mut f64)) {
+    let mut is_there = slot.is_some();
+    is_there.visit(each);
+    // A hypothesis that is restored into an empty slot replaces all of these numbers.
+    *slot = is_there.then(|| slot.take().unwrap_or_else(Hypothesis::empty));
+    if let Some(hypothesis) = slot {
+        hypothesis.visit(each);
     }
 }
 

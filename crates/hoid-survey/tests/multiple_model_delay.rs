@@ -2,21 +2,20 @@
 //! were wrong or that change, signals that overflow.
 #![allow(clippy::unwrap_used)]
 
+#[path = "../../hoid-core/tests/common/mod.rs"]
 mod common;
+#[path = "common/operator.rs"]
+mod operator;
 
-use common::{
-    Noise,
-    operator::{S1, TS, diagonal, prior_of},
+use common::Noise;
+use hoid_core::innovation_variance::InnovationVariance;
+use hoid_survey::kernel::multiple_model::{
+    MultipleModelFilter,
+    hypothesis::Hypothesis,
+    prior::{ChangePrior, DelayPrior},
+    response::{Response, Signals},
 };
-use hoid_core::{
-    innovation_variance::InnovationVariance,
-    multiple_model::{
-        MultipleModelFilter,
-        hypothesis::Hypothesis,
-        prior::{ChangePrior, DelayPrior},
-        response::{Response, Signals},
-    },
-};
+use operator::{S1, TS, diagonal, prior_of};
 
 /// Number of candidate delays.
 const COUNT: usize = 16;

@@ -1,7 +1,7 @@
 //! Response of the neuromuscular system to a held error and to its rate, with derivatives by
 //! omega_nm and zeta_nm.
 //!
-//! With the exact hold of [`crate::held_operator`] for the gains `[1, 0]` and `[0, 1]`,
+//! With the exact hold of [`hoid_core::held_operator`] for the gains `[1, 0]` and `[0, 1]`,
 //!
 //! `x(t) = b0 e(t) + b1 e(t-1) - f1 x(t-1) - f2 x(t-2)`,
 //! `x'(t) = b0' e(t) + b1' e(t-1) - f1' x(t-1) - f2' x(t-2) - f1 x'(t-1) - f2 x'(t-2)`,
@@ -11,7 +11,7 @@
 //! belongs to another point would have a kink there, which the whitening filter, a difference of
 //! high order, makes larger than the noise.
 
-use crate::held_operator::held_operator;
+use hoid_core::held_operator::held_operator;
 
 /// x1, x2, their derivatives by omega_nm, their derivatives by zeta_nm.
 pub type Signals = [f64; 6];
@@ -29,7 +29,7 @@ pub struct Response {
     past: [Signals; 2],
 }
 
-crate::state!([] Response { point, b, f, input, past });
+hoid_core::state!([] Response { point, b, f, input, past });
 
 impl Response {
     /// At rest at the point `[omega_nm, zeta_nm]` (rad/s, 1). Ts in s.

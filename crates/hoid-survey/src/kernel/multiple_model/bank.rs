@@ -15,9 +15,11 @@
 //!
 //! A newborn takes the slot of the least likely hypothesis that is old enough to be judged.
 
+use hoid_core::state::{State, visit_all};
+
 use super::{
     change::{Change, ChangeDetector, delay_of},
-    hypothesis::Hypothesis,
+    hypothesis::{Hypothesis, visit_slot},
     prior::{ChangePrior, OPERATOR},
     signal_ring::DelayedSignals,
 };
@@ -36,7 +38,22 @@ pub struct Bank<const M: usize> {
     detector: ChangeDetector,
 }
 
-crate::state!([const M: usize] Bank<M> { hypotheses, samples, until_birth, births, neuromuscular_from, detector }, bounded);
+impl<const M: usize> State for Bank<M> {
+    fn visit(&mut self, each: &mut dyn FnMut(&mut f64)) {
+        for slot in &mut self.hypotheses {
+            visit_slot(slot, each);
+        }
+        let rest: &mut [&mut dyn State] = &mut [
+            &mut self.samples,
+            &mut self.until_birth,
+            &mut self.births,
+            &mut self.neuromuscular_from,
+            &mut self.detector,
+        ];
+        visit_all(rest, each);
+        self.bounded();
+    }
+}
 
 /// Mean of the mixture.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -74,7 +91,7 @@ impl<const M: usize> Bank<M> {
         if M < 2 || !valid_start || !prior.is_valid() {
             return None;
         }
-        let mut hypotheses = core::array::from_fn(|_| None);
+        let mut hypotheses = std::array::from_fn(|_| None);
         hypotheses[0] = Some(first);
         let mut bank = Self {
             hypotheses,

@@ -31,7 +31,7 @@ pub(crate) fn exp(x: f64) -> f64 {
     if x.abs() >= 700.0 || x.is_nan() {
         return libm::exp(x);
     }
-    let k = (x * core::f64::consts::LOG2_E + ROUNDS) - ROUNDS;
+    let k = (x * std::f64::consts::LOG2_E + ROUNDS) - ROUNDS;
     let r = (x - k * LN_2[0]) - k * LN_2[1];
     let mut sum = 1.0 / 6_227_020_800.0;
     for factorial in [

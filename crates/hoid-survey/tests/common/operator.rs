@@ -1,6 +1,6 @@
 //! An operator in state s1 of the reference text, and a prior of their changes.
 
-use hoid_core::multiple_model::prior::{ChangePrior, DelayPrior};
+use hoid_survey::kernel::multiple_model::prior::{ChangePrior, DelayPrior};
 
 /// Sample time, s.
 pub const TS: f64 = 0.01;
