@@ -6,6 +6,7 @@ use hoid::analysis::Tracking;
 use hoid::ident::{Choice, IdentError, settings::DelayRange};
 use hoid::io::{is_fit_file, read_fit};
 use hoid::model::Record;
+use hoid::survey;
 use hoid::track::{Method, RequestedStart, TrackOptions, TrackPlan, TrackRequest};
 
 use crate::{
@@ -82,10 +83,10 @@ pub fn searching<T>(plan: &TrackPlan, work: impl FnOnce(&(dyn Fn() + Sync)) -> T
 /// # Errors
 /// A name that no method has.
 pub fn method_of(name: &str) -> Result<Method, CliError> {
-    if let Some((_, renamed)) = Method::renamed(name) {
+    if let Some((_, renamed)) = survey::renamed(name) {
         output::notice("", format!("note: {renamed}"));
     }
-    Ok(name.parse()?)
+    Ok(survey::method(name)?)
 }
 
 /// The method with the options that were typed.
@@ -96,7 +97,7 @@ fn method(args: &RecursionArgs) -> Result<Method, CliError> {
     let usage = |name: &str, text: &str| CliError::Usage(format!("--{} {text}", flag(name)));
     let mut method = method_of(&args.method)?;
     for (name, text) in args.settings.given() {
-        let of = methods_with(name, &Method::registry()).join(" or ");
+        let of = methods_with(name, &survey::registry()).join(" or ");
         if !method.settings().list().iter().any(|setting| setting.name == name) {
             return Err(usage(name, &format!("belongs to --method {of}")));
         }

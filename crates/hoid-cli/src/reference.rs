@@ -5,7 +5,7 @@
 
 use hoid::analysis::registry::estimators;
 use hoid::ident::settings::{Kind, MethodSpec, Setting};
-use hoid::track::Method;
+use hoid::survey::registry;
 
 use crate::args::in_words;
 
@@ -269,14 +269,14 @@ mod tests {
 
     #[test]
     fn the_book_has_the_options_of_the_registry() {
-        is_as_written("docs/src/reference/options.md", &options_page(&Method::registry()));
+        is_as_written("docs/src/reference/options.md", &options_page(&registry()));
     }
 
     #[test]
     fn python_has_the_options_of_the_registry() {
         is_as_written(
             "python/src/pyhoid/_settings.py",
-            &python_settings(&Method::registry(), &estimators()),
+            &python_settings(&registry(), &estimators()),
         );
     }
 
@@ -310,7 +310,7 @@ mod tests {
     /// An option that is declared once is there wherever options are.
     #[test]
     fn a_new_option_needs_no_other_edit() {
-        let mut methods = Method::registry();
+        let mut methods = registry();
         let dummy = Setting::of("tremor_band", &(8.0, 12.0))
             .unit("s")
             .bounds(Bounds::NonNegative)
@@ -342,14 +342,14 @@ mod tests {
             help.contains("--tremor-band <LO..HI>") && help.contains("[for operator]"),
             "{help}"
         );
-        let python = python_settings(&Method::registry(), &batch);
+        let python = python_settings(&registry(), &batch);
         assert!(python.contains("    # Frequencies that count as tremor. For operator.\n    tremor_band: "));
         assert!(options_page(&batch).contains("| `tremor_band` | `LO..HI` |  | 8..12 |"));
     }
 
     #[test]
     fn a_new_method_needs_no_other_edit() {
-        let mut methods = Method::registry();
+        let mut methods = registry();
         methods.push(MethodSpec {
             name: "setpoint",
             help: "a method that is new",

@@ -15,7 +15,6 @@ use hoid_core::{
     covariance::Covariance,
     error_bars::{ErrorBars, NoErrorBars},
     innovation_variance::InnovationVariance,
-    physical::{PhysicalModel, PhysicalRpem},
     predictor::Regressor,
     recursion::Stable,
     rls::Rls,
@@ -142,36 +141,6 @@ fn bare_rpem(data: &[(f64, f64)], history: &mut Vec<[f64; 5]>) {
     }
 }
 
-fn physical<S: Shape, const N: usize, const K: usize, const L: usize>(
-    shape: S,
-    smallest_nk: Option<usize>,
-    data: &[(f64, f64)],
-    history: &mut Vec<[f64; N]>,
-) {
-    history.clear();
-    let mut bounds = [[f64::NEG_INFINITY, f64::INFINITY]; N];
-    bounds[2] = [0.5, 100.0];
-    bounds[3] = [0.02, 5.0];
-    let mut eta = [0.0; N];
-    eta[..4].copy_from_slice(&[0.09, 0.036, 11.25, 0.35]);
-    if smallest_nk.is_some() {
-        bounds[4] = [0.0, 0.5];
-        eta[4] = 0.02;
-    }
-    let model = PhysicalModel {
-        shape,
-        smallest_nk,
-        sample_time: 0.01,
-        bounds,
-        stable: Stable::Predictor,
-    };
-    let mut recursion = PhysicalRpem::<S, N, K, L, _>::new(model, eta, covariance(matrix()), bars::<N, K>()).unwrap();
-    for &(x, u) in data {
-        recursion.step(x, u);
-        history.push(*recursion.eta());
-    }
-}
-
 /// The yardstick: recursive least squares with one triangle of a plain covariance and nothing else,
 /// no guard, no error bars.
 fn plain(data: &[(f64, f64)], history: &mut Vec<[f64; 4]>) {
@@ -245,17 +214,6 @@ fn bench(c: &mut Criterion) {
     });
     group.bench_function("rpem 5, any shape", |b| {
         b.iter(|| rpem::<_, 5, 2>(any(0, 2, 1, 2), scalar(), data, &mut h5))
-    });
-    group.bench_function("physical 5", |b| {
-        b.iter(|| physical::<_, 5, 2, 5>(bj, None, data, &mut h5))
-    });
-    group.bench_function("physical 5, usual error bars", |b| {
-        b.iter(|| physical::<_, 5, 0, 5>(bj, None, data, &mut h5));
-    });
-    let mut h6: Vec<[f64; 6]> = Vec::with_capacity(SAMPLES);
-    let delayed = FixedShape::<0, 3, 0, 1, 2>;
-    group.bench_function("physical 6, tau_e", |b| {
-        b.iter(|| physical::<_, 6, 2, 64>(delayed, Some(1), data, &mut h6))
     });
     let mut h8: Vec<[f64; 8]> = Vec::with_capacity(SAMPLES);
     group.bench_function("rpem 8", |b| {

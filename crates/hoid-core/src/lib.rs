@@ -67,8 +67,7 @@
 //!
 //! | module | what it holds |
 //! |---|---|
-//! | [`rls`], [`rpem`], [`physical`] | the recursions: least squares, prediction-error method in polynomials and in physical parameters |
-//! | [`multiple_model`] | a bank of hypotheses about when the operator changed |
+//! | [`rls`], [`rpem`] | the recursions: least squares, prediction-error method |
 //! | [`adaptive`] | gains in a basis that people share, a noise model and a level of its own, a test for changes |
 //! | [`bounds`] | a number within its bounds |
 //! | [`predictor`], [`shape`] | one-step predictor of the general model with its gradient; orders of the model |
@@ -99,8 +98,6 @@ pub mod filter;
 pub mod guard;
 pub mod held_operator;
 pub mod innovation_variance;
-pub mod multiple_model;
-pub mod physical;
 pub mod predictor;
 pub mod recursion;
 pub mod rls;

@@ -48,8 +48,8 @@ impl Asked {
     pub fn understood(&self) -> Result<Understood, Failure> {
         let sample_time = SampleTime::new(self.sample_time_s)?;
         let mut options = object(self.options.as_deref().unwrap_or("{}"))?;
-        let mut method: Method = match &self.method {
-            Some(name) => name.parse()?,
+        let mut method = match &self.method {
+            Some(name) => hoid_survey::method(name)?,
             None => Method::default(),
         };
         let structure: Option<Structure> = taken(&mut options, "structure", choice)?;
@@ -117,10 +117,10 @@ fn set(method: &mut Method, mut options: Map<String, Value>, fit: Option<&str>) 
             fitted = other;
         }
     }
-    let listed = Method::registry().into_iter().flat_map(|spec| spec.settings);
+    let listed = hoid_survey::registry().into_iter().flat_map(|spec| spec.settings);
     for name in listed.map(|setting| setting.name) {
         if let Some(text) = options.remove(name).and_then(|value| text(&value)) {
-            method.set(name, &text)?;
+            hoid_survey::set(method, name, &text)?;
         }
     }
     if let Some((unknown, _)) = options.into_iter().next() {

@@ -280,7 +280,7 @@ impl Config {
         if self.consent.trim().is_empty() {
             return wrong("consent is empty, expected the text that a person confirms".to_owned());
         }
-        if let Err(error) = self.method.parse::<hoid_track::Method>() {
+        if let Err(error) = hoid_survey::method(&self.method) {
             return wrong(format!("method: {error}"));
         }
         for (name, ms) in [

@@ -19,7 +19,7 @@ use std::{
 
 use hoid_ident::order_selection::{Criterion, default_operator_ranges};
 use hoid_model::{Complex64, ContinuousTransferFunction, SampleTime, uncertainty::Estimate};
-use hoid_track::{Live, Method, Response, Sample, TrackOptions, TrackPlan};
+use hoid_track::{Live, Response, Sample, TrackOptions, TrackPlan};
 use serde::Serialize;
 
 use crate::{
@@ -89,7 +89,7 @@ impl LiveRun {
     /// [`LabError::Ident`] for a method that cannot run live.
     pub fn new(method: &str, course: Course) -> Result<Self, LabError> {
         let ts = SampleTime::new(TICK_S * TICKS_PER_SAMPLE as f64)?;
-        let method: Method = method.parse()?;
+        let method = hoid_survey::method(method)?;
         let options = TrackOptions::usual(method, USUAL_NK);
         let ranges = default_operator_ranges(options.structure, ts);
         let plan = TrackPlan::new(options, ranges, Criterion::Bic, ts)?;

@@ -67,21 +67,21 @@ fn method(options: &Bound<'_, PyDict>) -> Outcome<Method> {
         Some(name) => {
             // In a pickle there may be an earlier name.
             let name = renamed_method(&name).map_or(name, |(now, _)| now.to_owned());
-            let words = Method::all().into_iter().map(|method| (method.name(), method));
+            let words = hoid_survey::methods().into_iter().map(|method| (method.name(), method));
             names::word("method", &name, &words.collect::<Vec<_>>())?
         }
         None => Method::default(),
     };
     let mut given: BTreeMap<String, String> = get(options, "settings")?.unwrap_or_default();
     // In the order of the registry: what belongs to a way of forgetting comes after it.
-    for setting in Method::registry().into_iter().flat_map(|spec| spec.settings) {
+    for setting in hoid_survey::registry().into_iter().flat_map(|spec| spec.settings) {
         let Some(text) = given.remove(setting.name) else {
             continue;
         };
         let keyword = names::keyword(setting.name);
         if !method.settings().list().iter().any(|own| own.name == setting.name) {
             let has = |spec: &MethodSpec| spec.settings.iter().any(|own| own.name == setting.name);
-            let of = Method::registry()
+            let of = hoid_survey::registry()
                 .into_iter()
                 .filter(has)
                 .map(|spec| format!("\"{}\"", spec.name));
@@ -102,7 +102,7 @@ fn method(options: &Bound<'_, PyDict>) -> Outcome<Method> {
 /// Of an earlier name of a recursive method that of now, and the sentence that says so.
 #[pyfunction]
 pub fn renamed_method(name: &str) -> Option<(&'static str, String)> {
-    Method::renamed(name)
+    hoid_survey::renamed(name)
 }
 
 /// Name, line of help and literature of each recursive method, and the keywords that it takes.
@@ -115,5 +115,5 @@ pub fn recursive_methods() -> Vec<(&'static str, &'static str, &'static str, Vec
             .collect()
     };
     let of = |spec: MethodSpec| (spec.name, spec.help, spec.source, keywords(&spec));
-    Method::registry().into_iter().map(of).collect()
+    hoid_survey::registry().into_iter().map(of).collect()
 }

@@ -31,7 +31,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let traces = [
         tracked(Method::rls(), &record)?,
         tracked(Method::rpem(), &record)?,
-        tracked(Method::physical(), &record)?,
+        tracked(hoid_survey::physical(), &record)?,
     ];
     let section = |name: &str, trace, batch| TraceSection {
         name: name.to_owned(),

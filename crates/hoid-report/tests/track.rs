@@ -103,7 +103,7 @@ fn figure<'a>(html: &'a str, id: &str) -> &'a str {
 fn three_methods_over_each_other_show_all_that_is_asked_for() {
     let record = run();
     let (arx, bj) = (fits(Structure::Arx, &record), fits(Structure::BoxJenkins, &record));
-    let traces = [Method::rls(), Method::rpem(), Method::physical()].map(|m| tracked(m, &record));
+    let traces = [Method::rls(), Method::rpem(), hoid_survey::physical()].map(|m| tracked(m, &record));
     let sections = vec![
         section("RLS", &traces[0], &arx),
         section("RPEM", &traces[1], &bj),
@@ -184,7 +184,7 @@ fn a_recording_has_no_truth() {
         Channel::new("u", "<b>", simulated.output().to_vec()),
     )
     .unwrap();
-    let trace = tracked(Method::physical(), &record);
+    let trace = tracked(hoid_survey::physical(), &record);
     let hostile = "a<script>alert(1)</script> & \"b\" $x^2$";
     let html = report(&record, vec![section(hostile, &trace, &[])]).to_html().unwrap();
     check_page(&html);
@@ -263,7 +263,7 @@ fn short_records_and_averages_have_their_page() {
 #[test]
 fn the_delay_is_shown_where_it_is_tracked() {
     let record = run();
-    let mut with_delay = options(Method::physical());
+    let mut with_delay = options(hoid_survey::physical());
     with_delay.method.set("track_delay", "0.2..0.4").unwrap();
     let trace = track(&record, &with_delay, 8).unwrap();
     let html = report(&record, vec![section("physical", &trace, &[])])
@@ -282,8 +282,8 @@ fn a_batch_fit_beside_a_delay_that_changed_has_the_delay_of_its_span() {
         .unwrap()
         .run(RunSeed::default(), false)
         .unwrap();
-    let mut with_delay = options(Method::multiple_model());
-    with_delay.orders = Method::multiple_model().usual_orders(29);
+    let mut with_delay = options(hoid_survey::multiple_model());
+    with_delay.orders = hoid_survey::multiple_model().usual_orders(29);
     with_delay.method.set("track_delay", "0.2..0.4").unwrap();
     let trace = track(&record, &with_delay, 8).unwrap();
     let (_, fit) = batch_fit(&trace, &record, SPANS[1]).unwrap();
@@ -295,9 +295,12 @@ fn a_batch_fit_beside_a_delay_that_changed_has_the_delay_of_its_span() {
 #[test]
 fn windows_and_instruments_have_their_page() {
     let record = run();
-    let mut window = options(Method::window());
+    let mut window = options(hoid_survey::window());
     window.method.set("refit", "500").unwrap();
-    let traces = [track(&record, &window, 8).unwrap(), tracked(Method::rriv(), &record)];
+    let traces = [
+        track(&record, &window, 8).unwrap(),
+        tracked(hoid_survey::rriv(), &record),
+    ];
     let sections = vec![section("window", &traces[0], &[]), section("RRIV", &traces[1], &[])];
     let html = report(&record, sections).to_html().unwrap();
     check_page(&html);

@@ -28,14 +28,20 @@ pub const TEXT_PLANS: &[NamedPlan] = named![
     "lead-change",
 ];
 
-/// All named plans: those of the reference text, and those of what goes beyond it.
+/// The recursive methods of the survey on the same runs.
+pub const SURVEY: &NamedPlan = &NamedPlan {
+    name: "survey",
+    text: include_str!("../plans/survey.toml"),
+};
+
+/// The named plans of the list: those of the reference text, and those of what goes beyond it.
 pub fn named_plans() -> impl Iterator<Item = &'static NamedPlan> {
     TEXT_PLANS.iter().chain(PLANS)
 }
 
-/// The named plan of a name.
+/// The named plan of a name: one of the list, or [`SURVEY`], which is for comparison.
 pub fn find(name: &str) -> Option<&'static NamedPlan> {
-    named_plans().find(|plan| plan.name == name)
+    named_plans().chain([SURVEY]).find(|plan| plan.name == name)
 }
 
 #[cfg(test)]
@@ -51,5 +57,7 @@ mod tests {
             assert_eq!(plan.replications, NamedPlan::REPLICATIONS, "{}", plan.name);
         }
         assert!(find("adaptation").is_some() && find("none").is_none());
+        let survey = find("survey").map(|named| named.plan().unwrap_or_else(|error| panic!("{error}")));
+        assert_eq!(survey.map(|plan| plan.name), Some("survey".to_owned()));
     }
 }

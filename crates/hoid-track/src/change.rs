@@ -1,12 +1,10 @@
-//! When a person changed: by the odds of the hypotheses of [`crate::Method::MultipleModel`], and the
-//! published baseline.
+//! When a person changed, as a method says it, and the published baseline.
 //!
 //! The baseline looks at the loop from outside: an adaptation is taken to be needed while the
 //! tracking error or its rate is larger than k of its standard deviations before the change (R. A.
 //! Hess, *Journal of Guidance, Control, and Dynamics* 32 (2009): three; here either signal raises
 //! the alarm, the rate by the difference of neighbouring samples).
 
-use hoid_core::multiple_model::{change as kernel_change, hypothesis as kernel};
 use hoid_model::{SampleTime, uncertainty::Estimate};
 use hoid_numerics::statistics::{mean, sample_variance};
 
@@ -46,36 +44,6 @@ const QUANTITIES: [&str; 6] = ["K_e", "K_e_dot", "omega_nm", "zeta_nm", REMNANT,
 const REMNANT: &str = "remnant";
 
 impl Change {
-    pub(crate) fn new(change: &kernel_change::Change, tau_e_s: [Estimate; 2], sample_time: SampleTime) -> Self {
-        let (before, now) = (&change.before, &change.after);
-        let pair = |i: usize| {
-            let of = |b: &kernel::Snapshot| {
-                if i < 2 {
-                    b.gain_covariance[i]
-                } else {
-                    b.neuromuscular_variance[i - 2]
-                }
-            };
-            [before, now].map(|b| Estimate::with_variance(b.eta[i], of(b)))
-        };
-        let lead = |b: &kernel::Snapshot| {
-            (b.eta[0] * b.eta[1] + b.gain_covariance[2]) / (b.eta[0] * b.eta[0] + b.gain_covariance[0])
-        };
-        Self {
-            seconds_ago: change.samples_ago as f64 * sample_time.s(),
-            odds: change.log_odds,
-            k_e: pair(0),
-            k_e_dot: pair(1),
-            omega_nm_rad_s: pair(2),
-            zeta_nm: pair(3),
-            tau_e_s,
-            t_l_s: [lead(before), lead(now)],
-            innovation_variance: [before.innovation_variance, now.innovation_variance],
-            z: change.z,
-            of_operator: false,
-        }
-    }
-
     /// Posterior probability of a change.
     pub fn probability(&self) -> f64 {
         1.0 / (1.0 + (-self.odds).exp())

@@ -17,7 +17,7 @@ const LEFT: f64 = 0.5;
 pub type Determined = (&'static str, bool);
 
 fn determined(method: &Method, operator: &OperatorEstimate) -> Vec<Determined> {
-    let before = method.inner().spread_before();
+    let before = method.spread_before();
     let supposed = |name: &str| {
         let [omega, zeta, tau] = before?;
         match name {
@@ -97,7 +97,7 @@ mod tests {
             ("zeta_nm", true),
         ];
         assert_eq!(found, expected);
-        let other = determined(&Method::physical(), &operator);
+        let other = determined(&Method::rpem(), &operator);
         assert!(other.contains(&("omega_nm", true)));
     }
 }

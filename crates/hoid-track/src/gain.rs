@@ -20,7 +20,7 @@ use crate::{forgetting::ForgettingRule, setup::Setup, shared_options::WindupGuar
 /// usual standard error.
 const ROOM_TO_GROW: f64 = 10.0;
 /// The same for a start covariance that comes from no fit, as a multiple of it.
-pub(crate) const ROOM_WITHOUT_FIT: f64 = 1e4;
+pub const ROOM_WITHOUT_FIT: f64 = 1e4;
 /// Growing memory of a start without a fit: what the first sample forgets, and the share of it that
 /// the next one forgets still.
 const EARLY_FORGETTING: f64 = 0.01;
@@ -31,8 +31,10 @@ const SMALLEST_FACTOR: f64 = 0.9;
 const LEVEL_MEMORIES: f64 = 4.0;
 
 /// The adaptations of the kernel as one type, so that each recursion is compiled once.
-pub(crate) enum Gain<const N: usize> {
+pub enum Gain<const N: usize> {
+    /// P in factors.
     Covariance(Covariance<N>),
+    /// The sums of a sliding window.
     Window(Window<N, Vec<f64>>),
 }
 
@@ -53,12 +55,7 @@ impl<const N: usize> Gain<N> {
     /// # Errors
     /// [`IdentError`] for options that contradict each other, or a start covariance that is not
     /// positive.
-    pub(crate) fn new(
-        setup: &Setup,
-        from: &StartState,
-        sample_time: SampleTime,
-        growing: bool,
-    ) -> Result<Self, IdentError> {
+    pub fn new(setup: &Setup, from: &StartState, sample_time: SampleTime, growing: bool) -> Result<Self, IdentError> {
         let p = from.values.len();
         let lambda = setup
             .memories
@@ -145,7 +142,7 @@ impl<const N: usize> Gain<N> {
 }
 
 /// A gain with a covariance that can be changed from outside.
-pub(crate) trait Scaled {
+pub trait Scaled {
     /// P times a factor; false where there is no P that stays.
     fn scale(&mut self, factor: f64) -> bool;
 }
@@ -203,7 +200,7 @@ impl<const N: usize> Adaptation<N> for Gain<N> {
 ///
 /// # Errors
 /// [`IdentError::BadOption`] for a memory that is too short.
-pub(crate) fn error_bars<const N: usize, const K: usize>(
+pub fn error_bars<const N: usize, const K: usize>(
     setup: &Setup,
     from: &StartState,
     sample_time: SampleTime,

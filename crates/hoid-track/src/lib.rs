@@ -15,7 +15,7 @@
 //!
 //! let simulator = Simulator::new(&Scenario::condition(Condition::C4))?;
 //! let record = simulator.run(RunSeed::default(), false)?;
-//! let options = TrackOptions::usual(Method::physical(), 29).with(&[("memory_of", "K_e=4s")])?;
+//! let options = TrackOptions::usual(Method::rpem(), 29).with(&[("memory_of", "b=4s")])?;
 //! let trace = track(&record, &options, 100)?;
 //!
 //! // The task changes at 40.96 s, and K_e_dot rises from .036 to .084 s.
@@ -27,11 +27,12 @@
 //! | module | what it holds |
 //! |---|---|
 //! | `methods`, `method` | [`Method`]: the recursive methods, a file or folder each; what each says of itself |
+//! | [`building`] | what a method is made of, for those in other crates |
 //! | `options`, `shared_options`, `memory`, `forgetting` | [`TrackOptions`]: what is to be tracked, and how |
 //! | `person_prior` | [`PersonPrior`]: what is known of a person before the first sample |
 //! | `request`, `plan` | [`TrackRequest`]: what is asked for; [`TrackPlan`]: orders that are still open, searched on the start span |
 //! | `setup`, `start`, `start_noise`, `gain` | what a recursion is built of: structure, start, way of forgetting |
-//! | `kernel`, `recursion` | RLS, RPEM and the physical recursion of the real-time kernel; what every recursion does |
+//! | `kernel`, `recursion` | RLS and RPEM of the real-time kernel; what every recursion does |
 //! | `predictor`, `past`, `reported` | signals and reports for methods that are not of the kernel |
 //! | `response` | [`Response`]: gain and phase of an estimate at a frequency |
 //! | `open_loop` | [`OpenLoop`]: crossover and phase margin of an estimate with the controlled element |
@@ -40,7 +41,7 @@
 //! | `guard` | samples and spans that no tracking makes, kept from the recursion |
 //! | `standing` | what a recursion without a guard does while nothing arrives |
 //! | `idle` | what was recorded before a run began |
-//! | `over_record`, `smoother` | [`track()`]: a record; the two-sided estimate of a recorded run |
+//! | `over_record`, `two_sided` | [`track()`]: a record; the two-sided estimate of a recorded run |
 //! | `trace`, `columns`, `summary`, `in_words` | [`Trace`]: the estimate at every sample, as columns and in words |
 //! | `judgement` | what a trace, and the estimate of a moment, is worth: [`Trace::verdict`] |
 //! | `determined` | which parameters the data determine |
@@ -56,9 +57,10 @@
 //! **Samples that are not as they should be** never reach the filters. A value is a fault when it
 //! is not a finite number or larger than [`TrackOptions::largest`]. An error e is then replaced by
 //! the last good one, an output u by the one-step prediction, and the estimate stays at that
-//! sample. Each is counted. Behind a guard (`guard`; by default for `physical`, `multiple-model` and `adaptive`) so are
+//! sample. Each is counted. Behind a guard (`guard`; by default for `adaptive`) so are
 //! outliers and spans that no tracking makes.
 
+pub mod building;
 mod change;
 mod columns;
 mod delay_bank;
@@ -90,13 +92,13 @@ mod saved;
 mod seal;
 mod setup;
 mod shared_options;
-mod smoother;
 mod standing;
 mod start;
 mod start_noise;
 mod summary;
 mod trace;
 mod tracker;
+mod two_sided;
 mod validation;
 
 pub use change::{Change, ErrorThreshold};
@@ -107,7 +109,8 @@ pub use guard::{GuardAction, GuardChannel, GuardChoice, GuardEvent, GuardKind, G
 pub use idle::{idle_head, usual_start_span};
 pub use live::{Choose, Live, LiveOutcome, WarmUp};
 pub use memory::{CommonMemory, Memory, MemoryOptions};
-pub use methods::*;
+pub use method::RecursiveMethod;
+pub use methods::{AdaptiveOptions, Method, RlsOptions, RpemOptions};
 pub use open_loop::{NoCrossover, OpenLoop};
 pub use options::TrackOptions;
 pub use outcome::{Counts, Outcome};

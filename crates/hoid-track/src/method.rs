@@ -1,10 +1,11 @@
 //! What a recursive method says of itself.
 //!
-//! A method is a file or folder in `methods`: its options (a struct made by `settings!`), this
-//! trait for them, and the recursion that it builds. One line in `methods/mod.rs` makes it a
-//! variant of [`Method`](crate::Method); the command line, plans, Python and the book follow.
+//! A method is a file or folder: its options (a struct made by `settings!`), [`RecursiveMethod`] for
+//! them, and the [`Recursion`] that it builds. That makes it a [`Method`](crate::Method), in this crate or
+//! in any other; a line in the list of `hoid-survey` gives it to the command line, plans, Python and
+//! the book.
 
-use std::collections::BTreeMap;
+use std::{any::Any, collections::BTreeMap, fmt};
 
 use hoid_core::recursion::Stable;
 use hoid_ident::{
@@ -22,10 +23,11 @@ use crate::{
     setup::Setup,
     shared_options::{GainOptions, WindupGuard},
     start::StartState,
+    two_sided::{Causal, TwoSided},
 };
 
 /// The words for a method.
-pub(crate) struct About {
+pub struct About {
     /// Name as typed.
     pub name: &'static str,
     /// What it is, in a line without a full stop.
@@ -39,8 +41,32 @@ pub(crate) struct About {
     pub defaults: &'static [(&'static str, &'static str)],
 }
 
+/// What a method can do behind a box: any that can be cloned and compared.
+pub trait Boxed: fmt::Debug + Send + Sync {
+    /// A copy.
+    fn boxed(&self) -> Box<dyn RecursiveMethod>;
+    /// Whether the other is the same method with the same options.
+    fn is_same(&self, other: &dyn RecursiveMethod) -> bool;
+    /// As of any type.
+    fn as_any(&self) -> &dyn Any;
+}
+
+impl<M: RecursiveMethod + Clone + PartialEq + 'static> Boxed for M {
+    fn boxed(&self) -> Box<dyn RecursiveMethod> {
+        Box::new(self.clone())
+    }
+
+    fn is_same(&self, other: &dyn RecursiveMethod) -> bool {
+        other.as_any().downcast_ref::<Self>() == Some(self)
+    }
+
+    fn as_any(&self) -> &dyn Any {
+        self
+    }
+}
+
 /// A recursive method with its options.
-pub(crate) trait RecursiveMethod: Settings {
+pub trait RecursiveMethod: Settings + Boxed + 'static {
     /// The words for it.
     fn about(&self) -> About;
 
@@ -68,6 +94,14 @@ pub(crate) trait RecursiveMethod: Settings {
     /// # Errors
     /// [`IdentError::BadOption`] with what is wrong.
     fn check(&self, setup: &Setup) -> Result<(), IdentError>;
+
+    /// Checks what depends on the sample time.
+    ///
+    /// # Errors
+    /// [`IdentError::BadOption`] with what is wrong.
+    fn check_at(&self, _sample_time: SampleTime) -> Result<(), IdentError> {
+        Ok(())
+    }
 
     /// Order of the noise model when none is named; none where that of the structure is taken.
     fn usual_nd(&self) -> Option<usize> {
@@ -97,6 +131,19 @@ pub(crate) trait RecursiveMethod: Settings {
 
     /// True where the two-sided estimate of a recorded run was asked for.
     fn smooths(&self) -> bool {
+        false
+    }
+
+    /// That estimate, a row for each of a causal trace.
+    ///
+    /// # Errors
+    /// [`IdentError::BadStart`] for a start that cannot be used.
+    fn two_sided(&self, _record: &Record, _causal: &Causal, _from: &StartState) -> Result<Vec<TwoSided>, IdentError> {
+        Ok(Vec::new())
+    }
+
+    /// True for a method that fits what it keeps anew: it starts from no coefficients and waits for nothing.
+    fn fits_anew(&self) -> bool {
         false
     }
 
@@ -197,7 +244,7 @@ pub(crate) trait RecursiveMethod: Settings {
 }
 
 /// What is known of a method.
-pub(crate) fn spec(method: &dyn RecursiveMethod) -> MethodSpec {
+pub fn spec(method: &dyn RecursiveMethod) -> MethodSpec {
     let about = method.about();
     let own = |setting: Setting| match about.defaults.iter().find(|(name, _)| *name == setting.name) {
         Some((_, words)) => setting.default(words),
@@ -213,7 +260,7 @@ pub(crate) fn spec(method: &dyn RecursiveMethod) -> MethodSpec {
 }
 
 /// An error about an option.
-pub(crate) fn bad(option: &str, found: String, expected: &str) -> IdentError {
+pub fn bad(option: &str, found: String, expected: &str) -> IdentError {
     IdentError::BadOption {
         option: option.to_owned(),
         found,
@@ -225,7 +272,7 @@ pub(crate) fn bad(option: &str, found: String, expected: &str) -> IdentError {
 ///
 /// # Errors
 /// [`IdentError::BadOption`].
-pub(crate) fn check_operator_orders(name: &str, setup: &Setup) -> Result<(), IdentError> {
+pub fn check_operator_orders(name: &str, setup: &Setup) -> Result<(), IdentError> {
     let o = &setup.orders;
     if !(o.na == 0 && o.nb == 2 && o.nf == 2) {
         return Err(bad(
@@ -241,7 +288,7 @@ pub(crate) fn check_operator_orders(name: &str, setup: &Setup) -> Result<(), Ide
 ///
 /// # Errors
 /// [`IdentError::BadOption`].
-pub(crate) fn check_delay(orders: &Orders) -> Result<(), IdentError> {
+pub fn check_delay(orders: &Orders) -> Result<(), IdentError> {
     match orders.nk {
         0 => Err(bad(
             "the delay",

@@ -96,7 +96,7 @@ impl TrackOptions {
 
     /// Range of tau_e in s where it is one of the parameters that the recursion moves.
     pub(crate) fn delay_parameter_s(&self) -> Option<(f64, f64)> {
-        let method = self.method.inner();
+        let method = &self.method;
         method.track_delay_s().filter(|_| method.delay_is_parameter())
     }
 
@@ -116,7 +116,7 @@ impl TrackOptions {
     /// # Errors
     /// [`IdentError::UnknownParameter`] for a memory of a parameter that is not there.
     pub fn memories(&self) -> Result<Vec<Memory>, IdentError> {
-        let (names, method) = (self.parameter_names(), self.method.inner());
+        let (names, method) = (self.parameter_names(), &self.method);
         let given = method.memories();
         if let Some(unknown) = given.and_then(|given| given.unknown(&names)) {
             return Err(IdentError::UnknownParameter {
@@ -136,7 +136,7 @@ impl TrackOptions {
     /// # Errors
     /// As [`TrackOptions::memories`].
     pub(crate) fn setup(&self) -> Result<Setup, IdentError> {
-        let method = self.method.inner();
+        let method = &self.method;
         Ok(Setup {
             structure: self.structure,
             orders: self.orders,
@@ -163,6 +163,7 @@ impl TrackOptions {
     pub(crate) fn check_at(&self, sample_time: SampleTime) -> Result<(), IdentError> {
         check_sample_time(sample_time)?;
         self.check()?;
+        self.method.check_at(sample_time)?;
         match self.method.person_prior() {
             Some(prior) => prior.check(sample_time, ["", ""]),
             None => Ok(()),
@@ -175,7 +176,7 @@ impl TrackOptions {
     /// [`IdentError`] with what is wrong.
     pub fn check(&self) -> Result<(), IdentError> {
         self.orders.check(self.structure)?;
-        let (setup, method) = (self.setup()?, self.method.inner());
+        let (setup, method) = (self.setup()?, &self.method);
         method.check(&setup)?;
         setup.forgetting.check()?;
         if let Some((low, high)) = setup.track_delay_s

@@ -9,9 +9,9 @@ use crate::{
     options::TrackOptions,
     recursion::Sample,
     response::Response,
-    smoother,
     trace::{self, Trace, pack},
     tracker::Tracker,
+    two_sided::Causal,
 };
 
 /// Tracks a record: the estimate after every `every`-th sample.
@@ -132,15 +132,28 @@ pub(crate) fn track_with(
     }
     trace.idle_s = idle_head(record) as f64 * sample_time.s();
     trace.failures = tracker.failures();
-    if options.method.inner().smooths() {
-        smoother::smooth(record, &mut trace, &tracker.start)?;
+    if options.method.smooths() {
+        let causal = Causal {
+            setup: options.setup()?,
+            largest: options.largest,
+            rows: kept_rows(record.len(), every),
+            last: trace.operator.last().copied(),
+        };
+        trace.replace(options.method.two_sided(record, &causal, &tracker.start)?);
+        trace.updated_from_s = record.time_s(0);
     }
     Ok(trace)
 }
 
+/// The samples of which a trace has rows.
+fn kept_rows(samples: usize, every: usize) -> Vec<usize> {
+    let kept = |k: &usize| (k + 1).is_multiple_of(every) || k + 1 == samples;
+    (0..samples).filter(kept).collect()
+}
+
 /// The signal from outside the loop that the method takes, where it takes one.
 fn reference<'r>(record: &'r Record, options: &TrackOptions) -> Result<Option<&'r [f64]>, IdentError> {
-    let Some(name) = options.method.inner().reference_channel() else {
+    let Some(name) = options.method.reference_channel() else {
         return Ok(None);
     };
     let names = || {

@@ -8,14 +8,14 @@ const LARGEST: f64 = 1e60;
 
 /// The value as a recursion takes it: within [`LARGEST`], and zero where a product of large numbers
 /// has no value.
-pub(crate) fn bounded(x: f64) -> f64 {
+pub fn bounded(x: f64) -> f64 {
     if x.is_nan() { 0.0 } else { x.clamp(-LARGEST, LARGEST) }
 }
 
 /// The last n values in one slice. Each is written twice, n places apart, so that nothing is ever
 /// moved.
 #[derive(Debug, Clone)]
-pub(crate) struct Past {
+pub struct Past {
     values: Vec<f64>,
     n: usize,
     at: usize,
@@ -55,7 +55,7 @@ impl Past {
 }
 
 /// `sum c_i x(t-i)` over as many terms as there are coefficients.
-pub(crate) fn weighted(coefficients: &[f64], past: &[f64]) -> f64 {
+pub fn weighted(coefficients: &[f64], past: &[f64]) -> f64 {
     coefficients.iter().zip(past).map(|(c, x)| c * x).sum()
 }
 

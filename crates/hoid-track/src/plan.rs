@@ -201,9 +201,6 @@ fn check(options: &TrackOptions, sample_time: SampleTime) -> Result<(), IdentErr
     for memory in options.memories()? {
         memory.lambda(sample_time)?;
     }
-    if let Method::Window(own) = &options.method {
-        own.window.lambda(sample_time)?;
-    }
     let names = options.parameter_names();
     let setup = options.setup()?;
     let drift = match &setup.forgetting {
@@ -265,9 +262,9 @@ mod tests {
             let start: Vec<String> = start.iter().map(|name| (*name).to_owned()).collect();
             ranges_of(method, Structure::BoxJenkins, &named.collect(), &start, ts)
         };
-        let tracked = Method::multiple_model().with("track_delay", "0.2..0.3").unwrap();
+        let tracked = Method::rpem().with("track_delay", "0.2..0.3").unwrap();
         let found = of(&tracked, &[], &[]).unwrap();
-        assert_eq!((found.nd, found.nk), (6..=6, 21..=31));
+        assert_eq!(found.nk, 21..=31);
         let found = of(&tracked, &[("nk", 29..=29), ("nd", 1..=2)], &[]).unwrap();
         assert_eq!((found.nd, found.nk), (1..=2, 29..=29));
         let start = ["b0", "b1", "d1", "d2", "f1", "f2"];

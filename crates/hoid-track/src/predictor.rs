@@ -19,7 +19,7 @@ const ROOM: usize = 64;
 
 /// The predictor in direct form.
 #[derive(Debug, Clone)]
-pub(crate) struct Predictor {
+pub struct Predictor {
     kernel: Box<Kernel<AnyShape, ROOM, ROOM>>,
     delay: DelayLine<Vec<f64>>,
     nk: usize,

@@ -18,7 +18,7 @@ pub struct Sample {
 
 /// What a recursion says of a sample that it has taken.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct StepOutcome {
+pub struct StepOutcome {
     /// A-priori innovation.
     pub innovation: f64,
     /// True when stability or a bound made the step shorter.
@@ -36,7 +36,7 @@ impl From<Step> for StepOutcome {
 
 /// A delay that is followed, and that of the polynomials.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Delay {
+pub struct Delay {
     /// Delay of b0 of the polynomials, samples.
     pub nk: usize,
     /// Delay of the person.
@@ -44,7 +44,7 @@ pub(crate) struct Delay {
 }
 
 /// A recursive method. Samples are finite and not too large.
-pub(crate) trait Recursion: State + Send + Sync {
+pub trait Recursion: State + Send + Sync {
     /// Takes a sample: filters and estimate move on.
     fn step(&mut self, sample: Sample) -> StepOutcome;
     /// Takes a sample into the filters alone; the estimate stays.

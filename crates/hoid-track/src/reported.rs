@@ -3,7 +3,6 @@
 
 use hoid_core::{
     held_operator::held_operator,
-    multiple_model::prior::OPERATOR,
     state::{State, visit_all},
 };
 use hoid_model::{
@@ -13,10 +12,13 @@ use hoid_model::{
 
 use crate::start::StartState;
 
+/// Parameters of the operator behind a known delay: K_e, K_e_dot, omega_nm and zeta_nm.
+pub const OPERATOR: usize = 4;
+
 /// `[b0, b1, d.., f1, f2]` with the Jacobian of the operator's part, and the covariance of d, which
 /// stays that of the start fit.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Reported {
+pub struct Reported {
     sample_time_s: f64,
     tau_s: f64,
     theta: Vec<f64>,
@@ -32,7 +34,7 @@ impl State for Reported {
 
 impl Reported {
     /// From a start in physical parameters, `[K_e, K_e_dot, omega_nm, zeta_nm, d..]`.
-    pub(crate) fn new(from: &StartState, nk: usize, sample_time: SampleTime) -> Self {
+    pub fn new(from: &StartState, nk: usize, sample_time: SampleTime) -> Self {
         let p = from.values.len();
         let (nd, ts) = (p - OPERATOR, sample_time.s());
         let element = |i: usize, j: usize| from.variance * from.spread[(OPERATOR + i) * p + OPERATOR + j];
@@ -50,7 +52,7 @@ impl Reported {
     }
 
     /// Takes an estimate.
-    pub(crate) fn set(&mut self, eta: [f64; OPERATOR]) {
+    pub fn set(&mut self, eta: [f64; OPERATOR]) {
         let (values, by) = held_operator(eta, self.sample_time_s);
         let p = self.theta.len();
         self.theta[..2].copy_from_slice(&values[..2]);
@@ -59,7 +61,7 @@ impl Reported {
     }
 
     /// Takes the first coefficients of a noise model; those that it does not have are zero.
-    pub(crate) fn set_noise(&mut self, d: &[f64]) {
+    pub fn set_noise(&mut self, d: &[f64]) {
         let p = self.theta.len();
         for (i, place) in self.theta[2..p - 2].iter_mut().enumerate() {
             *place = d.get(i).copied().unwrap_or(0.0);
@@ -67,16 +69,17 @@ impl Reported {
     }
 
     /// Sample time, s.
-    pub(crate) fn sample_time_s(&self) -> f64 {
+    pub fn sample_time_s(&self) -> f64 {
         self.sample_time_s
     }
 
-    pub(crate) fn theta(&self) -> &[f64] {
+    /// The coefficients.
+    pub fn theta(&self) -> &[f64] {
         &self.theta
     }
 
     /// `J C J'` of the operator, and that of d, by rows.
-    pub(crate) fn covariance(&self, of_eta: &[[f64; OPERATOR]; OPERATOR], into: &mut [f64]) {
+    pub fn covariance(&self, of_eta: &[[f64; OPERATOR]; OPERATOR], into: &mut [f64]) {
         let p = self.theta.len();
         let nd = p - OPERATOR;
         into.fill(0.0);
@@ -99,7 +102,7 @@ impl Reported {
 
     /// Puts the covariance of the coefficients of a noise model that is followed in the place of
     /// that of the start fit.
-    pub(crate) fn set_covariance_of_noise<const D: usize>(&self, of_d: &[[f64; D]; D], into: &mut [f64]) {
+    pub fn set_covariance_of_noise<const D: usize>(&self, of_d: &[[f64; D]; D], into: &mut [f64]) {
         let p = self.theta.len();
         let nd = p - OPERATOR;
         for (i, row) in of_d.iter().enumerate().take(nd) {
@@ -109,7 +112,7 @@ impl Reported {
     }
 
     /// The operator, with T_L in s and its variance as given.
-    pub(crate) fn operator(
+    pub fn operator(
         &self,
         eta: [f64; OPERATOR],
         covariance: &[[f64; OPERATOR]; OPERATOR],

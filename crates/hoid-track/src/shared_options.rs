@@ -72,7 +72,7 @@ settings! {
 
 impl GainOptions {
     /// The limit in use: none for a sliding window, whose sums hold every sample as it came.
-    pub(crate) fn limit_or(&self, usual: f64) -> f64 {
+    pub fn limit_or(&self, usual: f64) -> f64 {
         match self.forgetting {
             ForgettingRule::Window => f64::INFINITY,
             _ => self.limit.unwrap_or(usual),
@@ -82,14 +82,14 @@ impl GainOptions {
     /// The guard against windup in use; `None` where it follows from the start. It is off for the
     /// recursion of the reference text: P at the start is given, P forgets exponentially, and no
     /// innovation is too large.
-    pub(crate) fn windup_guard(&self, limit: f64) -> Option<WindupGuard> {
+    pub fn windup_guard(&self, limit: f64) -> Option<WindupGuard> {
         let of_the_text =
             self.covariance.is_some() && self.forgetting == ForgettingRule::Exponential && limit == f64::INFINITY;
         self.windup_guard.or(of_the_text.then_some(WindupGuard::Off))
     }
 
     /// Leaves out what was said of parameters that are not known.
-    pub(crate) fn retain(&mut self, known: &dyn Fn(&str) -> bool) {
+    pub fn retain(&mut self, known: &dyn Fn(&str) -> bool) {
         self.memories.memory_of.retain(|key, _| known(key));
         if let ForgettingRule::RandomWalk(drift) = &mut self.forgetting {
             drift.retain(|key, _| known(key));

@@ -57,7 +57,7 @@ pub(crate) fn check_sample_time(sample_time: SampleTime) -> Result<(), IdentErro
 
 /// The start in the coordinates of the recursion.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct StartState {
+pub struct StartState {
     /// theta, or eta.
     pub values: Vec<f64>,
     /// P by rows, over the innovation variance.
@@ -187,10 +187,7 @@ impl StartState {
 ///
 /// # Errors
 /// As [`bounds`].
-pub(crate) fn physical_bounds<const N: usize>(
-    setup: &Setup,
-    sample_time: SampleTime,
-) -> Result<[[f64; 2]; N], IdentError> {
+pub fn physical_bounds<const N: usize>(setup: &Setup, sample_time: SampleTime) -> Result<[[f64; 2]; N], IdentError> {
     let limits = bounds(setup, sample_time)?;
     let free = [f64::NEG_INFINITY, f64::INFINITY];
     Ok(std::array::from_fn(|i| limits.get(i).copied().unwrap_or(free)))

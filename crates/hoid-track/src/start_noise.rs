@@ -48,16 +48,8 @@ impl StartNoise {
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
-    use std::collections::BTreeMap;
-
-    use hoid_ident::Constraint;
-    use hoid_model::{
-        SampleTime,
-        scenario::{Condition, Scenario},
-    };
+    use hoid_model::scenario::{Condition, Scenario};
     use hoid_sim::{RunSeed, Simulator};
-
-    use crate::{Method, TrackOptions, Tracker};
 
     use super::*;
 
@@ -68,35 +60,6 @@ mod tests {
             .unwrap()
             .span(0.0, 30.0)
             .unwrap()
-    }
-
-    /// Bounds that the Box-Jenkins fit cannot keep lead to the grey box.
-    fn outside() -> TrackOptions {
-        let mut options = TrackOptions::usual(Method::multiple_model(), 29);
-        let narrow = BTreeMap::from([("omega_nm".to_owned(), Constraint::Between(20.0, 30.0))]);
-        if let Method::MultipleModel(own) = &mut options.method {
-            own.bounds.bound = narrow;
-        }
-        options
-    }
-
-    #[test]
-    fn a_start_outside_the_bounds_keeps_the_order_of_its_noise_model() {
-        let (span, options) = (span(), outside());
-        let tracker = Tracker::new(&options, Some(&span), SampleTime::HUNDREDTH).unwrap();
-        let names = tracker.parameter_names();
-        let d: Vec<f64> = names
-            .iter()
-            .zip(tracker.theta())
-            .filter(|(name, _)| name.starts_with('d'))
-            .map(|(_, d)| *d)
-            .collect();
-        assert_eq!(d.len(), 6);
-        assert!(d.iter().skip(1).any(|d| d.abs() > 0.02), "{d:?}");
-        // The innovations of its first samples are as white as those of the fit: their variance is
-        // that of the start.
-        let fit = tracker.start().unwrap();
-        assert!(tracker.innovation_variance() <= fit.innovation_variance() * 1.001);
     }
 
     #[test]

@@ -53,10 +53,10 @@ mod tests {
     fn a_trace_prints_what_it_is_and_where_it_ends() {
         let simulator = Simulator::new(&Scenario::condition(Condition::C1)).unwrap();
         let record = simulator.run(RunSeed::default(), false).unwrap();
-        let trace = track(&record, &TrackOptions::usual(Method::physical(), 29), 64).unwrap();
+        let trace = track(&record, &TrackOptions::usual(Method::rpem(), 29), 64).unwrap();
         let text = trace.to_string();
         for part in [
-            "physical of BJ",
+            "rpem of BJ",
             "128 rows",
             "memory  exponential forgetting",
             "batch fit of",

@@ -11,6 +11,7 @@ use crate::{
     options::TrackOptions,
     recursion::Delay,
     response::Response,
+    two_sided::TwoSided,
 };
 use hoid_ident::{Fit, IdentError, family::LoopShape};
 
@@ -103,6 +104,22 @@ impl Trace {
             every,
             averaged: 1,
             updated_from_s: f64::NEG_INFINITY,
+        }
+    }
+
+    /// Replaces the estimates of the rows, each by one.
+    pub(crate) fn replace(&mut self, rows: Vec<TwoSided>) {
+        let p = self.options.polynomial_orders().parameters();
+        self.theta.clear();
+        self.covariance.clear();
+        self.covariance.reserve(rows.len() * packed_len(p));
+        self.operator.clear();
+        self.innovation_variance.clear();
+        for row in rows {
+            self.theta.extend(row.theta);
+            pack(&row.covariance, p, &mut self.covariance);
+            self.operator.push(row.operator);
+            self.innovation_variance.push(row.innovation_variance);
         }
     }
 

@@ -80,7 +80,7 @@ impl Tracker {
         options.check_at(sample_time)?;
         let setup = options.setup()?;
         let start = StartState::new(&setup, span, known, sample_time)?;
-        let mut recursion = options.method.inner().build(&setup, &start, sample_time)?;
+        let mut recursion = options.method.build(&setup, &start, sample_time)?;
         Ok(Self {
             guard: guard_of(options, &mut *recursion, span, sample_time),
             standing: standing_of(options, sample_time),
@@ -333,7 +333,7 @@ impl Tracker {
     }
 
     /// Logarithm of the odds that the person changed within the last four seconds, by
-    /// [`crate::Method::MultipleModel`].
+    /// the bank of `multiple-model`.
     pub fn change_odds(&self) -> Option<f64> {
         self.recursion.change_odds()
     }
@@ -380,7 +380,7 @@ fn largest_nk(options: &TrackOptions, sample_time: SampleTime) -> usize {
 
 /// The watch of a recursion without a guard, but where that was asked for.
 pub(crate) fn standing_of(options: &TrackOptions, sample_time: SampleTime) -> Option<Box<Standing>> {
-    if options.method.inner().guard().is_some() {
+    if options.method.guard().is_some() {
         return None;
     }
     Standing::new(largest_nk(options, sample_time), sample_time).map(Box::new)
@@ -393,7 +393,7 @@ pub(crate) fn guard_of(
     span: Option<&Record>,
     sample_time: SampleTime,
 ) -> Option<Box<Guard>> {
-    let method = options.method.inner();
+    let method = &options.method;
     if !method.is_guarded() {
         return None;
     }

@@ -159,7 +159,7 @@ fn check_method(options: &TrackOptions) -> Result<(), IdentError> {
         .list()
         .iter()
         .any(|setting| setting.name == COVARIANCE);
-    let forgets = method.inner().forgetting();
+    let forgets = method.forgetting();
     if !has_p || matches!(forgets, ForgettingRule::Window | ForgettingRule::Gradient(_)) {
         return Err(bad(
             "the run for validation",

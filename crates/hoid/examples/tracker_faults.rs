@@ -27,13 +27,13 @@ fn main() {
             ("--bare", _) => bare = true,
             ("--cost", _) => cost = true,
             (_, Ok(number)) => numbers.push(number),
-            (name, Err(_)) => methods.push(name.parse::<Method>().unwrap()),
+            (name, Err(_)) => methods.push(hoid::survey::method(name).unwrap()),
         }
     }
     if methods.is_empty() {
         methods = vec![
-            Method::physical(),
-            Method::multiple_model(),
+            hoid::survey::physical(),
+            hoid::survey::multiple_model(),
             Method::rls(),
             Method::rpem(),
         ];

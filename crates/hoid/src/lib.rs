@@ -75,6 +75,8 @@ pub use hoid_report as report;
 pub use hoid_sim as sim;
 #[cfg(feature = "study")]
 pub use hoid_study as study;
+#[cfg(feature = "survey")]
+pub use hoid_survey as survey;
 #[cfg(feature = "thesis")]
 pub use hoid_thesis as thesis;
 pub use hoid_track as track;

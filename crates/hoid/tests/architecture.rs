@@ -6,7 +6,7 @@ use std::{collections::BTreeMap, process::Command};
 use serde_json::Value;
 
 /// What each crate may depend on within the workspace.
-const ALLOWED: [(&str, &[&str]); 21] = [
+const ALLOWED: [(&str, &[&str]); 22] = [
     ("hoid-numerics", &[]),
     ("hoid-core", &["hoid-numerics"]),
     ("hoid-embedded", &["hoid-core"]),
@@ -20,6 +20,10 @@ const ALLOWED: [(&str, &[&str]); 21] = [
         "hoid-track",
         &["hoid-numerics", "hoid-core", "hoid-ident", "hoid-model"],
     ),
+    (
+        "hoid-survey",
+        &["hoid-numerics", "hoid-core", "hoid-ident", "hoid-model", "hoid-track"],
+    ),
     ("hoid-sim", &["hoid-core", "hoid-lanes", "hoid-model"]),
     ("hoid-io", &["hoid-model"]),
     (
@@ -28,7 +32,14 @@ const ALLOWED: [(&str, &[&str]); 21] = [
     ),
     (
         "hoid-ffi",
-        &["hoid-ident", "hoid-io", "hoid-model", "hoid-sim", "hoid-track"],
+        &[
+            "hoid-ident",
+            "hoid-io",
+            "hoid-model",
+            "hoid-sim",
+            "hoid-survey",
+            "hoid-track",
+        ],
     ),
     (
         "hoid-thesis",
@@ -45,7 +56,14 @@ const ALLOWED: [(&str, &[&str]); 21] = [
     ),
     (
         "hoid-challenge",
-        &["hoid-model", "hoid-ident", "hoid-sim", "hoid-track", "hoid-io"],
+        &[
+            "hoid-model",
+            "hoid-ident",
+            "hoid-sim",
+            "hoid-survey",
+            "hoid-track",
+            "hoid-io",
+        ],
     ),
     (
         "hoid-evidence",
@@ -58,6 +76,7 @@ const ALLOWED: [(&str, &[&str]); 21] = [
             "hoid-sim",
             "hoid-study",
             "hoid-thesis",
+            "hoid-survey",
             "hoid-track",
         ],
     ),
@@ -69,6 +88,7 @@ const ALLOWED: [(&str, &[&str]); 21] = [
             "hoid-model",
             "hoid-ident",
             "hoid-sim",
+            "hoid-survey",
             "hoid-track",
             "hoid-io",
         ],
@@ -94,6 +114,7 @@ const ALLOWED: [(&str, &[&str]); 21] = [
             "hoid-ident",
             "hoid-sim",
             "hoid-io",
+            "hoid-survey",
             "hoid-track",
             "hoid-study",
         ],
@@ -111,6 +132,7 @@ const ALLOWED: [(&str, &[&str]); 21] = [
             "hoid-io",
             "hoid-study",
             "hoid-thesis",
+            "hoid-survey",
             "hoid-track",
             "hoid-report",
         ],
@@ -127,6 +149,7 @@ const ALLOWED: [(&str, &[&str]); 21] = [
             "hoid-io",
             "hoid-report",
             "hoid-thesis",
+            "hoid-survey",
             "hoid-track",
         ],
     ),

@@ -65,12 +65,14 @@ fn mean(all: &[[[f64; 5]; 2]], what: usize, i: usize) -> f64 {
 
 #[test]
 fn the_two_sided_estimate_is_closer_and_its_bands_hold() {
-    let two_sided = options(Method::multiple_model()).with(&[("smooth", "true")]).unwrap();
+    let two_sided = options(hoid::survey::multiple_model())
+        .with(&[("smooth", "true")])
+        .unwrap();
     let (mut causal, mut smooth) = (Vec::new(), Vec::new());
     for condition in [Condition::C3, Condition::C4, Condition::C5, Condition::C6] {
         for replication in 0..3 {
             let record = run(condition, 2, 0.1, replication);
-            causal.push(errors(&record, &options(Method::multiple_model())));
+            causal.push(errors(&record, &options(hoid::survey::multiple_model())));
             smooth.push(errors(&record, &two_sided));
         }
     }
@@ -87,7 +89,7 @@ fn the_two_sided_estimate_is_closer_and_its_bands_hold() {
 
 #[test]
 fn the_methods_of_the_literature_follow_a_change() {
-    for method in [Method::fused(), Method::ekf(), Method::ukf()] {
+    for method in [hoid::survey::fused(), hoid::survey::ekf(), hoid::survey::ukf()] {
         let all: Vec<_> = (0..4)
             .map(|replication| errors(&run(Condition::C3, 2, 0.1, replication), &options(method.clone())))
             .collect();
@@ -105,7 +107,8 @@ fn the_methods_of_the_literature_follow_a_change() {
 #[test]
 fn on_real_dimensions_the_points_and_the_linearisation_agree() {
     let record = run(Condition::C5, 1, 0.05, 0);
-    let [extended, unscented] = [Method::ekf(), Method::ukf()].map(|m| track(&record, &options(m), 512).unwrap());
+    let [extended, unscented] =
+        [hoid::survey::ekf(), hoid::survey::ukf()].map(|m| track(&record, &options(m), 512).unwrap());
     for row in 0..extended.len() {
         let (a, b) = (extended.operator(row).unwrap(), unscented.operator(row).unwrap());
         for ((_, _, a), (_, _, b)) in a.rows()[..5].iter().zip(b.rows()) {
@@ -123,7 +126,7 @@ fn a_delay_that_changes_is_followed_and_named() {
     scenario.realisation = hoid::model::scenario::Realisation::Output;
     scenario.last.operator.tau_e_s = 0.34;
     let simulator = Simulator::new(&scenario).unwrap();
-    let tracked = options(Method::multiple_model())
+    let tracked = options(hoid::survey::multiple_model())
         .with(&[("track_delay", "0.2..0.4")])
         .unwrap();
     for replication in 0..2 {
@@ -155,11 +158,12 @@ fn a_delay_that_changes_is_followed_and_named() {
             .to_string()
     };
     let with = |range| {
-        let mut options = options(Method::multiple_model());
-        if let Method::MultipleModel(own) = &mut options.method {
-            own.delay.track_delay_s = Some(range);
+        let mut own = hoid::survey::MultipleModelOptions::default();
+        own.delay.track_delay_s = Some(range);
+        TrackOptions {
+            method: own.into(),
+            ..options(hoid::survey::multiple_model())
         }
-        options
     };
     let says = refused(with((0.3, 0.4)));
     assert!(says.contains("nk = 29") && says.contains("31 to 41"), "{says}");
@@ -173,7 +177,7 @@ fn a_delay_that_changes_is_followed_and_named() {
 
 #[test]
 fn what_has_a_model_of_the_change_takes_no_memory() {
-    for method in [Method::ekf(), Method::ukf(), Method::multiple_model()] {
+    for method in [hoid::survey::ekf(), hoid::survey::ukf(), hoid::survey::multiple_model()] {
         for (name, text) in [("memory", "256"), ("covariance", "0.1")] {
             let refused = options(method.clone()).with(&[(name, text)]).unwrap_err().to_string();
             assert!(refused.contains(name) && refused.contains("rpem"), "{refused}");
@@ -182,9 +186,9 @@ fn what_has_a_model_of_the_change_takes_no_memory() {
     let other_orders = TrackOptions {
         orders: hoid::model::Orders {
             nf: 1,
-            ..Method::fused().usual_orders(29)
+            ..hoid::survey::fused().usual_orders(29)
         },
-        ..options(Method::fused())
+        ..options(hoid::survey::fused())
     };
     assert!(other_orders.check().is_err());
 }

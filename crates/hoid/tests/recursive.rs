@@ -80,7 +80,7 @@ fn with_memory(method: Method, memory: &str) -> TrackOptions {
 
 #[test]
 fn error_bars_hold_with_an_infinite_memory() {
-    for method in [Method::rpem(), Method::physical()] {
+    for method in [Method::rpem(), hoid::survey::physical()] {
         // From half of the record, whose own errors are nearly normal. The standard error of a
         // standard deviation from 6000 runs is 1/sqrt(12000) = .009.
         let half = TrackOptions {
@@ -95,7 +95,7 @@ fn error_bars_hold_with_an_infinite_memory() {
 
 #[test]
 fn error_bars_hold_with_a_memory_of_256_samples() {
-    for method in [Method::rpem(), Method::physical()] {
+    for method in [Method::rpem(), hoid::survey::physical()] {
         for deviation in z_scores(&with_memory(method.clone(), "256"), 2000) {
             assert!((0.9..=1.1).contains(&deviation), "{method:?}: {deviation}");
         }
@@ -104,7 +104,7 @@ fn error_bars_hold_with_a_memory_of_256_samples() {
 
 #[test]
 fn error_bars_hold_with_a_memory_for_each_parameter() {
-    for method in [Method::rpem(), Method::physical()] {
+    for method in [Method::rpem(), hoid::survey::physical()] {
         for deviation in z_scores(&options(method.clone()), 2000) {
             assert!((0.9..=1.1).contains(&deviation), "{method:?}: {deviation}");
         }
@@ -224,8 +224,8 @@ fn a_million_samples_in_all_weathers_leave_numbers_and_a_bounded_covariance() {
         .collect();
     all.extend([
         options(Method::rls()),
-        options(Method::physical()),
-        options(Method::rriv()),
+        options(hoid::survey::physical()),
+        options(hoid::survey::rriv()),
     ]);
     on_all_cores(all.len() as u64, |i| {
         let options = &all[i as usize];
@@ -260,7 +260,7 @@ fn after_silence_the_estimate_recovers_as_fast_as_at_the_start() {
     let simulator = Simulator::new(&scenario(Condition::C1, 1, 0.1)).unwrap();
     let (first, second) = (run(&simulator, 7), run(&simulator, 8));
     let span = first.span(0.0, 30.72).unwrap();
-    for method in [Method::rls(), Method::rpem(), Method::physical()] {
+    for method in [Method::rls(), Method::rpem(), hoid::survey::physical()] {
         let mut fresh = Tracker::new(&options(method.clone()), Some(&span), first.sample_time()).unwrap();
         let mut silent = Tracker::new(&options(method.clone()), Some(&span), first.sample_time()).unwrap();
         for k in 0..first.len() {
@@ -300,7 +300,7 @@ fn hostile_samples_are_skipped_counted_and_forgotten() {
     let record = run(&Simulator::new(&scenario(Condition::C1, 1, 0.1)).unwrap(), 9);
     let span = record.span(0.0, 30.72).unwrap();
     let hostile = [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e300, -1e7];
-    for method in Method::all() {
+    for method in hoid::survey::methods() {
         let options = options(method.clone());
         let mut clean = Tracker::new(&options, Some(&span), record.sample_time()).unwrap();
         let mut tracker = Tracker::new(&options, Some(&span), record.sample_time()).unwrap();
@@ -333,7 +333,12 @@ fn hostile_samples_are_skipped_counted_and_forgotten() {
 
 #[test]
 fn no_default_diverges_in_the_reference_conditions() {
-    let methods = [Method::rls(), Method::rpem(), Method::physical(), Method::rriv()];
+    let methods = [
+        Method::rls(),
+        Method::rpem(),
+        hoid::survey::physical(),
+        hoid::survey::rriv(),
+    ];
     for condition in Condition::ALL {
         for m in [1, 4] {
             let simulator = Simulator::new(&scenario(condition, m, 0.2)).unwrap();
@@ -379,7 +384,7 @@ fn the_delay_is_tracked_with_its_error() {
     inside.initial.operator.tau_e_s = 0.3;
     inside.last.operator.tau_e_s = 0.3;
     let record = run(&Simulator::new(&inside).unwrap(), 11);
-    let tracked = options(Method::physical())
+    let tracked = options(hoid::survey::physical())
         .with(&[("track_delay", "0.1..0.5")])
         .unwrap();
     let trace = track(&record, &tracked, 1).unwrap();

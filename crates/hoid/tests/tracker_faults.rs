@@ -36,7 +36,7 @@ fn effects(references: &[(Run, Reference)], fault: &Fault, at_s: f64) -> Vec<Eff
 #[test]
 fn an_outlier_moves_no_parameter_by_half_a_standard_error_for_a_second() {
     use Signal::{E, U};
-    for method in [Method::physical(), Method::multiple_model(), Method::rpem()] {
+    for method in [hoid::survey::physical(), hoid::survey::multiple_model(), Method::rpem()] {
         let references = references(&method, 70..73, 120.0);
         for (signal, size, seconds, at_s) in [
             (E, 7.0, 0.0, 61.37),
@@ -60,7 +60,7 @@ fn an_outlier_moves_no_parameter_by_half_a_standard_error_for_a_second() {
 
 #[test]
 fn after_a_hostile_span_the_estimate_comes_back_by_itself() {
-    for method in [Method::physical(), Method::multiple_model()] {
+    for method in [hoid::survey::physical(), hoid::survey::multiple_model()] {
         let references = references(&method, 80..82, 200.0);
         for (fault, at_s) in [
             (
@@ -93,7 +93,7 @@ fn after_a_hostile_span_the_estimate_comes_back_by_itself() {
 #[test]
 fn nothing_is_held_back_where_nothing_is_wrong() {
     let (mut held, mut samples) = (0, 0);
-    for (run, reference) in references(&Method::physical(), 90..99, 300.0) {
+    for (run, reference) in references(&hoid::survey::physical(), 90..99, 300.0) {
         assert_eq!(reference.restarts, 0, "{:?}", reference.events);
         held += reference.held;
         samples += run.e.len() as u64;

@@ -34,6 +34,8 @@ RecursiveMethod = Literal[
     "fused",
     "ekf",
     "ukf",
+    "dual-ekf",
+    "linear-network",
 ]
 
 #: A polynomial structure.
@@ -116,7 +118,7 @@ class MethodSettings(TypedDict, total=False):
     track_delay: tuple[float, float] | None
 
     # Bounds of physical parameters, as omega_nm=5..30,zeta_nm=0.1..2; an end may be left open.
-    # For physical, multiple-model, ekf, ukf.
+    # For physical, multiple-model, ekf, ukf, dual-ekf.
     bound: Mapping[str, tuple[float | None, float | None]] | None
 
     # Length of the window: samples or seconds. For window.
@@ -147,6 +149,28 @@ class MethodSettings(TypedDict, total=False):
     # of omega_nm, zeta_nm, tau_e, T_I (the spread is relative), or an earlier fit of them, a
     # file that hoid identify --json has printed. For adaptive.
     prior: str | PathLike[str] | Mapping[str, tuple[float, float]] | OperatorFit | None
+
+    # Drift of K_e and K_e_dot in a root second, share of their start. For dual-ekf.
+    gain_drift: float | None
+
+    # Drift of omega_nm and zeta_nm in a root second, share of their start. For dual-ekf.
+    nms_drift: float | None
+
+    # Drift of tau_e in a root second, share of its start, behind a Padé approximation. For
+    # dual-ekf.
+    delay_drift: float | None
+
+    # Error that enters the neuromuscular part beside e, share of the size of e. For dual-ekf.
+    state_noise: float | None
+
+    # Root mean square of e. For dual-ekf.
+    error_size: float | None
+
+    # Order of the Padé approximation of the delay, 1 to 3; 0 for whole samples. For dual-ekf.
+    pade: int | None
+
+    # Time constant with which a weight is learned. For linear-network.
+    learning: float | None
 
 
 class BatchSettings(TypedDict, total=False):
@@ -283,7 +307,11 @@ METHODS = """``"rls"``: recursive least squares;
         starts without a fit;
         ``"fused"``: least squares for B with the poles of rpem, for comparison;
         ``"ekf"``: extended Kalman filter of state and parameters, for comparison;
-        ``"ukf"``: unscented Kalman filter of state and parameters, for comparison."""
+        ``"ukf"``: unscented Kalman filter of state and parameters, for comparison;
+        ``"dual-ekf"``: two extended Kalman filters that take turns, of state and of parameters,
+        for comparison;
+        ``"linear-network"``: single linear layer that learns K_e and K_e_dot behind a known
+        neuromuscular part, for comparison."""
 
 #: The options, as the documentation of `track` lists them.
 SETTINGS = """covariance : float
@@ -327,7 +355,7 @@ SETTINGS = """covariance : float
             samples by rpem and multiple-model. For rpem, physical, multiple-model.
         bound : Mapping[str, tuple[float | None, float | None]]
             Bounds of physical parameters, as omega_nm=5..30,zeta_nm=0.1..2; an end may be left
-            open. For physical, multiple-model, ekf, ukf.
+            open. For physical, multiple-model, ekf, ukf, dual-ekf.
         window : float | str
             Length of the window: samples or seconds. For window.
         refit : int
@@ -349,7 +377,24 @@ SETTINGS = """covariance : float
         prior : str | PathLike[str] | Mapping[str, tuple[float, float]] | OperatorFit
             What is known of the person before the first sample: population, none,
             NAME=CENTRE:SPREAD of omega_nm, zeta_nm, tau_e, T_I (the spread is relative), or an
-            earlier fit of them, a file that hoid identify --json has printed. For adaptive."""
+            earlier fit of them, a file that hoid identify --json has printed. For adaptive.
+        gain_drift : float
+            Drift of K_e and K_e_dot in a root second, share of their start. For dual-ekf.
+        nms_drift : float
+            Drift of omega_nm and zeta_nm in a root second, share of their start. For dual-ekf.
+        delay_drift : float
+            Drift of tau_e in a root second, share of its start, behind a Padé approximation.
+            For dual-ekf.
+        state_noise : float
+            Error that enters the neuromuscular part beside e, share of the size of e. For
+            dual-ekf.
+        error_size : float
+            Root mean square of e. For dual-ekf.
+        pade : int
+            Order of the Padé approximation of the delay, 1 to 3; 0 for whole samples. For
+            dual-ekf.
+        learning : float
+            Time constant with which a weight is learned. For linear-network."""
 
 #: The options, as the documentation of `identify` lists them.
 BATCH_SETTINGS = """noise : Literal['ar', 'arma', 'remnant']

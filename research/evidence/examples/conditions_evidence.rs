@@ -15,7 +15,7 @@ use hoid_model::{
     scenario::{Condition, Realisation},
 };
 use hoid_sim::{RunSeed, Simulator};
-use hoid_track::{Method, Sample, TrackOptions, Tracker};
+use hoid_track::{Sample, TrackOptions, Tracker};
 
 /// Not a seed on which anything was set.
 const SEED: u64 = 46_000;
@@ -55,7 +55,7 @@ struct Found {
 }
 
 fn tracker(name: &str, record: &Record) -> Tracker {
-    let method: Method = name.parse().unwrap();
+    let method = hoid_survey::method(name).unwrap();
     if method.starts_itself() {
         let options = TrackOptions::told_nothing(method, record.sample_time());
         return Tracker::new(&options, None, record.sample_time()).unwrap();

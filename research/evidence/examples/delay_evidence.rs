@@ -46,12 +46,12 @@ fn main() {
     let methods = [
         ("rpem, nk = 29", options(Method::rpem(), None)),
         ("rpem, tracked", options(Method::rpem(), Some(RANGE_S))),
-        ("multiple-model, nk = 29", options(Method::multiple_model(), None)),
+        ("multiple-model, nk = 29", options(hoid_survey::multiple_model(), None)),
         (
             "multiple-model, tracked",
-            options(Method::multiple_model(), Some(RANGE_S)),
+            options(hoid_survey::multiple_model(), Some(RANGE_S)),
         ),
-        ("physical, tracked", options(Method::physical(), Some(RANGE_S))),
+        ("physical, tracked", options(hoid_survey::physical(), Some(RANGE_S))),
     ];
     let orders: &[usize] = if tune { &[2, 3] } else { &[2] };
     println!(

@@ -163,7 +163,7 @@ fn alarms(statistic: &Statistic, threshold: f64, changes: bool) -> (Option<f64>,
 fn detection(runs: usize) {
     let statistics = |record: &Record| -> [Statistic; 2] {
         let span = record.span(0.0, START_S).unwrap();
-        let options = options(Method::multiple_model());
+        let options = options(hoid_survey::multiple_model());
         let mut tracker = Tracker::new(&options, Some(&span), record.sample_time()).unwrap();
         let mut baseline = ErrorThreshold::new(span.input(), record.sample_time()).unwrap();
         let mut both = [Vec::new(), Vec::new()];
@@ -246,9 +246,9 @@ fn tune(runs: usize) {
     let methods = [
         of_the_text(Method::rls()),
         of_the_text(Method::rpem()),
-        options(Method::fused()),
-        options(Method::ekf()),
-        options(Method::ukf()),
+        options(hoid_survey::fused()),
+        options(hoid_survey::ekf()),
+        options(hoid_survey::ukf()),
     ];
     let mut ratios: Vec<Vec<[f64; 5]>> = vec![Vec::new(); methods.len()];
     let mut covered: Vec<Vec<[f64; 5]>> = vec![Vec::new(); methods.len()];
@@ -292,7 +292,7 @@ fn tune(runs: usize) {
 /// Cells on which `multiple-model` is set: C3 and C5, C1 and C2, and changes of the neuromuscular system
 /// that are not those of the plan. Errors: geometric mean over the cells of the median run.
 fn set(runs: usize) {
-    let options = options(Method::multiple_model());
+    let options = options(hoid_survey::multiple_model());
     let neuromuscular = |omega: f64, zeta: f64| {
         move |scenario: &mut Scenario| {
             scenario.last.operator.omega_nm_rad_s = omega;
@@ -427,7 +427,7 @@ fn joined(files: &[String]) {
         let span = record.span(0.0, start_s).unwrap();
         // The delay of the least innovation variance of the start fit.
         let fits = (8..=26).filter_map(|nk| {
-            let m = Method::multiple_model();
+            let m = hoid_survey::multiple_model();
             let options = TrackOptions::new(m.clone(), m.usual_structure(), m.usual_orders(nk));
             Tracker::new(&options, Some(&span), sample_time).ok()
         });
@@ -485,17 +485,17 @@ fn cost(runs: usize) {
     let simulator = simulator(Condition::C4, 2, 0.1);
     let record = run(&simulator, Condition::C4, 2, 1, 0);
     let span = record.span(0.0, START_S).unwrap();
-    let tracked = options(Method::multiple_model())
+    let tracked = options(hoid_survey::multiple_model())
         .with(&[("track_delay", "0.2..0.4")])
         .unwrap();
     let methods = [
         Method::rls(),
         Method::rpem(),
-        Method::fused(),
-        Method::physical(),
-        Method::ekf(),
-        Method::ukf(),
-        Method::multiple_model(),
+        hoid_survey::fused(),
+        hoid_survey::physical(),
+        hoid_survey::ekf(),
+        hoid_survey::ukf(),
+        hoid_survey::multiple_model(),
     ];
     for options in methods.map(options).into_iter().chain([tracked]) {
         let mut least = f64::INFINITY;

@@ -39,7 +39,7 @@ fn main() {
     let start = Estimator::new(Structure::BoxJenkins, orders)
         .fit(std::slice::from_ref(&record))
         .unwrap();
-    for method in [Method::rpem(), Method::physical()] {
+    for method in [Method::rpem(), hoid_survey::physical()] {
         let options = TrackOptions {
             start: StartAt::Theta(start.model().theta().to_vec()),
             ..TrackOptions::new(method.clone(), Structure::BoxJenkins, orders)

@@ -16,7 +16,7 @@ use std::{env, f64::consts::PI, fs, path::PathBuf};
 use hoid_evidence::oracle::{self, Rows};
 use hoid_evidence::task::{median, on_all_cores};
 use hoid_model::{Channel, Record, SampleTime};
-use hoid_track::{Method, StartAt, TrackOptions, Tracker};
+use hoid_track::{StartAt, TrackOptions, Tracker};
 
 const PEOPLE: [&str; 3] = ["P03", "P05", "P09"];
 const ELEMENTS: [&str; 2] = ["fo", "so"];
@@ -138,7 +138,7 @@ fn run(method: &str, first: &Trial, second: &Trial, truths: [&[[f64; 2]; 7]; 2],
     let (name, option) = method
         .split_once(':')
         .map_or((method, None), |(name, option)| (name, Some(option)));
-    let mut method: Method = name.parse().unwrap();
+    let mut method = hoid_survey::method(name).unwrap();
     if let Some((key, value)) = option.and_then(|o| o.split_once('=')) {
         method.set(key, value).unwrap();
     }

@@ -14,7 +14,7 @@
 use std::{collections::BTreeMap, env, f64::consts::PI, fs, path::Path};
 
 use hoid_evidence::pilots::{self, FROM_S};
-use hoid_track::{Method, Sample, TrackOptions, Tracker};
+use hoid_track::{Sample, TrackOptions, Tracker};
 use rayon::prelude::*;
 
 const AT_RAD_S: [f64; 3] = [1.0, 2.5, 4.0];
@@ -123,7 +123,7 @@ fn run(name: &str, folder: &Path, references: &References, method: &str) -> Run 
     let people = [whole("C1"), whole("C2")];
     let (record, first) = pilots::read(folder, name);
     let (name, setting) = method.split_once(':').map_or((method, None), |(m, s)| (m, Some(s)));
-    let mut method: Method = name.parse().unwrap();
+    let mut method = hoid_survey::method(name).unwrap();
     if let Some((key, value)) = setting.and_then(|s| s.split_once('=')) {
         method.set(key, value).unwrap();
     }

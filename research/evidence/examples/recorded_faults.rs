@@ -17,7 +17,7 @@ use std::{collections::BTreeMap, env};
 use faults::{Fault, Signal, faults};
 use hoid::model::SampleTime;
 use hoid_evidence::pilots;
-use hoid_track::{GuardEvent, Method, Sample, TrackOptions, Tracker};
+use hoid_track::{GuardEvent, Sample, TrackOptions, Tracker};
 use rayon::prelude::*;
 
 /// Where faults are put in, s after the beginning, and the longest of them.
@@ -33,7 +33,7 @@ struct Recording {
 }
 
 fn told(recording: &Recording, e: &[f64], u: &[f64], method: &str) -> Vec<(usize, GuardEvent)> {
-    let method: Method = method.parse().unwrap();
+    let method = hoid_survey::method(method).unwrap();
     let options = TrackOptions::told_nothing(method, recording.sample_time);
     let mut tracker = Tracker::new(&options, None, recording.sample_time).unwrap();
     let mut all = Vec::new();

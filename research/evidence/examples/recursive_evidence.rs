@@ -140,7 +140,7 @@ fn table(runs: usize) {
         ("RPEM, text", of_the_text(Method::rpem())),
         ("cascade", cascade),
         ("RPEM", options(Method::rpem())),
-        ("physical", options(Method::physical())),
+        ("physical", options(hoid_survey::physical())),
     ];
     for (cell, (m, level)) in cells.into_iter().enumerate() {
         let simulator = simulator(Condition::C4, m, level);
@@ -188,9 +188,9 @@ fn divergence(runs: usize) {
                             (0..trace.len()).any(|k| trace.theta(k).iter().any(bad))
                         })
                     };
-                    Method::all().into_iter().map(diverges).collect::<Vec<bool>>()
+                    hoid_survey::methods().into_iter().map(diverges).collect::<Vec<bool>>()
                 });
-                for (i, method) in Method::all().into_iter().enumerate() {
+                for (i, method) in hoid_survey::methods().into_iter().enumerate() {
                     let n = found.iter().filter(|f| f[i]).count();
                     *diverged.entry(method.name()).or_default() += n;
                     if n > 0 {
@@ -220,7 +220,12 @@ fn alternating(k: usize, record: &Record) -> (f64, f64) {
 fn endurance(samples: usize) {
     let record = run(&simulator(Condition::C1, 1, 0.1), 0, 0);
     let span = record.span(0.0, 30.72).unwrap();
-    let methods = [Method::rls(), Method::rpem(), Method::physical(), Method::rriv()];
+    let methods = [
+        Method::rls(),
+        Method::rpem(),
+        hoid_survey::physical(),
+        hoid_survey::rriv(),
+    ];
     let lines = on_all_cores(methods.len(), |i| {
         let options = options(methods[i as usize].clone());
         let mut tracker = Tracker::new(&options, Some(&span), record.sample_time()).unwrap();

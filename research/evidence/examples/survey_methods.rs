@@ -2,18 +2,23 @@
 //!
 //! `cargo run --release -p hoid-evidence --example survey_methods > survey-methods.md`
 //!
-//! or, of a plan of one's own, `... --example survey_methods -- my-survey.toml`. Method by method it
-//! can be tuned on other runs by another seed in a copy of the plan.
+//! or, of plans of one's own, `... --example survey_methods -- my-survey.toml my-comparators.toml`. Method by
+//! method it can be tuned on other runs by another seed in a copy of the plan.
 #![allow(clippy::unwrap_used, clippy::print_stdout, clippy::print_stderr)]
 
-use hoid_thesis::survey::{SURVEY, SurveyPlan, survey, survey_tables};
+use hoid_thesis::{
+    plans::SURVEY,
+    survey::{COMPARATORS, SurveyPlan, survey, survey_tables},
+};
 
 fn main() {
+    let text = |place: usize, usual: &str| {
+        let path = std::env::args().nth(place);
+        path.map_or_else(|| usual.to_owned(), |path| std::fs::read_to_string(path).unwrap())
+    };
     let path = std::env::args().nth(1);
-    let text = path
-        .as_ref()
-        .map_or_else(|| SURVEY.to_owned(), |path| std::fs::read_to_string(path).unwrap());
-    let plan = match SurveyPlan::parse(&text, path.as_deref().unwrap_or("survey.toml")) {
+    let (study, comparators) = (text(1, SURVEY.text), text(2, COMPARATORS));
+    let plan = match SurveyPlan::parse(&study, &comparators, path.as_deref().unwrap_or("survey.toml")) {
         Ok(plan) => plan,
         Err(error) => {
             eprintln!("{error}");

@@ -431,7 +431,7 @@ fn main() {
     let number = |name: &str, usual: u64| text(name).map_or(usual, |text| text.parse().unwrap());
     let (runs, seed) = (number("--runs", 20), number("--seed", 9000));
     let is = |name: &str| arguments.iter().any(|a| a == name);
-    let method: Method = text("--method").map_or(Method::adaptive(), |name| name.parse().unwrap());
+    let method = text("--method").map_or(Method::adaptive(), |name| hoid_survey::method(&name).unwrap());
     let (named, kinds) = (is("--element"), is("--kinds"));
     let only = text("--only");
     let mut asked: Vec<(Kind, Attack, u64)> = Vec::new();

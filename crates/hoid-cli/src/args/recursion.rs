@@ -12,6 +12,7 @@ use hoid::ident::{
 };
 use hoid::io::{Scaling, readable_endings, writable_endings};
 use hoid::model::{ContinuousTransferFunction, Structure};
+use hoid::survey::is_for_comparison;
 use hoid::track::Method;
 
 use super::{
@@ -23,7 +24,7 @@ use super::{
 #[derive(Debug, Args)]
 pub struct RecursionArgs {
     /// The recursion
-    #[arg(long, value_name = "NAME", default_value_t = Method::default().name().to_owned(), value_parser = method_names())]
+    #[arg(long, value_name = "NAME", long_help = method_help(), default_value_t = Method::default().name().to_owned(), value_parser = method_names())]
     pub method: String,
     /// Polynomial structure [default: arx for rls, else bj]
     #[arg(long, value_name = "NAME", value_parser = choice_of(&Structure::ALL))]
@@ -149,13 +150,25 @@ pub struct StreamArgs {
     pub scale: Vec<(String, Scaling)>,
 }
 
+/// The recursion, and which there are to be compared with.
+fn method_help() -> String {
+    let all = hoid::survey::methods();
+    let others: Vec<&str> = all
+        .iter()
+        .filter(|of| is_for_comparison(of))
+        .map(Method::name)
+        .collect();
+    format!("The recursion. For comparison there are also {}", others.join(", "))
+}
+
 /// The recursive methods, each with its line of help.
 pub(super) fn method_names() -> impl TypedValueParser<Value = String> {
     let value = |method: Method| {
         let MethodSpec { name, help, .. } = method.spec();
-        PossibleValue::new(name).help(help).aliases(method.earlier_name())
+        let value = PossibleValue::new(name).help(help).aliases(method.earlier_name());
+        value.hide(is_for_comparison(&method))
     };
-    PossibleValuesParser::new(Method::all().into_iter().map(value)).map(|name| name.to_lowercase())
+    PossibleValuesParser::new(hoid::survey::methods().into_iter().map(value)).map(|name| name.to_lowercase())
 }
 
 fn parse_count(text: &str) -> Result<usize, String> {

@@ -9,7 +9,7 @@ use hoid::ident::{
     IvMethod,
     settings::{Kind, MethodSpec, Setting},
 };
-use hoid::track::Method;
+use hoid::survey;
 
 use super::choices::by_name;
 
@@ -29,7 +29,7 @@ pub trait Registry {
 
 impl Registry for Recursive {
     fn specs() -> Vec<MethodSpec> {
-        Method::registry()
+        survey::registry()
     }
 }
 

@@ -1,8 +1,6 @@
 //! Data and the plain form of the covariance that tests share.
 #![allow(dead_code)]
 
-pub mod operator;
-
 use hoid_core::{
     adaptation::Forgetting, covariance::Covariance, error_bars::ErrorBars, innovation_variance::InnovationVariance,
     shape::AnyShape, ud_covariance::UdCovariance,

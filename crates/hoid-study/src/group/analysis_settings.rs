@@ -63,7 +63,7 @@ fn form_names() -> Vec<&'static str> {
 
 /// The names of the recursive methods, for the schema.
 fn method_names() -> Vec<&'static str> {
-    Method::registry().into_iter().map(|spec| spec.name).collect()
+    hoid_survey::registry().into_iter().map(|spec| spec.name).collect()
 }
 
 impl Default for AnalysisSettings {
@@ -91,10 +91,7 @@ impl AnalysisSettings {
     /// # Errors
     /// A name that no method has.
     pub(super) fn recursions(&self) -> Result<Vec<Method>, String> {
-        let of = |name: &String| {
-            name.parse::<Method>()
-                .map_err(|error| format!("analysis.methods: {error}"))
-        };
+        let of = |name: &String| hoid_survey::method(name).map_err(|error| format!("analysis.methods: {error}"));
         self.methods.iter().map(of).collect()
     }
 

@@ -91,7 +91,7 @@ impl EstimatorCell {
         let method = match table.method.as_str() {
             FIT | GREY_BOX | RECORD => None,
             _ if asked.is_some() => None,
-            name => Some(name.parse::<Method>().map_err(|_| at("method", unknown_method(name)))?),
+            name => Some(hoid_survey::method(name).map_err(|_| at("method", unknown_method(name)))?),
         };
         let structure = match &table.structure {
             None => method.as_ref().map_or(Structure::BoxJenkins, Method::usual_structure),

@@ -26,7 +26,7 @@ pub fn whole_keys() -> Vec<String> {
 
 /// The recursive methods, and what is run as `hoid identify` runs it, with their options.
 pub(super) fn methods() -> Vec<MethodSpec> {
-    [Method::registry(), analysis::methods()].concat()
+    [hoid_survey::registry(), analysis::methods()].concat()
 }
 
 /// A whole number, or `"true"` for that of the scenario.
@@ -199,7 +199,7 @@ impl EstimatorTable {
         let operator = asked.is_some_and(|asked| asked.structure().is_none());
         let tracks = method.is_some();
         // A window is no recursion that starts from coefficients or waits.
-        let moves = method.is_some_and(|method| !matches!(method, Method::Window(_)));
+        let moves = method.is_some_and(|method| !method.fits_anew());
         let both = "fit and grey-box";
         let recursive = "the recursive methods";
         let given = [
@@ -371,7 +371,7 @@ impl EstimatorTable {
         at: &impl Fn(&str, String) -> PlanProblem,
     ) -> Result<TrackOptions, PlanProblem> {
         // In the order of the registry: what belongs to a way of forgetting comes after it.
-        let known = Method::registry().into_iter().flat_map(|spec| spec.settings);
+        let known = hoid_survey::registry().into_iter().flat_map(|spec| spec.settings);
         let mut left: BTreeMap<&str, &toml::Value> = self.settings.iter().map(|(k, v)| (k.as_str(), v)).collect();
         for setting in known {
             let key = plan_key(&setting);
@@ -408,7 +408,7 @@ pub(super) const RECORD: &str = "record";
 pub(super) fn what_is_done() -> Vec<&'static str> {
     let analysed = analysis::methods().into_iter().map(|spec| spec.name);
     let (first, others): (Vec<_>, Vec<_>) = analysed.partition(|name| *name == analysis::OPERATOR);
-    let recursive = Method::registry().into_iter().map(|spec| spec.name);
+    let recursive = hoid_survey::registry().into_iter().map(|spec| spec.name);
     let own = [FIT, GREY_BOX, RECORD];
     first.into_iter().chain(own).chain(others).chain(recursive).collect()
 }

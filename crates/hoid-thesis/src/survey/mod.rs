@@ -2,8 +2,8 @@
 //!
 //! Part II of the reference text describes the methods by which others have identified operators who
 //! change (section 2.4). A survey follows the same simulated runs with all of them: the recursive
-//! methods of `hoid_track`, as estimators of a plan, and the [`comparators`](crate::comparators). A
-//! plan of a survey is that of a study, and at its end tables of comparators:
+//! methods, as estimators of a study that anything can run, and the [`comparators`](crate::comparators),
+//! tables in a file of their own:
 //!
 //! ```toml
 //! [[comparators]]
@@ -31,5 +31,6 @@ pub use plan::SurveyPlan;
 pub use run::{MethodErrors, survey};
 pub use table::survey_tables;
 
-/// The plan of the page "The survey's methods" of the book.
-pub const SURVEY: &str = include_str!("../../plans/survey.toml");
+/// The comparators of the page "The survey's methods" of the book; its study is the named plan
+/// [`SURVEY`](crate::plans::SURVEY).
+pub const COMPARATORS: &str = include_str!("../../plans/survey-comparators.toml");

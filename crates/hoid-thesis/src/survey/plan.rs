@@ -1,4 +1,4 @@
-//! The plan of a survey: that of a study, and comparators.
+//! The plan of a survey: that of a study, and a file of comparators.
 
 use hoid_study::Plan;
 use toml::{Table, Value};
@@ -7,9 +7,6 @@ use crate::{
     ThesisError,
     comparators::{Comparator, comparators},
 };
-
-/// Heading of the tables of comparators, which end a plan.
-const HEADING: &str = "[[comparators]]";
 
 /// A plan of a survey, checked.
 pub struct SurveyPlan {
@@ -20,31 +17,27 @@ pub struct SurveyPlan {
 }
 
 impl SurveyPlan {
-    /// Reads and checks the text of a plan.
+    /// Reads and checks the texts of a study and of its comparators.
     ///
     /// # Errors
     /// [`ThesisError::Study`] for what is wrong with the study, [`ThesisError::Unsuited`] and
     /// [`ThesisError::Estimator`] for a comparator or an option of one.
-    pub fn parse(text: &str, path: &str) -> Result<Self, ThesisError> {
-        let first = text.lines().position(|line| line.trim() == HEADING);
-        let lines: Vec<&str> = text.lines().collect();
-        let (study, own) = lines.split_at(first.unwrap_or(lines.len()));
-        let study = Plan::parse(&study.join("\n"), path)?;
+    pub fn parse(study: &str, comparators: &str, path: &str) -> Result<Self, ThesisError> {
+        let study = Plan::parse(study, path)?;
         let wrong = |quantity: &str, found: String, expected: String| ThesisError::Unsuited {
             method: "a comparator of the plan",
             quantity: quantity.to_owned(),
             found,
             expected,
         };
-        let table: Table = own
-            .join("\n")
+        let table: Table = comparators
             .parse()
             .map_err(|error: toml::de::Error| wrong("its table", error.message().to_owned(), "TOML".to_owned()))?;
         if let Some(key) = table.keys().find(|key| *key != "comparators") {
             return Err(wrong(
-                "a key behind it",
+                "a key beside it",
                 key.clone(),
-                format!("{HEADING}, at the end of the plan"),
+                "[[comparators]] alone".to_owned(),
             ));
         }
         let each = table.get("comparators").and_then(Value::as_array).into_iter().flatten();
@@ -96,6 +89,7 @@ fn comparator(
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
+    use crate::plans::SURVEY;
 
     const HEAD: &str = r#"
 name = "small"
@@ -109,7 +103,7 @@ method = "rls"
 
     #[test]
     fn the_plan_of_the_book_has_all_comparators() {
-        let plan = SurveyPlan::parse(super::super::SURVEY, "survey.toml").unwrap();
+        let plan = SurveyPlan::parse(SURVEY.text, super::super::COMPARATORS, "survey.toml").unwrap();
         let methods: Vec<&str> = plan.comparators.iter().map(|(_, of)| of.about().name).collect();
         for comparator in comparators() {
             assert!(
@@ -122,19 +116,24 @@ method = "rls"
 
     #[test]
     fn options_are_set_and_what_is_unknown_is_refused_by_name() {
-        let parse = |tail: &str| SurveyPlan::parse(&format!("{HEAD}[[comparators]]\n{tail}"), "small.toml");
+        let parse = |tail: &str| SurveyPlan::parse(HEAD, &format!("[[comparators]]\n{tail}"), "small.toml");
         let plan = parse("name = \"FIR\"\nmethod = \"rls-fir\"\nnb = 64\n").unwrap();
         assert_eq!(plan.comparators[0].1.get("nb").as_deref(), Some("64"));
-        assert!(SurveyPlan::parse(HEAD, "small.toml").unwrap().comparators.is_empty());
+        assert!(
+            SurveyPlan::parse(HEAD, "", "small.toml")
+                .unwrap()
+                .comparators
+                .is_empty()
+        );
         for (tail, named) in [
-            ("name = \"x\"\nmethod = \"lstm\"\n", "linear-network"),
+            ("name = \"x\"\nmethod = \"lstm\"\n", "rls-fir"),
             ("name = \"x\"\nmethod = \"wavelet\"\nnb = 3\n", "radians"),
             ("name = \"x\"\nmethod = \"wavelet\"\nradians = -1\n", "radians"),
             ("method = \"wavelet\"\n", "name"),
             ("name = \n", "TOML"),
             (
                 "name = \"x\"\nmethod = \"wavelet\"\n[[estimators]]\nname = \"y\"\n",
-                "at the end",
+                "alone",
             ),
         ] {
             let Err(refused) = parse(tail) else { panic!("{tail}") };

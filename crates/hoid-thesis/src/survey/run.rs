@@ -191,9 +191,12 @@ method = "fit"
 structure = "bj"
 orders.nk = 29
 span_s = [51.2, 81.92]
-[[comparators]]
+[[estimators]]
 name = "network"
 method = "linear-network"
+orders.nk = 29
+"#;
+    const LINES_TOO: &str = r#"
 [[comparators]]
 name = "lines"
 method = "fourier"
@@ -201,7 +204,7 @@ method = "fourier"
 
     #[test]
     fn estimators_and_comparators_meet_on_the_same_runs() {
-        let plan = SurveyPlan::parse(SMALL, "small.toml").unwrap();
+        let plan = SurveyPlan::parse(SMALL, LINES_TOO, "small.toml").unwrap();
         let found = survey(&plan, &|_| ()).unwrap();
         let names: Vec<&str> = found.iter().map(|of| of.name.as_str()).collect();
         assert_eq!(names, ["RLS", "BJ", "network", "lines"]);

@@ -48,8 +48,6 @@ mod options;
 mod pausing;
 mod prime;
 mod snapshot;
-#[cfg(test)]
-mod tests;
 
 use hoid_core::{
     guard::{

@@ -188,7 +188,7 @@ impl Trace {
             .enumerate()
             .filter_map(|(i, name)| Some((name, grown(i)?)))
             .max_by(|a, b| a.1.total_cmp(&b.1))?;
-        let remedy = match self.options().method.inner().memories() {
+        let remedy = match self.options().method.memories() {
             Some(_) => " for the memory in use; take a longer one",
             None => "",
         };

@@ -51,7 +51,7 @@ pub(super) fn operator_findings(trace: &Trace, operators: &[Operator]) -> Vec<Fi
         });
     }
     let rows_with = |is: &dyn Fn(&OperatorEstimate) -> bool| share(found.iter().filter(|o| is(o)).count(), found.len());
-    let remembers = trace.options().method.inner().memories().is_some();
+    let remembers = trace.options().method.memories().is_some();
     // Where the response is known, gain and lead are one way to say it, which may not be theirs.
     let of_response = |finding: Finding| match trace.response_is_known {
         true => Finding {

@@ -1,12 +1,12 @@
 #![allow(clippy::unwrap_used)]
 use hoid_model::{
-    Channel, NotConvertible, Orders, Severity, Structure, VerdictLevel,
+    Channel, Orders, Severity, Structure, VerdictLevel,
     scenario::{Condition, Scenario},
 };
 use hoid_sim::{RunSeed, Simulator};
 
 use super::*;
-use crate::{Method, StartAt, TrackOptions, Tracker, track};
+use crate::{Method, TrackOptions, Tracker, track};
 use hoid_model::uncertainty::OperatorEstimate;
 
 fn simulated(condition: Condition) -> Record {
@@ -20,36 +20,6 @@ fn kinds(verdict: &Verdict) -> Vec<&'static str> {
 
 fn judged(record: &Record, options: &TrackOptions) -> Verdict {
     track(record, options, 10).unwrap().verdict(record, None).unwrap()
-}
-
-#[test]
-fn a_clean_run_is_trustworthy_and_a_wrong_start_is_named() {
-    let record = simulated(Condition::C4);
-    let verdict = judged(&record, &TrackOptions::usual(Method::physical(), 29));
-    assert_eq!(verdict.level, VerdictLevel::Trustworthy, "{verdict}");
-    let arx = TrackOptions::usual(Method::rls(), 29);
-    let verdict = judged(&record, &arx);
-    assert!(verdict.reasons().any(|r| r.starts_with("start fit: ")), "{verdict}");
-}
-
-#[test]
-fn a_change_inside_the_start_span_is_told() {
-    // C4 changes at 40.96 s.
-    let record = simulated(Condition::C4);
-    for (span, changes) in [((10.0, 36.0), false), ((25.0, 60.0), true)] {
-        for (method, severity) in [
-            (Method::multiple_model(), Severity::Doubt),
-            (Method::physical(), Severity::Note),
-        ] {
-            let options = TrackOptions {
-                start: StartAt::Span(Some(span)),
-                ..TrackOptions::usual(method, 29)
-            };
-            let verdict = judged(&record, &options);
-            let found = verdict.findings().iter().find(|f| f.kind == "not-constant");
-            assert_eq!(found.map(|f| f.severity), changes.then_some(severity), "{verdict}");
-        }
-    }
 }
 
 /// The recursion of the text, without a guard, told 11.3293 ± .0096 rad/s of a person who had gone.
@@ -86,25 +56,6 @@ fn a_method_that_starts_itself_says_what_it_supposes() {
     assert_eq!(tracker.level(&tracker.operator()), VerdictLevel::Trustworthy);
 }
 
-#[test]
-fn an_output_without_a_response_is_not_determined() {
-    let record = simulated(Condition::C1);
-    let mut state = 3_u64;
-    let mut draw = || {
-        state = state
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
-        (state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
-    };
-    let noise = Channel::new("u", "", (0..record.len()).map(|_| draw()).collect());
-    let input = Channel::new("e", "", record.input().to_vec());
-    let other = Record::new(record.sample_time(), input, noise).unwrap();
-    let trace = track(&other, &TrackOptions::usual(Method::physical(), 29), 10).unwrap();
-    let verdict = trace.verdict(&other, None).unwrap();
-    assert_ne!(verdict.level, VerdictLevel::Trustworthy);
-    assert!(kinds(&verdict).contains(&"start-explains-little"), "{verdict}");
-}
-
 /// A change of nothing.
 fn change() -> crate::Change {
     let same = [Estimate::fixed(1.0); 2];
@@ -135,10 +86,20 @@ fn an_output_that_is_zero_is_not_determined() {
     assert_eq!(verdict.level, VerdictLevel::NotDetermined, "{verdict}");
 }
 
+/// A trace with an operator in each row, as recursions in its parameters have it.
+fn in_the_operators_parameters(record: &Record, every: usize) -> Trace {
+    let options = TrackOptions::usual(Method::rpem(), 29)
+        .with(&[("memory", "20s")])
+        .unwrap();
+    let mut trace = track(record, &options, every).unwrap();
+    trace.operator = (0..trace.len()).map(|row| trace.operator(row).unwrap()).collect();
+    trace
+}
+
 /// A trace of C1 whose rows are as they are wanted.
 fn changed(change: impl FnOnce(&mut Trace)) -> Vec<&'static str> {
     let record = simulated(Condition::C1);
-    let mut trace = track(&record, &TrackOptions::usual(Method::physical(), 29), 100).unwrap();
+    let mut trace = in_the_operators_parameters(&record, 100);
     change(&mut trace);
     kinds(&trace.verdict(&record, None).unwrap())
 }
@@ -180,55 +141,6 @@ fn each_size_of_the_trace_has_its_finding() {
     }
     let broken = changed(|trace| *trace.theta.last_mut().unwrap() = f64::NAN);
     assert_eq!(broken, ["not-finite"]);
-}
-
-#[test]
-fn a_delay_that_jumps_is_not_followed_by_a_fixed_one() {
-    let record = simulated(Condition::C1);
-    let late = |at: usize, by: usize| {
-        let u = |t: usize| record.output()[if t >= at { t - by } else { t }];
-        let u = Channel::new("u", "", (0..record.len()).map(u).collect());
-        let e = Channel::new("e", "", record.input().to_vec());
-        Record::new(record.sample_time(), e, u).unwrap()
-    };
-    let options = TrackOptions::usual(Method::physical(), 29);
-    let told = |record: &Record| kinds(&judged(record, &options)).contains(&"not-followed");
-    assert!(told(&late(5000, 20)));
-    assert!(!told(&late(5000, 0)));
-    // Shorter than what is looked at.
-    assert!(
-        judged(&record.span(0.0, 12.0).unwrap(), &options)
-            .findings()
-            .iter()
-            .all(|f| f.kind != "not-followed")
-    );
-}
-
-#[test]
-fn the_level_of_a_moment_follows_the_estimate() {
-    let options = TrackOptions {
-        start: StartAt::Nothing,
-        ..TrackOptions::usual(Method::physical(), 29)
-    };
-    let record = simulated(Condition::C1);
-    let mut tracker = Tracker::new(&options, None, record.sample_time()).unwrap();
-    // From nothing nothing is known.
-    assert_ne!(tracker.level(&tracker.operator()), VerdictLevel::Trustworthy);
-    let usual = TrackOptions::usual(Method::physical(), 29);
-    let mut known = Tracker::new(&usual, Some(&record), record.sample_time()).unwrap();
-    for (e, u) in record.input().iter().zip(record.output()) {
-        tracker.step(*e, *u);
-        known.step(*e, *u);
-    }
-    let mut operator = known.operator().unwrap();
-    assert_eq!(known.level(&Ok(operator)), VerdictLevel::Trustworthy);
-    operator.zeta_nm.value = 4.0;
-    assert_eq!(known.level(&Ok(operator)), VerdictLevel::Doubtful);
-    for gain in [&mut operator.k_e, &mut operator.k_e_dot] {
-        gain.standard_error = Some(gain.value.abs());
-    }
-    assert_eq!(known.level(&Ok(operator)), VerdictLevel::NotDetermined);
-    assert_eq!(known.level(&Err(NotConvertible::ZeroGain)), VerdictLevel::Doubtful);
 }
 
 #[test]
@@ -311,19 +223,22 @@ fn a_gain_that_drifts_and_one_that_sways_are_told() {
 
 #[test]
 fn who_answers_like_a_gain_is_trustworthy_and_no_remedy_is_refused() {
-    let lead_is_open = |method: Method| {
-        let record = simulated(Condition::C1);
-        let mut trace = track(&record, &TrackOptions::usual(method, 29), 10).unwrap();
+    let record = simulated(Condition::C1);
+    let lead_is_open = |mut trace: Trace| {
         for o in &mut trace.operator {
             o.k_e_dot.standard_error = Some(o.k_e_dot.value.abs());
         }
         trace.verdict(&record, None).unwrap()
     };
-    let verdict = lead_is_open(Method::physical());
+    let verdict = lead_is_open(in_the_operators_parameters(&record, 10));
     let found = verdict.findings().iter().find(|f| f.kind == "undetermined-parameter");
     assert_eq!(found.map(|f| f.severity), Some(Severity::Note), "{verdict}");
     // Without a memory none is asked to be longer.
-    assert!(!lead_is_open(Method::adaptive()).to_string().contains("memory"));
+    assert!(
+        !lead_is_open(track(&record, &usual(), 10).unwrap())
+            .to_string()
+            .contains("memory")
+    );
     let operator = |k_e_dot: f64| OperatorEstimate {
         k_e: Estimate::with_variance(1.0, 0.01),
         t_l_s: Estimate::with_variance(k_e_dot, 0.01),

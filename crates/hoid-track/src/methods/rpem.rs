@@ -37,7 +37,7 @@ settings! {
 }
 
 /// What an innovation may move an estimate at most, in standard deviations.
-pub(crate) const LIMIT: f64 = 5.0;
+pub const USUAL_LIMIT: f64 = 5.0;
 
 impl RecursiveMethod for RpemOptions {
     fn about(&self) -> About {
@@ -103,7 +103,7 @@ impl RecursiveMethod for RpemOptions {
     }
 
     fn limit(&self) -> f64 {
-        self.gain.limit_or(LIMIT)
+        self.gain.limit_or(USUAL_LIMIT)
     }
 
     fn track_delay_s(&self) -> Option<(f64, f64)> {
@@ -120,7 +120,7 @@ impl RecursiveMethod for RpemOptions {
 }
 
 /// B follows the gains and is short, the others long.
-pub(crate) fn short_for_b(parameter: &str) -> Memory {
+pub fn short_for_b(parameter: &str) -> Memory {
     if parameter.starts_with('b') {
         Memory::Seconds(2.56)
     } else {

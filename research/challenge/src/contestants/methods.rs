@@ -163,8 +163,8 @@ mod tests {
         let task = task("change-K_e_dot-100");
         for method in [
             Method::rls(),
-            Method::physical(),
-            Method::multiple_model(),
+            hoid_survey::physical(),
+            hoid_survey::multiple_model(),
             Method::adaptive(),
         ] {
             let own = OfMethod(method);
@@ -195,7 +195,7 @@ mod tests {
     #[test]
     fn missing_samples_are_no_end() {
         let task = task("none-missing");
-        let answer = OfMethod(Method::physical()).follow(&task).unwrap();
+        let answer = OfMethod(hoid_survey::physical()).follow(&task).unwrap();
         assert_eq!(answer.said.len(), task.asked_s.len());
         assert!(
             answer

@@ -14,14 +14,12 @@ mod kalman;
 mod methods;
 mod threshold;
 
-use hoid_track::Method;
-
 use super::contestant::Contestant;
 
 /// All of them: the methods in the order of their registry, then the plain ones.
 pub fn contestants() -> Vec<Box<dyn Contestant>> {
     let mut all: Vec<Box<dyn Contestant>> = Vec::new();
-    for method in Method::all() {
+    for method in hoid_survey::methods() {
         all.push(Box::new(methods::OfMethod(method)));
     }
     all.push(Box::new(kalman::Kalman));

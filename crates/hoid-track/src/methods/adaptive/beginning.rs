@@ -393,7 +393,7 @@ mod tests {
         };
         assert!(tracker(other).unwrap_err().to_string().contains("50.000000 Hz"));
         assert!(
-            Method::physical()
+            Method::rpem()
                 .start_from(fitted(Form::Lead, &[2.0, 0.4, 2.3, -1.2, 0.18]))
                 .is_err()
         );

@@ -1,0 +1,116 @@
+//! A delay as a rational function (H. Padé 1892; K. Ogata, *Modern Control Engineering*).
+//!
+//! `e^(-tau s) = Q(-tau s)/Q(tau s)`, `Q(x) = sum_k c_k x^k`,
+//! `c_k = (2n - k)! n!/((2n)! k! (n - k)!)`, of order n: all-pass, with the phase of the delay up to
+//! about `omega tau = 2 n`. Each order is a state and a pole more, and tau appears in the
+//! coefficients, where a parameter belongs that is to be estimated or changes.
+
+use hoid_model::SampleTime;
+use nalgebra::{DMatrix, DVector};
+
+/// Highest order.
+pub(super) const HIGHEST: usize = 3;
+
+/// c_0 to c_n.
+fn coefficients(order: usize) -> Vec<f64> {
+    let mut c = vec![1.0];
+    for k in 1..=order {
+        let (n, k) = (order as f64, k as f64);
+        let last = c[c.len() - 1];
+        c.push(last * (n - k + 1.0) / ((2.0 * n - k + 1.0) * k));
+    }
+    c
+}
+
+/// The neuromuscular part behind a delay, over one sample of held input: states y_0, y_1 and those
+/// of the delay.
+///
+/// The delay is in controllable canonical form, `p^(n) + sum a_k p^(k) = e`, its output
+/// `d e + sum b_k p^(k)` with the direct part `d = (-1)^n`; y_0 is driven by it. Both together are
+/// held exactly, by the exponential of the matrix of states and input.
+pub(super) fn delayed_second_order(
+    omega: f64,
+    zeta: f64,
+    tau_s: f64,
+    order: usize,
+    sample_time: SampleTime,
+) -> (DMatrix<f64>, DVector<f64>) {
+    let c = coefficients(order);
+    let direct = if order.is_multiple_of(2) { 1.0 } else { -1.0 };
+    // Over c_n tau^n, so that the leading coefficient of the denominator is 1.
+    let leading = c[order] * tau_s.powi(order as i32);
+    let denominator = |k: usize| c[k] * tau_s.powi(k as i32) / leading;
+    let numerator = |k: usize| {
+        let sign = if k.is_multiple_of(2) { 1.0 } else { -1.0 };
+        (sign - direct) * denominator(k)
+    };
+    let n = 2 + order;
+    let square = omega * omega;
+    let mut all = DMatrix::zeros(n + 1, n + 1);
+    all[(0, 1)] = 1.0;
+    all[(1, 0)] = -square;
+    all[(1, 1)] = -2.0 * zeta * omega;
+    all[(1, n)] = square * direct;
+    for k in 0..order {
+        all[(1, 2 + k)] = square * numerator(k);
+        if k + 1 < order {
+            all[(2 + k, 3 + k)] = 1.0;
+        }
+        all[(n - 1, 2 + k)] = -denominator(k);
+    }
+    all[(n - 1, n)] = 1.0;
+    // Powers of p by 1/tau differ by orders of size: scaled by tau the exponential keeps its digits.
+    let scale = |i: usize| {
+        if (2..n).contains(&i) {
+            tau_s.powi((i - 2) as i32)
+        } else {
+            1.0
+        }
+    };
+    let scaled = DMatrix::from_fn(n + 1, n + 1, |i, j| all[(i, j)] * scale(i) / scale(j) * sample_time.s());
+    let held = scaled.exp();
+    let back = |i: usize, j: usize| held[(i, j)] * scale(j) / scale(i);
+    (DMatrix::from_fn(n, n, back), DVector::from_fn(n, |i, _| back(i, n)))
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use hoid_model::Complex64;
+
+    use super::*;
+
+    #[test]
+    fn coefficients_are_those_of_the_tables() {
+        assert_eq!(coefficients(1), [1.0, 0.5]);
+        assert_eq!(coefficients(2)[..2], [1.0, 0.5]);
+        for (found, expected) in coefficients(3).iter().zip([1.0, 0.5, 0.1, 1.0 / 120.0]) {
+            assert!((found - expected).abs() < 1e-15);
+        }
+    }
+
+    /// The held system against the frequency response of the delay and the second order themselves.
+    #[test]
+    fn the_phase_is_that_of_the_delay() {
+        let ts = SampleTime::new(0.01).unwrap();
+        let (omega, zeta, tau) = (11.25, 0.35, 0.28);
+        // Frequency and largest error for each order: the phase of Padé's remainder.
+        for (order, at, most) in [(1, 1.0, 3e-3), (2, 3.0, 2e-3), (3, 6.0, 2e-3)] {
+            let (a, b) = delayed_second_order(omega, zeta, tau, order, ts);
+            let n = 2 + order;
+            let z = Complex64::from_polar(1.0, at * ts.s());
+            let matrix = DMatrix::from_fn(n, n, |i, j| (if i == j { z } else { Complex64::default() }) - a[(i, j)]);
+            let state = matrix.lu().solve(&b.map(|x| Complex64::new(x, 0.0))).unwrap();
+            let s = Complex64::new(0.0, at);
+            let square = omega * omega;
+            // A hold delays by half a sample and attenuates by sinc.
+            let half = 0.5 * at * ts.s();
+            let hold = Complex64::from_polar(half.sin() / half, -half);
+            let expected =
+                hold * Complex64::from_polar(1.0, -at * tau) * square / (s * s + 2.0 * zeta * omega * s + square);
+            // Images of the spectrum above half the sample rate: 1e-4.
+            let off = (state[0] / expected - 1.0).norm();
+            assert!(off < most, "{order}: {off}");
+        }
+    }
+}

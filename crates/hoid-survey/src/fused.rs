@@ -1,0 +1,266 @@
+//! Two methods in one, as the reference text proposes it (section VII): recursive least squares for
+//! the gains, with the neuromuscular coefficients "adjusted based on recursive Box-Jenkins
+//! calculations".
+//!
+//! The prediction-error method with a forgetting matrix gives F and D; least squares has only B
+//! left to find,
+//!
+//! `F u = B q^-nk e + eps`,
+//!
+//! with the F of the sample, and forgets by the memory of b. The bias that coloured noise gives to
+//! the poles is gone, that of B is not: the equation error `F n` is as coloured as in an ARX model.
+
+use hoid_core::{
+    delay::DelayLine,
+    predictor::Regressor,
+    recursion::Stable,
+    rls::Rls,
+    shape::AnyShape,
+    state::{State, visit_all},
+};
+use hoid_model::{Orders, SampleTime, Structure};
+
+use hoid_ident::{IdentError, settings, settings::Bounds};
+
+use hoid_track::{
+    Memory, MemoryOptions, Sample, StabilityOptions,
+    building::{
+        About, Gain, Kernel, Plan, Recursion, RecursiveMethod, Scaled, Setup, StartState, StepOutcome, USUAL_LIMIT,
+        bounded, check_operator_orders, error_bars,
+    },
+};
+
+/// Coefficients of B.
+const B: usize = 2;
+
+settings! {
+    /// Options of least squares with the poles of the prediction-error method.
+    pub struct FusedOptions {
+        /// Covariance P at the start: X times the unit matrix, in units of the innovation variance
+        /// (the reference text: 0.1)
+        #[setting(bounds(Bounds::PositiveFinite), default("that of the start fit; 1e6 where there is none"))]
+        pub covariance: Option<f64> = None,
+        /// Standard deviations beyond which an innovation moves the estimate no further
+        #[setting(bounds(Bounds::Positive), default("5"))]
+        pub limit: Option<f64> = None,
+    }
+    groups {
+        /// Memories.
+        pub memories: MemoryOptions,
+        /// Stability.
+        pub stability: StabilityOptions,
+    }
+}
+
+impl RecursiveMethod for FusedOptions {
+    fn about(&self) -> About {
+        About {
+            name: "fused",
+            help: "least squares for B with the poles of rpem, for comparison",
+            source: "the reference text, section VII",
+            structures: &[Structure::BoxJenkins, Structure::OutputError, Structure::General],
+            defaults: &[("memory", "2.56s for b, inf for the others")],
+        }
+    }
+
+    fn usual_memory(&self, parameter: &str) -> Memory {
+        if parameter.starts_with('b') {
+            Memory::Seconds(2.56)
+        } else {
+            Memory::Infinite
+        }
+    }
+
+    fn check(&self, setup: &Setup) -> Result<(), IdentError> {
+        check_operator_orders("fused", setup)
+    }
+
+    fn build(
+        &self,
+        setup: &Setup,
+        from: &StartState,
+        sample_time: SampleTime,
+    ) -> Result<Box<dyn Recursion>, IdentError> {
+        Ok(Box::new(FusedRecursion::new(
+            setup,
+            self.limit.unwrap_or(f64::INFINITY),
+            from,
+            sample_time,
+        )?))
+    }
+
+    fn memories(&self) -> Option<&MemoryOptions> {
+        Some(&self.memories)
+    }
+
+    fn covariance(&self) -> Option<f64> {
+        self.covariance
+    }
+
+    fn limit(&self) -> f64 {
+        self.limit.unwrap_or(USUAL_LIMIT)
+    }
+
+    fn stable(&self) -> Stable {
+        self.stability.stable
+    }
+
+    fn retain(&mut self, known: &dyn Fn(&str) -> bool) {
+        self.memories.memory_of.retain(|key, _| known(key));
+    }
+}
+
+/// RLS beside RPEM.
+pub(crate) struct FusedRecursion {
+    rpem: Box<dyn Recursion>,
+    rls: Rls<AnyShape, B, Gain<B>>,
+    delay: DelayLine<Vec<f64>>,
+    /// The last two outputs, the newest first.
+    past: [f64; 2],
+    theta: Vec<f64>,
+}
+
+impl State for FusedRecursion {
+    fn visit(&mut self, each: &mut dyn FnMut(&mut f64)) {
+        let parts: &mut [&mut dyn State] = &mut [
+            &mut *self.rpem,
+            &mut self.rls,
+            &mut self.delay,
+            &mut self.past,
+            &mut self.theta.as_mut_slice(),
+        ];
+        visit_all(parts, each);
+    }
+}
+
+impl FusedRecursion {
+    /// From the same start as the prediction-error method; least squares has no limit of its own.
+    ///
+    /// # Errors
+    /// As that.
+    pub(crate) fn new(
+        setup: &Setup,
+        limit_of_b: f64,
+        from: &StartState,
+        sample_time: SampleTime,
+    ) -> Result<Self, IdentError> {
+        let p = from.values.len();
+        let of_b = |matrix: &[f64]| -> Vec<f64> { (0..B * B).map(|k| matrix[k / B * p + k % B]).collect() };
+        let start = StartState {
+            values: from.values[..B].to_vec(),
+            covariance: of_b(&from.covariance),
+            spread: of_b(&from.spread),
+            fit: None,
+            ..from.clone()
+        };
+        let linear = Setup {
+            structure: Structure::Fir,
+            orders: Orders {
+                nb: B,
+                nk: setup.orders.nk,
+                ..Orders::default()
+            },
+            memories: setup.memories.iter().take(B).cloned().collect(),
+            limit: limit_of_b,
+            ..setup.clone()
+        };
+        let shape = AnyShape {
+            na: 0,
+            nb: B,
+            nc: 0,
+            nd: 0,
+            nf: 0,
+        };
+        let gain = Gain::new(&linear, &start, sample_time, false)?;
+        let bars = error_bars(&linear, &start, sample_time)?;
+        let values = [start.values[0], start.values[1]];
+        let rls = Rls::new(shape, values, gain, bars).ok_or_else(|| IdentError::BadStart {
+            reason: "it has no coefficients of B".to_owned(),
+        })?;
+        Ok(Self {
+            rpem: Plan::new(setup, from, sample_time).build(Kernel::PredictionError(Regressor::Gradient))?,
+            rls,
+            delay: DelayLine::new(vec![0.0; setup.orders.nk]),
+            past: [0.0; 2],
+            theta: from.values.clone(),
+        })
+    }
+
+    /// `F u` with the F of the prediction-error method.
+    fn filtered(&self, u: f64) -> f64 {
+        let theta = self.rpem.theta();
+        let p = theta.len();
+        u + theta[p - 2] * self.past[0] + theta[p - 1] * self.past[1]
+    }
+
+    fn join(&mut self) {
+        self.theta.copy_from_slice(self.rpem.theta());
+        self.theta[..B].copy_from_slice(&self.rls.theta()[..B]);
+    }
+
+    fn remember(&mut self, u: f64) {
+        self.past = [u, self.past[0]];
+    }
+}
+
+impl Recursion for FusedRecursion {
+    fn step(&mut self, sample: Sample) -> StepOutcome {
+        let x = self.delay.step(sample.e);
+        let of_rpem = self.rpem.step(sample);
+        let y = self.filtered(sample.u);
+        let of_rls: StepOutcome = self.rls.step(x, y).into();
+        self.remember(sample.u);
+        self.join();
+        StepOutcome {
+            innovation: of_rls.innovation,
+            shortened: of_rpem.shortened,
+        }
+    }
+
+    fn follow(&mut self, sample: Sample) -> StepOutcome {
+        let x = self.delay.step(sample.e);
+        self.rpem.follow(sample);
+        let y = self.filtered(sample.u);
+        let taken = self.rls.step_without_update(x, y).into();
+        self.remember(sample.u);
+        taken
+    }
+
+    fn bridge(&mut self, sample: Sample) {
+        let x = self.delay.step(sample.e);
+        self.rpem.bridge(sample);
+        // eps of an output of zero is the prediction with its sign changed.
+        let y = self.filtered(0.0);
+        let predicted = -self.rls.step_without_update(x, y).innovation;
+        self.remember(bounded(predicted));
+    }
+
+    fn scale_covariance(&mut self, factor: f64) -> bool {
+        self.rls.adaptation_mut().scale(factor) && self.rpem.scale_covariance(factor)
+    }
+
+    fn theta(&self) -> &[f64] {
+        &self.theta
+    }
+
+    /// That of each method; between them nothing is known, and zero is put.
+    fn covariance(&self, into: &mut [f64]) -> bool {
+        let known = self.rpem.covariance(into);
+        let p = self.theta.len();
+        let (spread, variance) = (self.rls.normalised_covariance(), self.rls.innovation_variance());
+        for i in 0..p {
+            for j in 0..p {
+                if i < B && j < B {
+                    into[i * p + j] = variance * spread[i][j];
+                } else if i < B || j < B {
+                    into[i * p + j] = 0.0;
+                }
+            }
+        }
+        known
+    }
+
+    fn innovation_variance(&self) -> f64 {
+        self.rls.innovation_variance()
+    }
+}

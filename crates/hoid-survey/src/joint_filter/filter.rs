@@ -1,0 +1,220 @@
+//! The filter of state and parameters over samples: start, bounds, restarts.
+
+use hoid_core::{
+    bounds::within,
+    delay::DelayLine,
+    state::{State, visit_all},
+};
+use hoid_ident::IdentError;
+use hoid_model::{SampleTime, uncertainty::OperatorEstimate};
+
+use hoid_track::{
+    Sample,
+    building::{OPERATOR, Recursion, Reported, Setup, StartState, StepOutcome, physical_bounds},
+};
+
+use crate::known_noise::lead_of;
+
+use super::belief::{Belief, ETA, Model, N};
+
+/// Takes a sample into what is believed; the innovation and its variance as expected.
+pub(super) type Update = fn(&Model, &mut Belief, f64, f64) -> [f64; 2];
+
+/// Variance of n over that of the remnant: a coloured remnant tells less than a white one of the
+/// same variance.
+const OUTPUT_NOISE: f64 = 10.0;
+/// Variance of what drives v beside the error within one second, over that of the remnant seen
+/// through K_e_dot.
+const STATE_NOISE: f64 = 10.0;
+/// Drift of K_e and K_e_dot in one second, in units of `g = sqrt(K_e^2 + omega^2 K_e_dot^2)` and
+/// `g/omega` at the crossover omega.
+const GAIN_DRIFT: [f64; 2] = [0.02, 0.05];
+/// The crossover, rad/s.
+const CROSSOVER_RAD_S: f64 = 2.0;
+/// Drift of omega_nm and zeta_nm in one second, as a share of them.
+const NEUROMUSCULAR_DRIFT: f64 = 0.003;
+/// Largest variance of a parameter, as a multiple of the square of its start.
+const LARGEST_VARIANCE: f64 = 25.0;
+/// Samples of the impulse response of 1/D.
+const RESPONSE: usize = 1000;
+
+/// The recursion.
+pub(crate) struct JointFilter {
+    update: Update,
+    model: Model,
+    belief: Belief,
+    first: Belief,
+    bounds: [[f64; 2]; OPERATOR],
+    delay: DelayLine<Vec<f64>>,
+    reported: Reported,
+    /// Innovation variance as expected at the last sample.
+    expected: f64,
+    restarts: u64,
+}
+
+impl JointFilter {
+    /// From the batch fit of the start span.
+    ///
+    /// # Errors
+    /// [`IdentError::BadStart`] without a fit.
+    pub(super) fn new(
+        update: Update,
+        setup: &Setup,
+        from: &StartState,
+        sample_time: SampleTime,
+    ) -> Result<Self, IdentError> {
+        if !from.from_fit {
+            return Err(IdentError::BadStart {
+                reason: "ekf and ukf need the noise level of a batch fit; start them from the fit of a span".to_owned(),
+            });
+        }
+        let width = from.values.len();
+        let mut belief = Belief {
+            x: [0.0; N],
+            p: [[0.0; N]; N],
+        };
+        for i in 0..OPERATOR {
+            belief.x[ETA + i] = from.values[i];
+            for j in 0..OPERATOR {
+                belief.p[ETA + i][ETA + j] = from.variance * from.spread[i * width + j];
+            }
+        }
+        let model = model(&belief.x, from, sample_time);
+        Ok(Self {
+            update,
+            model,
+            first: belief,
+            belief,
+            bounds: physical_bounds::<OPERATOR>(setup, sample_time)?,
+            delay: DelayLine::new(vec![0.0; setup.orders.nk]),
+            reported: Reported::new(from, setup.orders.nk, sample_time),
+            expected: from.variance,
+            restarts: 0,
+        })
+    }
+
+    /// Keeps the parameters within their bounds and what is known of them within reason; true where
+    /// that changed something.
+    fn hold(&mut self) -> bool {
+        let mut cut = false;
+        let sound =
+            self.belief.x.iter().all(|x| x.is_finite()) && self.belief.p.iter().flatten().all(|p| p.is_finite());
+        if !sound {
+            self.belief = self.first;
+            self.restarts += 1;
+            return true;
+        }
+        for (i, bounds) in self.bounds.into_iter().enumerate() {
+            let x = &mut self.belief.x[ETA + i];
+            let bounded = within(*x, bounds);
+            cut |= bounded != *x;
+            *x = bounded;
+            let largest = LARGEST_VARIANCE * self.first.x[ETA + i].powi(2);
+            let variance = self.belief.p[ETA + i][ETA + i];
+            if variance > largest && largest > 0.0 {
+                let shrink = (largest / variance).sqrt();
+                for j in 0..N {
+                    self.belief.p[ETA + i][j] *= shrink;
+                    self.belief.p[j][ETA + i] *= shrink;
+                }
+            }
+        }
+        cut
+    }
+
+    fn eta(&self) -> [f64; OPERATOR] {
+        std::array::from_fn(|i| self.belief.x[ETA + i])
+    }
+
+    fn of_eta(&self) -> [[f64; OPERATOR]; OPERATOR] {
+        std::array::from_fn(|i| std::array::from_fn(|j| self.belief.p[ETA + i][ETA + j]))
+    }
+}
+
+fn model(x: &[f64; N], from: &StartState, sample_time: SampleTime) -> Model {
+    let ts = sample_time.s();
+    let remnant = from.variance * power(&from.values[OPERATOR..]);
+    let [_, _, k_e, k_e_dot, omega, zeta] = *x;
+    let g = (k_e * k_e + (CROSSOVER_RAD_S * k_e_dot).powi(2)).sqrt();
+    let gain = [GAIN_DRIFT[0] * g, GAIN_DRIFT[1] * g / CROSSOVER_RAD_S];
+    Model {
+        ts,
+        drift: [
+            0.0,
+            STATE_NOISE * remnant * (CROSSOVER_RAD_S / g).powi(2) * ts,
+            gain[0] * gain[0] * ts,
+            gain[1] * gain[1] * ts,
+            (NEUROMUSCULAR_DRIFT * omega).powi(2) * ts,
+            (NEUROMUSCULAR_DRIFT * zeta).powi(2) * ts,
+        ],
+        noise: OUTPUT_NOISE * remnant,
+    }
+}
+
+/// Power of the impulse response of 1/D.
+pub(super) fn power(d: &[f64]) -> f64 {
+    let mut response = vec![0.0; RESPONSE];
+    response[0] = 1.0;
+    hoid_core::filter::divide_in_place(d, &mut response);
+    let sum: f64 = response.iter().map(|h| h * h).sum();
+    if sum.is_finite() { sum } else { 1.0 }
+}
+
+impl State for JointFilter {
+    fn visit(&mut self, each: &mut dyn FnMut(&mut f64)) {
+        let parts: &mut [&mut dyn State] = &mut [
+            &mut self.belief,
+            &mut self.delay,
+            &mut self.reported,
+            &mut self.expected,
+            &mut self.restarts,
+        ];
+        visit_all(parts, each);
+    }
+}
+
+impl Recursion for JointFilter {
+    fn step(&mut self, sample: Sample) -> StepOutcome {
+        let e = self.delay.step(sample.e);
+        let [innovation, expected] = (self.update)(&self.model, &mut self.belief, e, sample.u);
+        self.expected = expected;
+        let shortened = self.hold();
+        self.reported.set(self.eta());
+        StepOutcome { innovation, shortened }
+    }
+
+    fn follow(&mut self, sample: Sample) -> StepOutcome {
+        let e = self.delay.step(sample.e);
+        self.belief.x = self.model.transition(&self.belief.x, e);
+        if !(self.belief.x[0].is_finite() && self.belief.x[1].is_finite()) {
+            (self.belief.x[0], self.belief.x[1]) = (0.0, 0.0);
+            self.restarts += 1;
+        }
+        StepOutcome {
+            innovation: sample.u - Model::output(&self.belief.x),
+            shortened: false,
+        }
+    }
+
+    fn bridge(&mut self, sample: Sample) {
+        self.follow(sample);
+    }
+
+    fn theta(&self) -> &[f64] {
+        self.reported.theta()
+    }
+
+    fn covariance(&self, into: &mut [f64]) -> bool {
+        self.reported.covariance(&self.of_eta(), into);
+        true
+    }
+
+    fn innovation_variance(&self) -> f64 {
+        self.expected
+    }
+
+    fn operator(&self) -> Option<OperatorEstimate> {
+        let (eta, c) = (self.eta(), self.of_eta());
+        Some(self.reported.operator(eta, &c, lead_of(eta, &c)))
+    }
+}

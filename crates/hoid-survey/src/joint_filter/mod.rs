@@ -1,0 +1,134 @@
+//! Joint estimation of state and parameters, as the literature on time-varying human control has
+//! it: for comparison.
+//!
+//! The state of the neuromuscular system, p (its response to the delayed error) and v (the rate of
+//! p), is estimated together with the parameters, which drift:
+//!
+//! `X = [p, v, K_e, K_e_dot, omega_nm, zeta_nm]`, `u = K_e p + K_e_dot v + n`.
+//!
+//! The transition is the exact hold. With [`DividedDifferences`] at the poles times Ts,
+//! `R = omega^2 Ts Phi_1`, `A = q Phi_2` and `m = e - p`,
+//!
+//! `p <- e - (1 - A) m + (R/omega^2) v`, `v <- R m + (1 - A - 2 zeta R/omega) v`;
+//!
+//! the parameters make a random walk, the remnant is taken to be white noise in u and in the drive
+//! of v. Neither is true of a coloured remnant in a closed loop; it is what the published
+//! estimators suppose. [`ekf`] linearises (A. Popovici, P. M. T. Zaal, D. M. Pool, *Dual extended
+//! Kalman filter for the identification of time-varying human manual control behavior*, AIAA
+//! 2017-3666, there with two filters that take turns), [`ukf`] sends points through (J. Rojer, D.
+//! M. Pool, M. M. van Paassen, M. Mulder, *UKF-based identification of time-varying manual control
+//! behaviour*, IFAC-PapersOnLine 52-19 (2019)).
+//!
+//! The noise of both is in proportion to the variance of the remnant of the start fit, `sigma^2`
+//! times the power of the impulse response of 1/D, and the drift in proportion to the start values;
+//! the factors were set on conditions C3 and C5 with remnants of order 2 and 3, as those of the
+//! method multiple-model were.
+
+mod belief;
+mod ekf;
+mod filter;
+mod ukf;
+
+use std::collections::BTreeMap;
+
+use hoid_ident::{Constraint, IdentError, settings};
+use hoid_model::{SampleTime, Structure};
+
+use hoid_track::{
+    BoundOptions, Memory,
+    building::{About, Recursion, RecursiveMethod, Setup, StartState},
+};
+
+use crate::known_noise::check_model_of_change;
+
+use filter::JointFilter;
+
+/// The words and the step of each filter are its own, the rest is the same.
+macro_rules! joint_filter {
+    ($options:ident, $name:literal, $help:literal, $source:literal, $step:path) => {
+        impl RecursiveMethod for $options {
+            fn about(&self) -> About {
+                About {
+                    name: $name,
+                    help: $help,
+                    source: $source,
+                    structures: &[Structure::BoxJenkins, Structure::OutputError, Structure::General],
+                    defaults: &[],
+                }
+            }
+
+            /// It follows from a random walk of the parameters.
+            fn usual_memory(&self, _parameter: &str) -> Memory {
+                Memory::Infinite
+            }
+
+            fn check(&self, setup: &Setup) -> Result<(), IdentError> {
+                check_model_of_change($name, setup)
+            }
+
+            fn build(
+                &self,
+                setup: &Setup,
+                from: &StartState,
+                sample_time: SampleTime,
+            ) -> Result<Box<dyn Recursion>, IdentError> {
+                Ok(Box::new(JointFilter::new($step, setup, from, sample_time)?))
+            }
+
+            fn is_physical(&self) -> bool {
+                true
+            }
+
+            fn is_model_of_change(&self) -> bool {
+                true
+            }
+
+            fn memory_in_words(&self) -> Option<String> {
+                Some("by a random walk of the parameters".to_owned())
+            }
+
+            fn bounds(&self) -> BTreeMap<String, Constraint> {
+                self.bounds.bound.clone()
+            }
+
+            fn retain(&mut self, known: &dyn Fn(&str) -> bool) {
+                self.bounds.bound.retain(|key, _| known(key));
+            }
+        }
+    };
+}
+
+settings! {
+    /// Options of the extended Kalman filter.
+    pub struct EkfOptions {}
+    groups {
+        /// Bounds.
+        pub bounds: BoundOptions,
+    }
+}
+settings! {
+    /// Options of the unscented Kalman filter.
+    pub struct UkfOptions {}
+    groups {
+        /// Bounds.
+        pub bounds: BoundOptions,
+    }
+}
+
+joint_filter!(
+    EkfOptions,
+    "ekf",
+    "extended Kalman filter of state and parameters, for comparison",
+    "Jazwinski 1970, section 8.3; after Popovici, Zaal and Pool 2017",
+    ekf::step
+);
+joint_filter!(
+    UkfOptions,
+    "ukf",
+    "unscented Kalman filter of state and parameters, for comparison",
+    "after Rojer, Pool, van Paassen and Mulder 2019",
+    ukf::step
+);
+
+#[cfg(test)]
+mod tests;

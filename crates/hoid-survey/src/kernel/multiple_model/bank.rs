@@ -1,0 +1,400 @@
+//! The hypotheses with their probabilities, for output and signals behind the whitening filter.
+//!
+//! At each sample the probability of a hypothesis is multiplied by the density that it gave to the
+//! innovation, and all are normalised. At every birth the likeliest is the parent of new ones:
+//!
+//! - **a change of the gains**, and at every few births one of omega_nm and zeta_nm too, with the
+//!   prior probability of such a change since the last birth;
+//! - **a neighbouring delay**, as what may have held all the time: as old as its parent, each
+//!   parameter opened by the error that the difference of the delays makes in it; the first of them
+//!   when the bank begins;
+//! - **a change of the delay**: delays spread over all candidates, with gains that are opened as in
+//!   any change, and probabilities in proportion to the normal density of the step. The proposed
+//!   delays move on by one each time, so that each candidate has its turn, and the number of
+//!   hypotheses is bounded however many delays there are.
+//!
+//! A newborn takes the slot of the least likely hypothesis that is old enough to be judged.
+
+use hoid_core::state::{State, visit_all};
+
+use super::{
+    change::{Change, ChangeDetector, delay_of},
+    hypothesis::{Hypothesis, visit_slot},
+    prior::{ChangePrior, OPERATOR},
+    signal_ring::DelayedSignals,
+};
+
+/// The hypotheses, at most M.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Bank<const M: usize> {
+    prior: ChangePrior,
+    hypotheses: [Option<Hypothesis>; M],
+    samples: u64,
+    /// Samples until the next birth.
+    until_birth: u32,
+    births: u32,
+    /// Sample from which hypotheses of a change of omega_nm and zeta_nm are born.
+    neuromuscular_from: u64,
+    detector: ChangeDetector,
+}
+
+impl<const M: usize> State for Bank<M> {
+    fn visit(&mut self, each: &mut dyn FnMut(&mut f64)) {
+        for slot in &mut self.hypotheses {
+            visit_slot(slot, each);
+        }
+        let rest: &mut [&mut dyn State] = &mut [
+            &mut self.samples,
+            &mut self.until_birth,
+            &mut self.births,
+            &mut self.neuromuscular_from,
+            &mut self.detector,
+        ];
+        visit_all(rest, each);
+        self.bounded();
+    }
+}
+
+/// Mean of the mixture.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Mixture {
+    /// `[K_e, K_e_dot, omega_nm, zeta_nm]`.
+    pub eta: [f64; OPERATOR],
+    /// Innovation variance.
+    pub variance: f64,
+}
+
+/// Delays on either side of the likeliest that are proposed as what may have held all the time.
+const NEIGHBOURS: usize = 3;
+/// Least probability of a hypothesis, relative to the likeliest: none is lost for ever.
+const LEAST_PROBABILITY: f64 = 1e-12;
+
+impl<const M: usize> Bank<M> {
+    fn bounded(&mut self) {
+        self.until_birth = self.until_birth.clamp(1, self.prior.birth_interval.max(1));
+        for h in self.hypotheses.iter_mut().flatten() {
+            h.born = h.born.min(self.samples);
+            h.extra_delay = h.extra_delay.min(self.prior.delay.count.saturating_sub(1));
+        }
+    }
+
+    /// Starts from one hypothesis. `None` when M is below two, the start is not finite or not
+    /// within the bounds, the bounds let omega_nm or zeta_nm become zero, or a number of the prior
+    /// is outside its range.
+    pub fn new(first: Hypothesis, prior: ChangePrior) -> Option<Self> {
+        let within_bounds = first
+            .eta
+            .iter()
+            .zip(&prior.bounds)
+            .all(|(e, [low, high])| low <= e && e <= high);
+        let valid_start = first.is_valid() && within_bounds && first.extra_delay < prior.delay.count;
+        if M < 2 || !valid_start || !prior.is_valid() {
+            return None;
+        }
+        let mut hypotheses = std::array::from_fn(|_| None);
+        hypotheses[0] = Some(first);
+        let mut bank = Self {
+            hypotheses,
+            samples: 0,
+            until_birth: prior.birth_interval,
+            births: 0,
+            neuromuscular_from: 0,
+            detector: ChangeDetector::default(),
+            prior,
+        };
+        bank.spawn_neighbouring_delays();
+        Some(bank)
+    }
+
+    /// The update by a sample: output and signals behind the whitening filter, `None` where they
+    /// are not known. Returns the innovation.
+    pub fn update(&mut self, sample: Option<(f64, DelayedSignals<'_>)>, point: [f64; 2]) -> f64 {
+        let innovation = self.update_hypotheses(sample, point);
+        if self.detector.update(&self.hypotheses, self.samples, &self.prior) {
+            self.suspend_neuromuscular();
+        }
+        innovation
+    }
+
+    /// Drops the young hypotheses of a change of omega_nm and zeta_nm, and lets new ones be born
+    /// only after the settling time.
+    ///
+    /// The change of the gains itself passes through the neuromuscular system, and until it has
+    /// settled the response is that of neither set of gains: it would be taken for a change of
+    /// omega_nm and zeta_nm.
+    fn suspend_neuromuscular(&mut self) {
+        self.neuromuscular_from = self.samples + self.prior.settling_time;
+        let mut rest = 0.0;
+        for h in self.hypotheses.iter().flatten() {
+            rest += if self.is_recent_neuromuscular(h) {
+                0.0
+            } else {
+                h.probability
+            };
+        }
+        if rest > 0.0 {
+            for i in 0..M {
+                self.hypotheses[i] = self.hypotheses[i].filter(|h| !self.is_recent_neuromuscular(h));
+                if let Some(h) = &mut self.hypotheses[i] {
+                    h.probability /= rest;
+                }
+            }
+        }
+    }
+
+    /// True for a hypothesis that omega_nm and zeta_nm changed within the change window.
+    fn is_recent_neuromuscular(&self, h: &Hypothesis) -> bool {
+        h.neuromuscular_changed && self.samples - h.born < self.prior.change_window
+    }
+
+    /// As [`Bank::update`], without the detection of changes.
+    pub fn update_hypotheses(&mut self, sample: Option<(f64, DelayedSignals<'_>)>, point: [f64; 2]) -> f64 {
+        self.samples += 1;
+        let mut innovation = 0.0;
+        if let Some((y, signals)) = sample {
+            for h in self.hypotheses.iter_mut().flatten() {
+                let (eps, density) = h.step(y, signals.at(h.extra_delay), point, &self.prior);
+                innovation += h.probability * eps;
+                h.probability *= density;
+            }
+            self.normalise();
+        }
+        self.until_birth -= 1;
+        if self.until_birth == 0 {
+            self.until_birth = self.prior.birth_interval;
+            self.drift();
+            self.give_birth();
+        }
+        innovation
+    }
+
+    /// The hypotheses whose turn it is.
+    fn give_birth(&mut self) {
+        self.births = self.births.wrapping_add(1);
+        let probability = self.prior.hazard * f64::from(self.prior.birth_interval);
+        self.spawn_changed(probability, false);
+        let every = self.prior.neuromuscular_every;
+        if every > 0 && self.births.is_multiple_of(every) && self.samples >= self.neuromuscular_from {
+            self.spawn_changed(probability * f64::from(every) * self.prior.neuromuscular_odds, true);
+        }
+        let delay = self.prior.delay;
+        if delay.count > 1 && self.births.is_multiple_of(delay.propose_every) {
+            self.spawn_neighbouring_delays();
+            self.spawn_changed_delays(probability * f64::from(delay.propose_every) * delay.change_odds);
+        }
+    }
+
+    /// Counts a sample; the estimate stays.
+    pub fn skip(&mut self) {
+        self.samples += 1;
+    }
+
+    /// Brings the sum of the probabilities to one. Those that are too small, or not finite, become
+    /// [`LEAST_PROBABILITY`].
+    fn normalise(&mut self) {
+        let mut most = 0.0;
+        for h in self.hypotheses.iter().flatten() {
+            if h.probability > most {
+                most = h.probability;
+            }
+        }
+        let (scale, mut sum) = (1.0 / most, 0.0);
+        for h in self.hypotheses.iter_mut().flatten() {
+            let p = h.probability * scale;
+            h.probability = if p > LEAST_PROBABILITY { p } else { LEAST_PROBABILITY };
+            sum += h.probability;
+        }
+        let scale = 1.0 / sum;
+        for h in self.hypotheses.iter_mut().flatten() {
+            h.probability *= scale;
+        }
+    }
+
+    fn drift(&mut self) {
+        for h in self.hypotheses.iter_mut().flatten() {
+            h.drift(self.samples, &self.prior);
+        }
+    }
+
+    /// The hypothesis that the gains change now, and with `neuromuscular` omega_nm and zeta_nm too.
+    fn spawn_changed(&mut self, probability: f64, neuromuscular: bool) {
+        if let Some((slot, parent)) = self.parent() {
+            self.spawn(self.with_change(&parent, neuromuscular), probability, slot);
+        }
+    }
+
+    /// Hypotheses of the delays next to the likeliest, where there are none.
+    fn spawn_neighbouring_delays(&mut self) {
+        let Some((slot, parent)) = self.parent() else { return };
+        let delay = self.prior.delay;
+        let mut probability = 1.0;
+        for away in 1..=NEIGHBOURS {
+            probability *= delay.neighbour_probability;
+            for extra_delay in [parent.extra_delay.checked_sub(away), Some(parent.extra_delay + away)]
+                .into_iter()
+                .flatten()
+            {
+                let is_there = |h: &Hypothesis| h.extra_delay == extra_delay && h.born == parent.born;
+                if extra_delay < delay.count && !self.hypotheses().any(is_there) {
+                    self.spawn(
+                        parent.with_neighbouring_delay(extra_delay, &self.prior),
+                        probability,
+                        slot,
+                    );
+                }
+            }
+        }
+    }
+
+    /// Hypotheses that the gains and the delay change now, with the probability of all together.
+    fn spawn_changed_delays(&mut self, probability: f64) {
+        let Some((slot, parent)) = self.parent() else { return };
+        let delay = self.prior.delay;
+        let apart = delay.count.div_ceil(delay.proposals);
+        let first = (self.births / delay.propose_every) as usize % apart;
+        let density = |extra_delay: usize| {
+            let step = extra_delay.abs_diff(parent.extra_delay) as f64 / delay.jump;
+            libm::exp(-0.5 * step * step)
+        };
+        let all: f64 = (first..delay.count).step_by(apart).map(density).sum();
+        if all <= 0.0 {
+            return;
+        }
+        for extra_delay in (first..delay.count)
+            .step_by(apart)
+            .filter(|extra_delay| *extra_delay != parent.extra_delay)
+        {
+            self.spawn(
+                self.with_change(&parent, false).with_extra_delay(extra_delay),
+                probability * density(extra_delay) / all,
+                slot,
+            );
+        }
+    }
+
+    /// The likeliest hypothesis, and its slot. One of a recent change of omega_nm and zeta_nm has
+    /// no children: what a change of the gains seems to do to them in passing is not handed on.
+    fn parent(&self) -> Option<(usize, Hypothesis)> {
+        let (mut likeliest, mut highest) = (None, 0.0);
+        for (slot, h) in self.hypotheses.iter().enumerate() {
+            if let Some(h) = h
+                && h.probability > highest
+                && !self.is_recent_neuromuscular(h)
+            {
+                (likeliest, highest) = (Some((slot, *h)), h.probability);
+            }
+        }
+        likeliest
+    }
+
+    /// A child that says that the operator changes now.
+    fn with_change(&self, parent: &Hypothesis, neuromuscular: bool) -> Hypothesis {
+        let mut child = parent.with_change(self.samples, neuromuscular, &self.prior);
+        child.before.delay = self.delay();
+        child
+    }
+
+    /// Puts a child into the slot of the least likely that is old enough to be pruned; there is no
+    /// child when that is its parent.
+    fn spawn(&mut self, mut child: Hypothesis, probability: f64, parent: usize) {
+        let (mut slot, mut lowest) = (None, f64::INFINITY);
+        for (i, h) in self.hypotheses.iter().enumerate() {
+            match h {
+                None => (slot, lowest) = (Some(i), f64::NEG_INFINITY),
+                Some(h) if self.samples - h.born >= self.prior.pruning_age && h.probability < lowest => {
+                    (slot, lowest) = (Some(i), h.probability);
+                }
+                Some(_) => {}
+            }
+        }
+        let Some(slot) = slot.filter(|slot| *slot != parent) else {
+            return;
+        };
+        self.hypotheses[slot] = None;
+        let rest: f64 = self.hypotheses.iter().flatten().map(|h| h.probability).sum();
+        for h in self.hypotheses.iter_mut().flatten() {
+            h.probability *= (1.0 - probability) / rest;
+        }
+        child.probability = probability;
+        self.hypotheses[slot] = Some(child);
+    }
+
+    /// Mean of the mixture.
+    pub fn mixture(&self) -> Mixture {
+        let mut mixture = Mixture {
+            eta: [0.0; OPERATOR],
+            variance: 0.0,
+        };
+        for h in self.hypotheses.iter().flatten() {
+            for i in 0..OPERATOR {
+                mixture.eta[i] += h.probability * h.eta[i];
+            }
+            mixture.variance += h.probability * h.innovation_variance.variance();
+        }
+        mixture
+    }
+
+    /// Covariance of eta.
+    pub fn covariance(&self) -> [[f64; OPERATOR]; OPERATOR] {
+        let mean = self.mixture().eta;
+        let mut covariance = [[0.0; OPERATOR]; OPERATOR];
+        for h in self.hypotheses.iter().flatten() {
+            let p = h.covariance.matrix();
+            for i in 0..OPERATOR {
+                let a = h.eta[i] - mean[i];
+                for j in 0..OPERATOR {
+                    let b = h.eta[j] - mean[j];
+                    covariance[i][j] += h.probability * (p[i][j] + a * b);
+                }
+            }
+        }
+        covariance
+    }
+
+    /// T_L in s and its variance, `E[K_e K_e_dot]/E[K_e^2]`: the T for which
+    /// `E (K_e_dot - T K_e)^2` is least.
+    pub fn lead_time(&self, covariance: &[[f64; OPERATOR]; OPERATOR]) -> [f64; 2] {
+        let [k_e, k_e_dot, ..] = self.mixture().eta;
+        let square = k_e * k_e + covariance[0][0];
+        let lead_time = (k_e * k_e_dot + covariance[0][1]) / square;
+        // To first order dT_L = (dK_e_dot - T_L dK_e)/K_e.
+        let variance = covariance[1][1] - 2.0 * lead_time * covariance[0][1] + lead_time * lead_time * covariance[0][0];
+        [lead_time, variance.max(0.0) / square]
+    }
+
+    /// Number of candidate delays.
+    pub fn delays(&self) -> usize {
+        self.prior.delay.count
+    }
+
+    /// Mean and variance of the delay, in samples beyond the shortest.
+    pub fn delay(&self) -> [f64; 2] {
+        delay_of(self.hypotheses())
+    }
+
+    /// The delay of the likeliest hypothesis.
+    pub fn likeliest_delay(&self) -> usize {
+        let likeliest = self.hypotheses().max_by(|a, b| a.probability.total_cmp(&b.probability));
+        likeliest.map_or(0, |h| h.extra_delay)
+    }
+
+    /// The hypotheses.
+    pub fn hypotheses(&self) -> impl Iterator<Item = &Hypothesis> {
+        self.hypotheses.iter().flatten()
+    }
+
+    /// Logarithm of the posterior odds that the operator changed within the change window.
+    pub fn log_odds(&self) -> f64 {
+        self.detector.log_odds()
+    }
+
+    /// The change that was declared at the last sample, if one was.
+    pub fn change(&self) -> Option<Change> {
+        self.detector.change()
+    }
+
+    /// Samples so far.
+    pub fn samples(&self) -> u64 {
+        self.samples
+    }
+}

@@ -1,0 +1,230 @@
+//! When the operator changed, and in what.
+//!
+//! `Lambda = ln(sum of P(h) over those born within the last T)/(sum of P(h) over those that are older))`:
+//! the logarithm of the posterior odds of a change. It is the likelihood ratio of Willsky and Jones
+//! (A. S. Willsky and H. L. Jones, *IEEE Transactions on Automatic Control* 21 (1976) 108-112),
+//! with the size of the change and its time averaged out instead of maximised, so that its
+//! expectation does not grow with the number of times that are tried. A change is declared when
+//! Lambda is over the threshold and the likeliest of the recent hypotheses is old enough to say
+//! what changed. The next is declared only after Lambda has been below zero, when the new values
+//! have become the established ones, or when more turns out to have changed: the neuromuscular
+//! system, by the same odds of such hypotheses against all others, or the delay, by three standard
+//! errors.
+//!
+//! The likeliest of the recent hypotheses says since when, and what held before: the change of each
+//! quantity over its standard error tells in what the operator changed. For the innovation variance
+//! that is `ln(s2/s1)/sqrt(2/n)` with the n samples since.
+
+use super::{
+    hypothesis::{Hypothesis, Snapshot},
+    prior::{ChangePrior, OPERATOR},
+};
+use hoid_core::state::{State, visit_all};
+
+/// A change that was declared.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Change {
+    /// Samples since the change, as the likeliest hypothesis has it.
+    pub samples_ago: u64,
+    /// Lambda.
+    pub log_odds: f64,
+    /// What held before.
+    pub before: Snapshot,
+    /// What holds now.
+    pub after: Snapshot,
+    /// Change of K_e, K_e_dot, omega_nm, zeta_nm, of the innovation variance and of the delay, each
+    /// over its standard error.
+    pub z: [f64; OPERATOR + 2],
+}
+
+/// Lambda, and what has been declared since it rose above zero.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ChangeDetector {
+    log_odds: f64,
+    /// A change was declared; one of the neuromuscular system too; one of the delay too.
+    declared: bool,
+    declared_neuromuscular: bool,
+    declared_delay: bool,
+    change: Option<Change>,
+}
+
+hoid_core::state!([] Change { samples_ago, log_odds, before, after, z });
+
+impl State for ChangeDetector {
+    fn visit(&mut self, each: &mut dyn FnMut(&mut f64)) {
+        let mut is_there = self.change.is_some();
+        visit_all(
+            &mut [
+                &mut self.log_odds,
+                &mut self.declared,
+                &mut self.declared_neuromuscular,
+                &mut self.declared_delay,
+                &mut is_there,
+            ],
+            each,
+        );
+        self.change = is_there.then(|| self.change.take().unwrap_or_default());
+        if let Some(change) = &mut self.change {
+            change.visit(each);
+        }
+    }
+}
+
+impl Default for ChangeDetector {
+    fn default() -> Self {
+        Self {
+            log_odds: f64::NEG_INFINITY,
+            declared: false,
+            declared_neuromuscular: false,
+            declared_delay: false,
+            change: None,
+        }
+    }
+}
+
+/// Change of the delay over its standard error from which it is declared.
+const DELAY_THRESHOLD: f64 = 3.0;
+/// Added to both sides of the odds, so that Lambda stays finite.
+const REGULARISATION: f64 = 1e-12;
+
+impl ChangeDetector {
+    /// The update by the hypotheses after a sample. True where Lambda rises above zero: a change
+    /// begins.
+    pub fn update(&mut self, hypotheses: &[Option<Hypothesis>], now: u64, prior: &ChangePrior) -> bool {
+        let sums = Sums::over(hypotheses, now, prior);
+        let before = self.log_odds;
+        self.log_odds = log_odds(sums.recent, sums.older);
+        self.change = None;
+        if self.log_odds < 0.0 {
+            (self.declared, self.declared_neuromuscular, self.declared_delay) = (false, false, false);
+        } else if self.log_odds > prior.log_odds_threshold {
+            self.declare(&sums, hypotheses, now, prior);
+        }
+        self.log_odds > 0.0 && before <= 0.0
+    }
+
+    /// Declares the change that the likeliest of the recent hypotheses stands for, once it has
+    /// settled and if there is something new in it.
+    fn declare(&mut self, sums: &Sums<'_>, hypotheses: &[Option<Hypothesis>], now: u64, prior: &ChangePrior) {
+        let Some(h) = sums.likeliest.filter(|h| now - h.born >= prior.settling_time) else {
+            return;
+        };
+        let others = sums.recent + sums.older - sums.neuromuscular;
+        let neuromuscular_changed =
+            h.neuromuscular_changed && log_odds(sums.neuromuscular, others.max(0.0)) > prior.log_odds_threshold;
+        let new_neuromuscular = neuromuscular_changed && !self.declared_neuromuscular;
+        let delay_may_be_new = prior.delay.count > 1 && !self.declared_delay;
+        // Most samples behind a change have nothing more to declare and end here.
+        if self.declared && !new_neuromuscular && !delay_may_be_new {
+            return;
+        }
+        let recent = hypotheses.iter().flatten().filter(|h| is_recent(h, now, prior));
+        let change = change_of(h, delay_of(recent), now, self.log_odds);
+        let delay_changed = change.z[OPERATOR + 1].abs() > DELAY_THRESHOLD;
+        let new_delay = delay_changed && !self.declared_delay;
+        if !self.declared || new_neuromuscular || new_delay {
+            self.change = Some(change);
+            self.declared = true;
+            self.declared_neuromuscular |= h.neuromuscular_changed;
+            self.declared_delay |= delay_changed;
+        }
+    }
+
+    /// Lambda.
+    pub fn log_odds(&self) -> f64 {
+        self.log_odds
+    }
+
+    /// The change that was declared at the last sample.
+    pub fn change(&self) -> Option<Change> {
+        self.change
+    }
+}
+
+/// Sums of probabilities, and the likeliest of the recent hypotheses.
+struct Sums<'a> {
+    recent: f64,
+    older: f64,
+    /// Of the recent ones in which omega_nm and zeta_nm changed too.
+    neuromuscular: f64,
+    likeliest: Option<&'a Hypothesis>,
+}
+
+impl<'a> Sums<'a> {
+    fn over(hypotheses: &'a [Option<Hypothesis>], now: u64, prior: &ChangePrior) -> Self {
+        let mut sums = Self {
+            recent: 0.0,
+            older: 0.0,
+            neuromuscular: 0.0,
+            likeliest: None,
+        };
+        for h in hypotheses.iter().flatten() {
+            if !is_recent(h, now, prior) {
+                sums.older += h.probability;
+                continue;
+            }
+            sums.recent += h.probability;
+            sums.neuromuscular += if h.neuromuscular_changed { h.probability } else { 0.0 };
+            if sums.likeliest.is_none_or(|l| h.probability > l.probability) {
+                sums.likeliest = Some(h);
+            }
+        }
+        sums
+    }
+}
+
+fn log_odds(probability: f64, of_others: f64) -> f64 {
+    libm::log((probability + REGULARISATION) / (of_others + REGULARISATION))
+}
+
+/// True for a hypothesis within the change window. The first, born at sample 0, stands for no
+/// change.
+fn is_recent(h: &Hypothesis, now: u64, prior: &ChangePrior) -> bool {
+    h.born > 0 && now - h.born < prior.change_window
+}
+
+/// Mean and variance of the delay over hypotheses, in samples beyond the shortest. The variance
+/// includes that of rounding to whole samples, 1/12.
+pub(super) fn delay_of<'a>(hypotheses: impl Iterator<Item = &'a Hypothesis>) -> [f64; 2] {
+    let (mut sum, mut first, mut second) = (0.0, 0.0, 0.0);
+    for h in hypotheses {
+        let delay = h.extra_delay as f64;
+        sum += h.probability;
+        first += h.probability * delay;
+        second += h.probability * delay * delay;
+    }
+    let mean = first / sum;
+    [mean, (second / sum - mean * mean).max(0.0) + 1.0 / 12.0]
+}
+
+/// The change that a hypothesis stands for, with the delay after it.
+fn change_of(h: &Hypothesis, delay: [f64; 2], now: u64, log_odds: f64) -> Change {
+    let (before, after) = (h.before, Snapshot { delay, ..h.snapshot() });
+    let samples_ago = now - h.born;
+    let mut z = [0.0; OPERATOR + 2];
+    for i in 0..OPERATOR {
+        let variance_of = |s: &Snapshot| {
+            if i < 2 {
+                s.gain_covariance[i]
+            } else {
+                s.neuromuscular_variance[i - 2]
+            }
+        };
+        let variance = variance_of(&before) + variance_of(&after);
+        if variance > 0.0 {
+            z[i] = (after.eta[i] - before.eta[i]) / libm::sqrt(variance);
+        }
+    }
+    if samples_ago > 0 && before.innovation_variance > 0.0 && after.innovation_variance > 0.0 {
+        z[OPERATOR] =
+            libm::log(after.innovation_variance / before.innovation_variance) / libm::sqrt(2.0 / samples_ago as f64);
+    }
+    z[OPERATOR + 1] = (after.delay[0] - before.delay[0]) / libm::sqrt(before.delay[1] + after.delay[1]);
+    Change {
+        samples_ago,
+        log_odds,
+        before,
+        after,
+        z,
+    }
+}

@@ -1,0 +1,182 @@
+//! The recursion: the filters of the signals, and behind them the bank of hypotheses.
+//!
+//! A sample passes the [`Response`] to the held error, the whitening filter D and the ring of
+//! delayed signals to the [`Bank`]. Now and then the linearisation point of the response follows
+//! the estimate.
+
+use super::{
+    bank::Bank,
+    hypothesis::{self, Hypothesis, LARGEST},
+    prior::ChangePrior,
+    response::{Response, Signals},
+    signal_ring::{DelayedSignals, SignalRing},
+};
+use hoid_core::{bounds::within, recursion::Step};
+
+/// Samples between two moves of the linearisation point.
+const RELINEARISE_EVERY: u64 = 64;
+/// Largest relative move of the point: the states of the filters move along their first derivative.
+const LARGEST_MOVE: f64 = 0.1;
+
+/// The recursion. M is the largest number of hypotheses, D the largest order of the noise model, B
+/// the memory for the signals of every delay.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MultipleModelFilter<const M: usize, const D: usize, B = [Signals; 1]> {
+    bank: Bank<M>,
+    response: Response,
+    ring: SignalRing<B>,
+    /// Coefficients of D behind the 1, and their number.
+    d: [f64; D],
+    order: usize,
+    /// The past of u and of the signals, newest first.
+    u: [f64; D],
+    past: [Signals; D],
+    restarts: u64,
+}
+
+hoid_core::state!([const M: usize, const D: usize, B: AsMut<[Signals]>] MultipleModelFilter<M, D, B> {
+    bank, response, ring, d, order, u, past, restarts,
+}, bounded);
+
+impl<const M: usize, const D: usize, B> MultipleModelFilter<M, D, B> {
+    fn bounded(&mut self) {
+        self.order = self.order.min(D);
+    }
+}
+
+impl<const M: usize, const D: usize> MultipleModelFilter<M, D> {
+    /// Starts from one hypothesis with filters at rest, for a delay that is known. `None` when the
+    /// order of the noise model is above D, and as [`Bank::new`].
+    pub fn new(first: Hypothesis, d: &[f64], prior: ChangePrior) -> Option<Self> {
+        Self::with_delays(first, d, prior, [[0.0; 6]; 1])
+    }
+}
+
+impl<const M: usize, const D: usize, B: AsRef<[Signals]> + AsMut<[Signals]>> MultipleModelFilter<M, D, B> {
+    /// As [`MultipleModelFilter::new`] with several candidate delays. `None` too when the memory is not
+    /// of [`DelayPrior::count`](super::prior::DelayPrior::count) signals.
+    pub fn with_delays(first: Hypothesis, d: &[f64], prior: ChangePrior, memory: B) -> Option<Self> {
+        let ring = SignalRing::new(memory);
+        if d.len() > D || ring.count() != prior.delay.count {
+            return None;
+        }
+        let mut padded = [0.0; D];
+        padded[..d.len()].copy_from_slice(d);
+        let point = [first.eta[2], first.eta[3]];
+        Some(Self {
+            bank: Bank::new(first, prior)?,
+            response: Response::new(point, prior.sample_time),
+            ring,
+            d: padded,
+            order: d.len(),
+            u: [0.0; D],
+            past: [[0.0; 6]; D],
+            restarts: 0,
+        })
+    }
+
+    /// The step by a sample `x(t) = e(t - nk)`, `u(t)`, with nk of the shortest delay. Both must be
+    /// finite.
+    pub fn step(&mut self, x: f64, u: f64) -> Step {
+        let signals = self.response.step(x);
+        let (y, r) = self.whitened(u, &signals);
+        let finite = y.abs() < LARGEST && r.iter().all(|r| r.abs() < LARGEST);
+        self.ring.push(if finite { r } else { [0.0; 6] });
+        let sample = finite.then_some((y, self.ring.newest()));
+        let innovation = self.bank.update(sample, self.response.point());
+        self.remember(u, signals);
+        Step {
+            innovation,
+            shortened: !finite,
+        }
+    }
+
+    /// As [`MultipleModelFilter::step`], but the estimate stays: only the filters move on.
+    pub fn step_without_update(&mut self, x: f64, u: f64) -> Step {
+        self.bank.skip();
+        let signals = self.response.step(x);
+        let (y, r) = self.whitened(u, &signals);
+        self.ring.push(r);
+        let innovation = y - self.predicted(self.ring.newest());
+        self.remember(u, signals);
+        Step {
+            innovation,
+            shortened: false,
+        }
+    }
+
+    /// As [`MultipleModelFilter::step_without_update`] where the output is missing: the one-step
+    /// prediction takes its place.
+    pub fn bridge(&mut self, x: f64) {
+        self.bank.skip();
+        let signals = self.response.step(x);
+        let (y, r) = self.whitened(0.0, &signals);
+        self.ring.push(r);
+        let u = self.predicted(self.ring.newest()) - y;
+        self.remember(u, signals);
+    }
+
+    /// `D u` and D times the signals.
+    #[inline(always)]
+    fn whitened(&self, u: f64, signals: &Signals) -> (f64, Signals) {
+        let (mut y, mut r) = (u, *signals);
+        for j in 0..self.order {
+            let d = self.d[j];
+            y += d * self.u[j];
+            for i in 0..6 {
+                r[i] += d * self.past[j][i];
+            }
+        }
+        (y, r)
+    }
+
+    /// `D w` of the mixture, with the likeliest delay.
+    fn predicted(&self, signals: DelayedSignals<'_>) -> f64 {
+        let eta = self.bank.mixture().eta;
+        let r = signals.at(self.bank.likeliest_delay());
+        let psi = hypothesis::gradient(&eta, r, self.response.point());
+        eta[0] * psi[0] + eta[1] * psi[1]
+    }
+
+    /// Puts a sample into the histories, and moves the linearisation point toward the estimate when
+    /// it is time.
+    fn remember(&mut self, u: f64, signals: Signals) {
+        if !(u.abs() < LARGEST && signals.iter().all(|s| s.abs() < LARGEST)) {
+            self.response.reset();
+            self.u = [0.0; D];
+            self.past = [[0.0; 6]; D];
+            self.ring.iter_mut().for_each(|signals| *signals = [0.0; 6]);
+            self.restarts += 1;
+            return;
+        }
+        if self.order > 0 {
+            self.u.copy_within(0..self.order - 1, 1);
+            self.past.copy_within(0..self.order - 1, 1);
+            self.u[0] = u;
+            self.past[0] = signals;
+        }
+        if self.bank.samples().is_multiple_of(RELINEARISE_EVERY) {
+            let [.., omega, zeta] = self.bank.mixture().eta;
+            let point = self.response.point();
+            let toward = |to: f64, from: f64| within(to, [(1.0 - LARGEST_MOVE) * from, (1.0 + LARGEST_MOVE) * from]);
+            let moved = [toward(omega, point[0]), toward(zeta, point[1])];
+            self.response
+                .move_to(moved, self.past.iter_mut().chain(self.ring.iter_mut()));
+        }
+    }
+
+    /// The hypotheses with their probabilities.
+    pub fn bank(&self) -> &Bank<M> {
+        &self.bank
+    }
+
+    /// Coefficients of D behind the 1.
+    pub fn d(&self) -> &[f64] {
+        &self.d[..self.order]
+    }
+
+    /// How often a signal overflowed and the filters were brought to rest.
+    pub fn restarts(&self) -> u64 {
+        self.restarts
+    }
+}

@@ -1,0 +1,111 @@
+//! The signals of the last samples, from which those for every delay are read.
+//!
+//! The response to an error that arrives k samples later is the response k samples ago. So one
+//! filter gives the signals for all delays between the shortest and the longest, and a ring buffer
+//! keeps those of the last samples, behind the whitening filter.
+
+use super::response::Signals;
+
+/// The signals of one sample for every delay.
+#[derive(Debug, Clone, Copy)]
+pub struct DelayedSignals<'a> {
+    ring: &'a [Signals],
+    newest: usize,
+}
+
+impl<'a> DelayedSignals<'a> {
+    /// Of a delay that is known.
+    pub fn known(signals: &'a Signals) -> Self {
+        Self {
+            ring: std::slice::from_ref(signals),
+            newest: 0,
+        }
+    }
+
+    /// For a delay that is `extra_delay` samples longer than the shortest.
+    ///
+    /// # Panics
+    /// Beyond the longest.
+    #[inline(always)]
+    pub fn at(&self, extra_delay: usize) -> &'a Signals {
+        let place = if extra_delay > self.newest {
+            self.newest + self.ring.len() - extra_delay
+        } else {
+            self.newest - extra_delay
+        };
+        &self.ring[place]
+    }
+}
+
+/// The signals of the last samples, as many as there are delays.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SignalRing<B> {
+    memory: B,
+    newest: usize,
+}
+
+impl<B: AsMut<[Signals]>> hoid_core::state::State for SignalRing<B> {
+    fn visit(&mut self, each: &mut dyn FnMut(&mut f64)) {
+        self.memory.as_mut().visit(each);
+        self.newest.visit(each);
+        self.newest = self.newest.min(self.memory.as_mut().len().saturating_sub(1));
+    }
+}
+
+impl<B: AsRef<[Signals]> + AsMut<[Signals]>> SignalRing<B> {
+    /// Zeros, as many as the memory holds.
+    pub fn new(mut memory: B) -> Self {
+        memory.as_mut().fill([0.0; 6]);
+        Self { memory, newest: 0 }
+    }
+
+    /// Number of delays.
+    pub fn count(&self) -> usize {
+        self.memory.as_ref().len()
+    }
+
+    /// Adds the signals of a sample for the shortest delay, in the place of the oldest.
+    #[inline(always)]
+    pub fn push(&mut self, signals: Signals) {
+        let memory = self.memory.as_mut();
+        self.newest = if self.newest + 1 < memory.len() {
+            self.newest + 1
+        } else {
+            0
+        };
+        memory[self.newest] = signals;
+    }
+
+    /// The signals of the newest sample.
+    #[inline(always)]
+    pub fn newest(&self) -> DelayedSignals<'_> {
+        DelayedSignals {
+            ring: self.memory.as_ref(),
+            newest: self.newest,
+        }
+    }
+
+    /// All signals in memory.
+    pub fn iter_mut(&mut self) -> std::slice::IterMut<'_, Signals> {
+        self.memory.as_mut().iter_mut()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn signals_of_a_delay_are_those_of_so_many_samples_ago() {
+        let mut ring = SignalRing::new([[7.0; 6]; 3]);
+        for k in 0..8 {
+            ring.push([f64::from(k); 6]);
+            for extra_delay in 0..3 {
+                let ago = f64::from(k) - extra_delay as f64;
+                assert_eq!(ring.newest().at(extra_delay)[0], ago.max(0.0));
+            }
+        }
+        let only = [4.0; 6];
+        assert_eq!(DelayedSignals::known(&only).at(0), &only);
+    }
+}

@@ -1,0 +1,360 @@
+//! The recursive prediction-error method in physical parameters.
+//!
+//! `eta = [K_e, K_e_dot, omega_nm, zeta_nm, c.., d..]`, or with the delay
+//! `[K_e, K_e_dot, omega_nm, zeta_nm, tau_e, c.., d..]`. The predictor is that of Box-Jenkins with
+//! the polynomials `theta(eta)` of the exact zero-order hold ([`hoid_core::held_operator`]); its
+//! gradient is `psi_eta = (d theta/d eta)' psi_theta`. The step is that of [`hoid_core::rpem`], but
+//! each factor of forgetting now belongs to a quantity of which the user knows how fast it changes:
+//! operators adapt their gains, and hardly their neuromuscular system.
+//!
+//! Each parameter stays within its bounds: a step is cut where it meets one. C (and D, with
+//! [`Stable::PredictorAndNoise`]) is kept stable by halving the step.
+//!
+//! With the delay as a parameter `tau_e = l Ts + delta`, B has three coefficients behind
+//! `nk = l + 1` samples; as tau_e grows over a whole sample, B moves on along the past input that
+//! the predictor keeps, without a transient. The model is continuous there, its derivative has a
+//! kink (see [`hoid_core::held_operator`]).
+
+use hoid_core::{
+    adaptation::Adaptation,
+    bounds::within,
+    error_bars::{ErrorBars, ErrorPropagation},
+    held_operator::{held_operator, held_operator_delayed},
+    predictor::{Predictor, Regressor},
+    recursion::{Stable, Step, backtrack, ratio},
+    sensitivities::{ErrorLayout, LinearForm, Sensitivities},
+    shape::Shape,
+};
+
+/// Place of omega_nm in eta.
+const OMEGA: usize = 2;
+/// Place of zeta_nm in eta.
+const ZETA: usize = 3;
+/// Place of tau_e in eta, where it is a parameter.
+const TAU: usize = 4;
+
+/// What the recursion estimates, and within which bounds.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PhysicalModel<S, const N: usize> {
+    /// Orders: nc and nd are free, na = 0, nf = 2 and nb = 2, or 3 when tau_e is a parameter.
+    pub shape: S,
+    /// Smallest delay nk in samples, of which the recursion is given the input `x(t) = e(t - nk)`,
+    /// when tau_e is a parameter.
+    pub smallest_nk: Option<usize>,
+    /// Sample time in s.
+    pub sample_time: f64,
+    /// Least and largest value of each parameter.
+    pub bounds: [[f64; 2]; N],
+    /// Which noise polynomials are kept stable.
+    pub stable: Stable,
+}
+
+/// The recursion. N is the capacity for parameters, K that for the errors of its filters
+/// ([`ErrorLayout::filter_errors`]; 0 for the usual error bars), L the number of past inputs that
+/// are kept: 2 without tau_e, 3 and the range of the delay with it; at least nc.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PhysicalRpem<S, const N: usize, const K: usize, const L: usize, A> {
+    model: PhysicalModel<S, N>,
+    predictor: Predictor<S, N, L>,
+    eta: [f64; N],
+    /// Polynomials of eta, their Jacobian with respect to the first parameters, and the whole
+    /// samples of the delay.
+    polynomials: Polynomials<N>,
+    psi: [f64; N],
+    adaptation: A,
+    bars: ErrorBars<N, K>,
+    restarts: u64,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+struct Polynomials<const N: usize> {
+    theta: [f64; N],
+    /// Rows b.., f1, f2; columns the operator's parameters.
+    jacobian: [[f64; 5]; 5],
+    whole_samples: usize,
+}
+
+hoid_core::state!([const N: usize] Polynomials<N> { theta, jacobian, whole_samples });
+hoid_core::state!([S, const N: usize, const K: usize, const L: usize, A: hoid_core::state::State] PhysicalRpem<S, N, K, L, A> {
+    predictor, eta, polynomials, psi, adaptation, bars, restarts,
+});
+
+impl<S: Shape, const N: usize> PhysicalModel<S, N> {
+    /// Number of operator parameters in front of c and d.
+    fn operator(&self) -> usize {
+        self.shape.nb() + 2
+    }
+
+    fn polynomials(&self, eta: &[f64; N]) -> Polynomials<N> {
+        let gains = [eta[0], eta[1], eta[2], eta[3]];
+        let noise = self.shape.nc() + self.shape.nd();
+        let mut theta = [0.0; N];
+        let mut jacobian = [[0.0; 5]; 5];
+        let (operator, mut whole_samples) = (self.operator(), 0);
+        if self.smallest_nk.is_some() {
+            let samples = eta[TAU] / self.sample_time;
+            // Up to rounding: 0.29/0.01 is 28.999999999999996.
+            let whole = libm::floor(samples * (1.0 + 1e-12) + 1e-12).max(0.0);
+            whole_samples = whole as usize;
+            let delta = (eta[TAU] - whole * self.sample_time).clamp(0.0, self.sample_time);
+            let (values, by) = held_operator_delayed(gains, delta, self.sample_time);
+            jacobian = by;
+            theta[..3].copy_from_slice(&values[..3]);
+            theta[3 + noise..5 + noise].copy_from_slice(&values[3..]);
+        } else {
+            let (values, by) = held_operator(gains, self.sample_time);
+            for (row, by) in jacobian.iter_mut().zip(by) {
+                row[..4].copy_from_slice(&by);
+            }
+            theta[..2].copy_from_slice(&values[..2]);
+            theta[2 + noise..4 + noise].copy_from_slice(&values[2..]);
+        }
+        let nb = operator - 2;
+        theta[nb..nb + noise].copy_from_slice(&eta[operator..operator + noise]);
+        Polynomials {
+            theta,
+            jacobian,
+            whole_samples,
+        }
+    }
+
+    fn within_bounds(&self, eta: &[f64; N]) -> bool {
+        eta.iter()
+            .zip(&self.bounds)
+            .all(|(e, [low, high])| low <= e && e <= high)
+    }
+}
+
+impl<S: Shape, const N: usize, const K: usize, const L: usize, A: Adaptation<N>> PhysicalRpem<S, N, K, L, A> {
+    /// Starts from eta with filters at rest. `None` when the orders are not those of
+    /// [`PhysicalModel::shape`], N, K or L is too small, eta lies outside the bounds, the bounds
+    /// let omega_nm or zeta_nm become zero, or the noise model is not stable.
+    pub fn new(model: PhysicalModel<S, N>, eta: [f64; N], adaptation: A, bars: ErrorBars<N, K>) -> Option<Self> {
+        let shape = model.shape;
+        let predictor = Predictor::new(shape, Regressor::Gradient)?;
+        let nb = if model.smallest_nk.is_some() { 3 } else { 2 };
+        let orders = (shape.na(), shape.nb(), shape.nf()) == (0, nb, 2);
+        let sound = orders
+            && model.sample_time > 0.0
+            && model.bounds[OMEGA][0] > 0.0
+            && model.bounds[ZETA][0] > 0.0
+            && model.within_bounds(&eta);
+        if !sound || ErrorLayout::for_capacity::<S, K>(&shape).filter_errors() > K {
+            return None;
+        }
+        let polynomials = model.polynomials(&eta);
+        if !model.stable.holds(&shape, &polynomials.theta) {
+            return None;
+        }
+        let mut recursion = Self {
+            model,
+            predictor,
+            eta,
+            polynomials,
+            psi: [0.0; N],
+            adaptation,
+            bars,
+            restarts: 0,
+        };
+        recursion.apply_delay();
+        Some(recursion)
+    }
+
+    /// Lets B begin at the delay of the estimate.
+    fn apply_delay(&mut self) {
+        if let Some(first) = self.model.smallest_nk {
+            let nk = self.polynomials.whole_samples + 1;
+            self.predictor.set_offset(nk.saturating_sub(first));
+        }
+    }
+
+    #[inline(always)]
+    fn predict(&mut self, x: f64, u: f64) -> f64 {
+        let (of_theta, innovation) = self.predictor.predict(&self.polynomials.theta, x, u);
+        self.psi = self.chain_rule(of_theta);
+        innovation
+    }
+
+    /// A gradient by theta as one by eta: `J' psi_theta`.
+    #[inline(always)]
+    fn chain_rule(&self, of_theta: [f64; N]) -> [f64; N] {
+        let shape = self.model.shape;
+        let (operator, noise) = (self.model.operator(), shape.nc() + shape.nd());
+        let nb = operator - 2;
+        let jacobian = &self.polynomials.jacobian;
+        let mut row = of_theta;
+        for j in 0..operator {
+            let mut sum = 0.0;
+            for i in 0..nb {
+                sum += of_theta[i] * jacobian[i][j];
+            }
+            for i in 0..2 {
+                sum += of_theta[nb + noise + i] * jacobian[nb + i][j];
+            }
+            row[j] = sum;
+        }
+        row[operator..operator + noise].copy_from_slice(&of_theta[nb..nb + noise]);
+        row
+    }
+
+    /// The step by a sample `x(t) = e(t - nk)`, `u(t)`; nk is [`PhysicalModel::smallest_nk`] when
+    /// the delay is a parameter. Both must be finite.
+    #[inline]
+    pub fn step(&mut self, x: f64, u: f64) -> Step {
+        let innovation = self.predict(x, u);
+        let (layout, rows) = self.sensitivities();
+        let limited = self.bars.clip(innovation);
+        let used = ratio(limited, innovation);
+        let moved = self
+            .adaptation
+            .update(&self.psi, limited, &self.eta, self.bars.innovation_variance());
+        let (operator, noise) = (self.model.operator(), self.model.shape.nc() + self.model.shape.nd());
+        let (shape, stable) = (self.model.shape, self.model.stable);
+        // The operator's part of theta is stable by its bounds; only the noise model has to be
+        // tested.
+        let (allowed, mut eta) = backtrack(&self.eta, &moved.step, |eta| {
+            let mut theta = [0.0; N];
+            theta[operator - 2..operator - 2 + noise].copy_from_slice(&eta[operator..operator + noise]);
+            stable.holds(&shape, &theta)
+        });
+        let (fraction, cut) = self.cut_at_bounds(&moved.step, allowed, &mut eta);
+        let mut gain = moved.gain;
+        for i in 0..N {
+            gain[i] *= fraction[i] * used;
+        }
+        self.eta = eta;
+        self.bars.update(&layout, &rows, &gain, innovation);
+        self.adaptation.add_drift_to(&mut self.bars);
+        self.polynomials = self.model.polynomials(&eta);
+        self.apply_delay();
+        self.correct();
+        Step {
+            innovation,
+            shortened: allowed < 1.0 || cut,
+        }
+    }
+
+    /// Cuts the new estimate where it is outside the bounds. Returns the fraction of the step that
+    /// is left of each parameter, `allowed` inside the bounds, and whether one was cut.
+    #[inline(always)]
+    fn cut_at_bounds(&self, step: &[f64; N], allowed: f64, eta: &mut [f64; N]) -> ([f64; N], bool) {
+        let (mut fraction, mut cut) = ([allowed; N], false);
+        for i in 0..N {
+            let bounded = within(eta[i], self.model.bounds[i]);
+            if bounded != eta[i] {
+                cut = true;
+                fraction[i] = if step[i] == 0.0 {
+                    0.0
+                } else {
+                    (bounded - self.eta[i]) / step[i]
+                };
+                eta[i] = bounded;
+            }
+        }
+        (fraction, cut)
+    }
+
+    /// As [`PhysicalRpem::step`], but the estimate stays: only the filters move on.
+    pub fn step_without_update(&mut self, x: f64, u: f64) -> Step {
+        let innovation = self.predict(x, u);
+        let (layout, rows) = self.sensitivities();
+        self.bars.propagate(&layout, &rows);
+        self.correct();
+        Step {
+            innovation,
+            shortened: false,
+        }
+    }
+
+    /// As [`PhysicalRpem::step_without_update`] where the output is missing: the one-step
+    /// prediction takes its place.
+    pub fn bridge(&mut self, x: f64) {
+        self.predict(x, 0.0);
+        self.predictor.bridge(&self.polynomials.theta);
+        let (layout, rows) = self.sensitivities();
+        self.bars.propagate(&layout, &rows);
+        self.correct();
+    }
+
+    /// Sensitivities with respect to eta, whose noise parameters stand behind the operator's.
+    #[inline(always)]
+    fn sensitivities(&self) -> (ErrorLayout, Sensitivities<N, K>) {
+        if K == 0 {
+            return (ErrorLayout::NONE, Sensitivities::from_gradient(&self.psi));
+        }
+        let layout = ErrorLayout::of(&self.model.shape);
+        let rows = self.predictor.sensitivities(&self.polynomials.theta, &layout);
+        let in_eta = |row: LinearForm<N, K>| LinearForm {
+            theta: self.chain_rule(row.theta),
+            filters: row.filters,
+        };
+        let layout = ErrorLayout {
+            noise: (self.model.operator(), layout.noise.1),
+            ..layout
+        };
+        let rows = Sensitivities {
+            w: in_eta(rows.w),
+            v: in_eta(rows.v),
+            e: in_eta(rows.e),
+        };
+        (layout, rows)
+    }
+
+    #[inline(always)]
+    fn correct(&mut self) {
+        if !self.predictor.correct(&self.polynomials.theta).is_finite() {
+            self.predictor.reset();
+            self.restarts += 1;
+        }
+    }
+
+    /// The estimate eta.
+    pub fn eta(&self) -> &[f64; N] {
+        &self.eta
+    }
+
+    /// The polynomials of eta, `[b.. c.. d.. f..]`.
+    pub fn theta(&self) -> &[f64; N] {
+        &self.polynomials.theta
+    }
+
+    /// Jacobian of `[b.., f1, f2]` with respect to the operator's parameters.
+    pub fn jacobian(&self) -> &[[f64; 5]; 5] {
+        &self.polynomials.jacobian
+    }
+
+    /// psi of the last sample.
+    pub fn psi(&self) -> &[f64; N] {
+        &self.psi
+    }
+
+    /// The adaptation with its covariance.
+    pub fn adaptation(&self) -> &A {
+        &self.adaptation
+    }
+
+    /// Delay of b0 in samples where tau_e is one of the parameters: its whole samples, and that of the hold.
+    pub fn nk(&self) -> usize {
+        self.polynomials.whole_samples + 1
+    }
+
+    /// The adaptation, to be changed from outside.
+    pub fn adaptation_mut(&mut self) -> &mut A {
+        &mut self.adaptation
+    }
+
+    /// Covariance of eta over sigma^2.
+    pub fn normalised_covariance(&self) -> [[f64; N]; N] {
+        self.adaptation.normalised_covariance(&self.bars)
+    }
+
+    /// Innovation variance sigma^2.
+    pub fn innovation_variance(&self) -> f64 {
+        self.bars.innovation_variance()
+    }
+
+    /// How often a signal overflowed and the filters were brought to rest.
+    pub fn restarts(&self) -> u64 {
+        self.restarts
+    }
+}

@@ -1,0 +1,55 @@
+//! What methods in the operator's parameters have in common that know the noise model from a batch fit: their
+//! checks, and T_L of gains.
+
+use hoid_ident::IdentError;
+use hoid_track::{
+    StartAt,
+    building::{OPERATOR, Setup, bad, check_delay, check_operator_orders},
+};
+
+/// Largest order of the noise model.
+pub(crate) const LARGEST_ND: usize = 8;
+
+/// Checks what a method needs that has a model of how the person changes.
+///
+/// # Errors
+/// [`IdentError::BadOption`].
+pub(crate) fn check_model_of_change(name: &str, setup: &Setup) -> Result<(), IdentError> {
+    check_operator_orders(name, setup)?;
+    check_delay(&setup.orders)?;
+    let o = &setup.orders;
+    if !(o.nc == 0 && o.nd <= LARGEST_ND) {
+        return Err(bad(
+            &format!("the noise model of {name}"),
+            format!("nc={},nd={}", o.nc, o.nd),
+            "nc = 0 and nd of at most 8",
+        ));
+    }
+    if !matches!(setup.start, StartAt::Span(_)) {
+        return Err(bad(
+            &format!("the start of {name}"),
+            "no batch fit".to_owned(),
+            "the batch fit of a span, whose noise model and covariance it needs",
+        ));
+    }
+    Ok(())
+}
+
+/// As [`check_model_of_change`], of a method whose noise model is of order 1.
+///
+/// # Errors
+/// [`IdentError::BadOption`].
+pub(crate) fn check_first_order(name: &str, setup: &Setup) -> Result<(), IdentError> {
+    check_model_of_change(name, setup)?;
+    match setup.orders.nd {
+        1 => Ok(()),
+        nd => Err(bad(&format!("the noise model of {name}"), format!("nd={nd}"), "nd = 1")),
+    }
+}
+
+/// T_L = K_e_dot/K_e, and its variance to first order, `d T_L = (d K_e_dot - T_L d K_e)/K_e`.
+pub(crate) fn lead_of(eta: [f64; OPERATOR], c: &[[f64; OPERATOR]; OPERATOR]) -> [f64; 2] {
+    let t_l = eta[1] / eta[0];
+    let of_ratio = c[1][1] - 2.0 * t_l * c[0][1] + t_l * t_l * c[0][0];
+    [t_l, of_ratio.max(0.0) / (eta[0] * eta[0])]
+}

@@ -1,0 +1,61 @@
+//! The recursive methods of the literature beside those of hoid: for comparison.
+//!
+//! Each follows the source that its file names, and is a [`Method`](hoid_track::Method) as the default is: the tracker,
+//! the guard, saved states, traces and verdicts of [`hoid_track`] are those of all. This crate sees all
+//! methods, and holds the one list of their names.
+//!
+//! ```
+//! use hoid_model::scenario::{Condition, Scenario};
+//! use hoid_sim::{RunSeed, Simulator};
+//! use hoid_track::{TrackOptions, track};
+//!
+//! let simulator = Simulator::new(&Scenario::condition(Condition::C4))?;
+//! let record = simulator.run(RunSeed::default(), false)?;
+//! let physical = hoid_survey::method("physical")?;
+//! let options = TrackOptions::usual(physical, 29).with(&[("memory_of", "K_e=4s")])?;
+//! let trace = track(&record, &options, 100)?;
+//!
+//! // The task changes at 40.96 s, and K_e_dot rises from .036 to .084 s.
+//! let last = trace.operator(trace.len() - 1)?;
+//! assert!((last.k_e_dot.value - 0.084).abs() < 0.02);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! | module | method |
+//! |---|---|
+//! | `registry` | [`methods()`]: all methods, those of [`hoid_track`] too, by name |
+//! | `physical` | `physical`: the prediction-error method in the operator's parameters |
+//! | `window` | `window`: a batch fit of the last seconds, again and again |
+//! | `rriv` | `rriv`: recursive refined instrumental variable |
+//! | `multiple_model` | `multiple-model`: a bank of hypotheses of when the person changed; its two-sided estimate |
+//! | `fused` | `fused`: least squares for B with the poles of the prediction-error method |
+//! | [`kernel`] | the arithmetic of a sample of `physical` and `multiple-model` |
+//! | `joint_filter` | `ekf`, `ukf`: Kalman filters of state and parameters |
+//! | `dual_ekf` | `dual-ekf`: two Kalman filters that take turns, of state and of parameters |
+//! | `linear_network` | `linear-network`: one linear layer that learns the gains |
+//! | `known_noise` | what methods have in common that know the noise model from a batch fit |
+
+mod dual_ekf;
+mod fused;
+mod joint_filter;
+pub mod kernel;
+mod known_noise;
+mod linear_network;
+mod multiple_model;
+mod physical;
+mod registry;
+mod rriv;
+mod window;
+
+pub use dual_ekf::DualEkfOptions;
+pub use fused::FusedOptions;
+pub use joint_filter::{EkfOptions, UkfOptions};
+pub use linear_network::LinearNetworkOptions;
+pub use multiple_model::MultipleModelOptions;
+pub use physical::PhysicalOptions;
+pub use registry::{
+    dual_ekf, ekf, fused, is_for_comparison, linear_network, method, methods, multiple_model, physical, registry,
+    renamed, rriv, set, ukf, window,
+};
+pub use rriv::RrivOptions;
+pub use window::WindowOptions;

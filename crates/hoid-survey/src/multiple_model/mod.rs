@@ -1,0 +1,309 @@
+//! The bank of hypotheses of the real-time kernel ([`crate::kernel::multiple_model`]) behind the face of a
+//! recursion: what it supposes of a person, in seconds.
+//!
+//! Where the delay is tracked, other delays are proposed every 1.28 s.
+//!
+//! The numbers were set on conditions C3 and C5 with remnants of order 2 and 3; the errors change
+//! by a tenth or less when any of them is halved or doubled.
+
+mod prior;
+mod smoother;
+
+use std::collections::BTreeMap;
+
+use hoid_core::{
+    delay::DelayLine,
+    state::{State, visit_all},
+};
+use hoid_model::{
+    Record, SampleTime, Structure,
+    uncertainty::{Estimate, OperatorEstimate},
+};
+
+use hoid_ident::{Constraint, IdentError, settings, settings::Bounds};
+
+use hoid_track::{
+    BoundOptions, Change, DelayOptions, GuardChoice, GuardOptions, Memory, Sample,
+    building::{
+        About, Causal, Recursion, RecursiveMethod, Reported, Setup, StartState, StepOutcome, TwoSided,
+        bad as bad_option,
+    },
+};
+
+use crate::{
+    kernel::multiple_model::{
+        MultipleModelFilter, change as kernel_change, hypothesis as kernel, prior::OPERATOR, response::Signals,
+    },
+    known_noise::{LARGEST_ND, check_model_of_change},
+};
+use prior::{bad, change_prior, delays, first_hypothesis, outside};
+
+/// Room for hypotheses where the delay is known, and where it is not.
+const HYPOTHESES: usize = 16;
+const WITH_DELAYS: usize = 48;
+/// Standard deviations beyond which an innovation moves the estimate no further.
+const LIMIT: f64 = 3.5;
+/// Order of the noise model when none is named: the odds need innovations that are white.
+const USUAL_ND: usize = 6;
+
+settings! {
+    /// Options of the bank of hypotheses.
+    pub struct MultipleModelOptions {
+        /// Logarithm of the odds from which a change is declared
+        pub alarm: f64 = 6.0,
+        /// Standard deviations beyond which an innovation moves the estimate no further
+        #[setting(bounds(Bounds::Positive), default("3.5"))]
+        pub limit: Option<f64> = None,
+        /// At each sample what all of a recorded run says of it, by hypotheses run from both ends,
+        /// in place of what the past alone says
+        pub smooth: bool = false,
+    }
+    groups {
+        /// Bounds.
+        pub bounds: BoundOptions,
+        /// A delay that is followed.
+        pub delay: DelayOptions,
+        /// The guard.
+        pub guard: GuardOptions,
+    }
+}
+
+impl RecursiveMethod for MultipleModelOptions {
+    fn about(&self) -> About {
+        About {
+            name: "multiple-model",
+            help: "a bank of hypotheses of when the person changed, which sets its memory itself and tells of changes",
+            source: "Andersson 1985; Willsky and Jones 1976; Adams and MacKay 2007; the book, page A person who changes",
+            structures: &[Structure::BoxJenkins, Structure::OutputError, Structure::General],
+            defaults: &[],
+        }
+    }
+
+    fn usual_nd(&self) -> Option<usize> {
+        Some(USUAL_ND)
+    }
+
+    /// It follows from a model of the change.
+    fn usual_memory(&self, _parameter: &str) -> Memory {
+        Memory::Infinite
+    }
+
+    fn check(&self, setup: &Setup) -> Result<(), IdentError> {
+        check_model_of_change("multiple-model", setup)?;
+        if self.smooth && self.delay.track_delay_s.is_some() {
+            return Err(bad_option(
+                "the range of the delay",
+                "with the two-sided estimate".to_owned(),
+                "a delay that is given or searched on the start span: past and future are joined for one delay",
+            ));
+        }
+        Ok(())
+    }
+
+    fn build(
+        &self,
+        setup: &Setup,
+        from: &StartState,
+        sample_time: SampleTime,
+    ) -> Result<Box<dyn Recursion>, IdentError> {
+        match setup.track_delay_s {
+            None => Ok(Box::new(MultipleModelRecursion::<HYPOTHESES>::new(
+                self,
+                setup,
+                from,
+                sample_time,
+            )?)),
+            Some(_) => Ok(Box::new(MultipleModelRecursion::<WITH_DELAYS>::new(
+                self,
+                setup,
+                from,
+                sample_time,
+            )?)),
+        }
+    }
+
+    fn is_physical(&self) -> bool {
+        true
+    }
+
+    fn is_model_of_change(&self) -> bool {
+        true
+    }
+
+    fn memory_in_words(&self) -> Option<String> {
+        Some(format!(
+            "since the last change, by a bank of hypotheses; a change is declared at log odds of {}",
+            self.alarm
+        ))
+    }
+
+    fn smooths(&self) -> bool {
+        self.smooth
+    }
+
+    fn two_sided(&self, record: &Record, causal: &Causal, from: &StartState) -> Result<Vec<TwoSided>, IdentError> {
+        smoother::smooth(self.alarm, record, causal, from)
+    }
+
+    fn guard(&self) -> Option<GuardChoice> {
+        self.guard.guard.or(Some(GuardChoice::Yes))
+    }
+
+    fn limit(&self) -> f64 {
+        self.limit.unwrap_or(LIMIT)
+    }
+
+    fn bounds(&self) -> BTreeMap<String, Constraint> {
+        self.bounds.bound.clone()
+    }
+
+    fn track_delay_s(&self) -> Option<(f64, f64)> {
+        self.delay.track_delay_s
+    }
+
+    fn retain(&mut self, known: &dyn Fn(&str) -> bool) {
+        self.bounds.bound.retain(|key, _| known(key));
+    }
+}
+
+/// The bank with its filters and its delay line, which is as long as the shortest delay.
+struct MultipleModelRecursion<const M: usize> {
+    model: Box<MultipleModelFilter<M, LARGEST_ND, Vec<Signals>>>,
+    delay: DelayLine<Vec<f64>>,
+    shortest: usize,
+    sample_time: SampleTime,
+    reported: Reported,
+}
+
+impl<const M: usize> MultipleModelRecursion<M> {
+    fn new(
+        options: &MultipleModelOptions,
+        setup: &Setup,
+        from: &StartState,
+        sample_time: SampleTime,
+    ) -> Result<Self, IdentError> {
+        let (nk, delays) = (setup.orders.nk, delays(setup, sample_time));
+        let shortest = *delays.start();
+        if !delays.contains(&nk) {
+            return Err(bad(&format!(
+                "its delay of nk = {nk} is not among those that are tracked, {shortest} to {}",
+                delays.end()
+            )));
+        }
+        let first = first_hypothesis(from, 1.0, sample_time)?.with_extra_delay(nk - shortest);
+        let d = &from.values[OPERATOR..];
+        let memory = vec![[0.0; 6]; delays.count()];
+        let model =
+            MultipleModelFilter::with_delays(first, d, change_prior(options.alarm, setup, sample_time)?, memory)
+                .ok_or_else(outside)?;
+        Ok(Self {
+            model: Box::new(model),
+            delay: DelayLine::new(vec![0.0; shortest]),
+            shortest,
+            sample_time,
+            reported: Reported::new(from, nk, sample_time),
+        })
+    }
+
+    /// tau_e in s from a mean and a variance of the delay in samples beyond the shortest; no
+    /// variance where it is known.
+    fn delay_s(&self, [later, variance]: [f64; 2]) -> Estimate {
+        let ts = self.sample_time.s();
+        let tau_e_s = (self.shortest as f64 - 1.0 + later) * ts;
+        match self.model.bank().delays() {
+            1 => Estimate::fixed(tau_e_s),
+            _ => Estimate::with_variance(tau_e_s, variance * ts * ts),
+        }
+    }
+}
+
+/// A change of the kernel in seconds, with the delay tau_e before and after.
+fn declared(change: &kernel_change::Change, tau_e_s: [Estimate; 2], sample_time: SampleTime) -> Change {
+    let (before, now) = (&change.before, &change.after);
+    let pair = |i: usize| {
+        let of = |b: &kernel::Snapshot| {
+            if i < 2 {
+                b.gain_covariance[i]
+            } else {
+                b.neuromuscular_variance[i - 2]
+            }
+        };
+        [before, now].map(|b| Estimate::with_variance(b.eta[i], of(b)))
+    };
+    let lead = |b: &kernel::Snapshot| {
+        (b.eta[0] * b.eta[1] + b.gain_covariance[2]) / (b.eta[0] * b.eta[0] + b.gain_covariance[0])
+    };
+    Change {
+        seconds_ago: change.samples_ago as f64 * sample_time.s(),
+        odds: change.log_odds,
+        k_e: pair(0),
+        k_e_dot: pair(1),
+        omega_nm_rad_s: pair(2),
+        zeta_nm: pair(3),
+        tau_e_s,
+        t_l_s: [lead(before), lead(now)],
+        innovation_variance: [before.innovation_variance, now.innovation_variance],
+        z: change.z,
+        of_operator: false,
+    }
+}
+
+impl<const M: usize> State for MultipleModelRecursion<M> {
+    fn visit(&mut self, each: &mut dyn FnMut(&mut f64)) {
+        visit_all(&mut [&mut *self.model, &mut self.delay, &mut self.reported], each);
+    }
+}
+
+impl<const M: usize> Recursion for MultipleModelRecursion<M> {
+    fn step(&mut self, sample: Sample) -> StepOutcome {
+        let x = self.delay.step(sample.e);
+        let step = self.model.step(x, sample.u);
+        self.reported.set(self.model.bank().mixture().eta);
+        step.into()
+    }
+
+    fn follow(&mut self, sample: Sample) -> StepOutcome {
+        let x = self.delay.step(sample.e);
+        self.model.step_without_update(x, sample.u).into()
+    }
+
+    fn bridge(&mut self, sample: Sample) {
+        let x = self.delay.step(sample.e);
+        self.model.bridge(x);
+    }
+
+    fn theta(&self) -> &[f64] {
+        self.reported.theta()
+    }
+
+    fn covariance(&self, into: &mut [f64]) -> bool {
+        self.reported.covariance(&self.model.bank().covariance(), into);
+        true
+    }
+
+    fn innovation_variance(&self) -> f64 {
+        self.model.bank().mixture().variance
+    }
+
+    fn operator(&self) -> Option<OperatorEstimate> {
+        let bank = self.model.bank();
+        let covariance = bank.covariance();
+        let operator = self
+            .reported
+            .operator(bank.mixture().eta, &covariance, bank.lead_time(&covariance));
+        Some(OperatorEstimate {
+            tau_e_s: self.delay_s(bank.delay()),
+            ..operator
+        })
+    }
+
+    fn change_odds(&self) -> Option<f64> {
+        Some(self.model.bank().log_odds())
+    }
+
+    fn change(&self) -> Option<Change> {
+        let change = self.model.bank().change()?;
+        let tau_e_s = [change.before, change.after].map(|b| self.delay_s(b.delay));
+        Some(declared(&change, tau_e_s, self.sample_time))
+    }
+}

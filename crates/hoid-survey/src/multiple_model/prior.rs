@@ -1,0 +1,135 @@
+//! What is supposed of a person and of their changes, in seconds, and the first hypothesis.
+
+use std::ops::RangeInclusive;
+
+use hoid_core::innovation_variance::InnovationVariance;
+use hoid_ident::IdentError;
+use hoid_model::SampleTime;
+use hoid_track::building::{Setup, StartState, physical_bounds};
+
+use crate::kernel::multiple_model::{
+    hypothesis::Hypothesis,
+    prior::{ChangePrior, DelayPrior, OPERATOR},
+};
+
+/// Time between two births, s.
+const SPACING_S: f64 = 0.32;
+/// Mean time between two changes, s.
+const BETWEEN_CHANGES_S: f64 = 60.0;
+/// Change of K_e and of K_e_dot to be expected, in the units of [`ChangePrior::gain_jump`].
+const JUMP: [f64; 2] = [0.15, 0.5];
+/// Drift of the gains in one second, in the same units.
+const DRIFT: f64 = 0.005;
+/// The drift just after a change, for K_e and K_e_dot in the same units, for omega_nm and zeta_nm
+/// in those of a change of them; and how long it lasts, s.
+const UNREST: [f64; OPERATOR] = [0.05, 0.25, 0.2, 0.2];
+const UNREST_FOR_S: f64 = 3.0;
+/// Relative change of omega_nm and of zeta_nm to be expected, how many births there are for one of
+/// this kind, and its odds against the other.
+const NEUROMUSCULAR: [f64; 2] = [0.25, 0.4];
+const WHOLE_EVERY: u32 = 4;
+const WHOLE_ODDS: f64 = 0.3;
+/// Crossover at which the gains are compared, rad/s.
+const CROSSOVER_RAD_S: f64 = 2.0;
+/// Memory of the innovation variance, and what of it is left after a change, s.
+const LEVEL_MEMORY_S: f64 = 20.0;
+const DOUBT_S: f64 = 1.0;
+/// Births for which a hypothesis is kept whatever it foretells.
+const PROTECTED_BIRTHS: f64 = 4.0;
+/// Age from which a hypothesis can say what changed, s.
+const SETTLED_S: f64 = 0.5;
+/// A hypothesis of up to this age stands for a change, s.
+const RECENT_S: f64 = 4.0;
+
+/// Births for one time at which other delays are proposed, how many of them, the odds of a change
+/// of the delay against one of the gains alone, its standard deviation in s, and the probability of
+/// a delay next to the likeliest.
+const DELAYS_EVERY: u32 = 4;
+const DELAYS_PROPOSED: usize = 8;
+const DELAY_ODDS: f64 = 1.0;
+const DELAY_JUMP_S: f64 = 0.05;
+const NEIGHBOUR: f64 = 0.15;
+/// What 0.01 s of delay is worth in K_e, K_e_dot, omega_nm and zeta_nm, in the units of
+/// [`DelayPrior::error_per_sample`].
+const WORTH: [f64; OPERATOR] = [0.01, 0.03, 0.04, 0.08];
+
+/// The delays in question, in samples of nk: nk itself, or those of the range that is tracked.
+pub(super) fn delays(setup: &Setup, sample_time: SampleTime) -> RangeInclusive<usize> {
+    match setup.track_delay_s {
+        None => setup.orders.nk..=setup.orders.nk,
+        Some((low, high)) => sample_time.nk(low)..=sample_time.nk(high),
+    }
+}
+
+/// What is supposed of changes, in samples.
+///
+/// # Errors
+/// As [`physical_bounds`].
+pub(super) fn change_prior(alarm: f64, setup: &Setup, sample_time: SampleTime) -> Result<ChangePrior, IdentError> {
+    let ts = sample_time.s();
+    let spacing = (SPACING_S / ts).round().max(1.0);
+    Ok(ChangePrior {
+        sample_time: ts,
+        bounds: physical_bounds::<OPERATOR>(setup, sample_time)?,
+        birth_interval: spacing as u32,
+        // Where samples are further apart than changes are supposed to be, half of them.
+        hazard: (ts / BETWEEN_CHANGES_S).min(0.5 / spacing),
+        gain_jump: JUMP,
+        gain_drift: DRIFT * ts.sqrt(),
+        transient_drift: UNREST.map(|u| u * ts.sqrt()),
+        transient_time_constant: UNREST_FOR_S / ts,
+        neuromuscular_jump: NEUROMUSCULAR,
+        neuromuscular_every: WHOLE_EVERY,
+        neuromuscular_odds: WHOLE_ODDS,
+        crossover: CROSSOVER_RAD_S,
+        residuals_after_change: (DOUBT_S / ts).max(4.0),
+        pruning_age: (PROTECTED_BIRTHS * spacing) as u64,
+        outlier_limit: setup.limit,
+        settling_time: (SETTLED_S / ts).round() as u64,
+        change_window: (RECENT_S / ts).round().max(2.0 * spacing) as u64,
+        log_odds_threshold: alarm,
+        delay: match delays(setup, sample_time).count() {
+            1 => DelayPrior::KNOWN,
+            count => DelayPrior {
+                count,
+                propose_every: DELAYS_EVERY,
+                change_odds: DELAY_ODDS,
+                proposals: DELAYS_PROPOSED,
+                jump: DELAY_JUMP_S / ts,
+                neighbour_probability: NEIGHBOUR,
+                error_per_sample: WORTH.map(|w| w * ts / 0.01),
+            },
+        },
+    })
+}
+
+/// The first hypothesis, from the batch fit of the start span, its covariance so many times larger.
+///
+/// # Errors
+/// [`IdentError::BadStart`] without a fit, or where it lies outside the bounds.
+pub(super) fn first_hypothesis(
+    from: &StartState,
+    times: f64,
+    sample_time: SampleTime,
+) -> Result<Hypothesis, IdentError> {
+    if !from.from_fit {
+        return Err(bad(
+            "multiple-model needs the noise model of a batch fit; start it from the fit of a span",
+        ));
+    }
+    let p = from.values.len();
+    let covariance = std::array::from_fn(|i| std::array::from_fn(|j| times * from.variance * from.spread[i * p + j]));
+    let memory = (LEVEL_MEMORY_S / sample_time.s()).max(10.0);
+    let level = InnovationVariance::new(from.variance, from.residuals.clamp(1.0, memory), 1.0 - 1.0 / memory);
+    Hypothesis::new(std::array::from_fn(|i| from.values[i]), &covariance, level).ok_or_else(outside)
+}
+
+pub(super) fn bad(reason: &str) -> IdentError {
+    IdentError::BadStart {
+        reason: reason.to_owned(),
+    }
+}
+
+pub(super) fn outside() -> IdentError {
+    bad("it lies outside the bounds of the physical parameters, or its covariance is not positive")
+}

@@ -1,0 +1,363 @@
+//! The two-sided estimate of a recorded run: what all of its samples say of the operator at each of
+//! them.
+//!
+//! Behind the whitening filter the model of [`crate::kernel::multiple_model`] has no dynamics:
+//! `y(t) = K_e psi_1 + K_e_dot psi_2 + eps`, with signals that the record gives once for all. The
+//! bank of hypotheses may therefore be run over it from either end. At t the run from the front
+//! says `p(eta_t | y_1..y_t) = sum_f P(f) N(m_f, P_f)`, where f says when the person changed last,
+//! and the run from the back `p(y_{t+1}..y_N | eta_t)`, in proportion to `sum_b P(b) N(m_b, P_b)`,
+//! where b says when the person will change next. The product is the two-filter smoother (D. C.
+//! Fraser and J. E. Potter, *IEEE Transactions on Automatic Control* 14 (1969) 387-390), here of
+//! two mixtures (G. Kitagawa, *Annals of the Institute of Statistical Mathematics* 46 (1994)
+//! 605-623): with `S = P_f + P_b`,
+//!
+//! - `m = m_f + P_f S^-1 (m_b - m_f)`, `P = P_f - P_f S^-1 P_f`;
+//! - `P(f, b) ~ P(f) P(b) N(m_b - m_f; 0, S)`: a past and a future that contradict each other are
+//!   not joined.
+//!
+//! Each hypothesis has an innovation variance s2 that rests on n residuals; the same holds for
+//! `ln s2`, of variance 2/n. What is printed is mean and covariance of the mixture of pairs.
+//!
+//! The run from the back needs a start about which it is linear: it is the end of the run from the
+//! front, with [`KNOWN_LITTLE`] times the covariance of the start fit, and so is that of the run
+//! from the front. What counts twice is one part in so many. omega_nm and zeta_nm, about which the
+//! filters stand, are those at the end of the causal estimate.
+//!
+//! There is time for more hypotheses here: one is born every 0.08 s, and there is room for 64.
+
+use crate::kernel::multiple_model::{
+    bank::Bank,
+    hypothesis::Hypothesis,
+    prior::{ChangePrior, OPERATOR},
+    response::{Response, Signals},
+    signal_ring::DelayedSignals,
+};
+use hoid_model::Record;
+use hoid_numerics::{cholesky, products::dot};
+
+use hoid_ident::IdentError;
+use hoid_track::building::{Causal, Reported, Setup, StartState, TwoSided};
+
+use super::prior::{change_prior, first_hypothesis, outside};
+
+/// Room for hypotheses, and time between two births, s.
+const HYPOTHESES: usize = 64;
+const SPACING_S: f64 = 0.08;
+/// Multiple of the covariance of the start fit from which both runs begin.
+const KNOWN_LITTLE: f64 = 100.0;
+/// Time constants of the neuromuscular system after which the filters have forgotten that they
+/// began at rest.
+const SETTLED: f64 = 6.0;
+/// Least probability of a hypothesis that is joined, and least share of a pair in the largest.
+const LEAST: f64 = 1e-3;
+/// Signals beyond this would overflow in products.
+const LARGEST: f64 = 1e60;
+
+/// A hypothesis as it is joined with others.
+#[derive(Debug, Clone, Copy)]
+struct Side {
+    log_weight: f64,
+    eta: [f64; OPERATOR],
+    covariance: [[f64; OPERATOR]; OPERATOR],
+    /// Half the logarithm of the determinant of all variances.
+    size: f64,
+    /// Logarithm of the innovation variance, and the variance of this logarithm.
+    level: [f64; 2],
+}
+
+impl Side {
+    fn of(h: &Hypothesis) -> Self {
+        let level = [
+            h.innovation_variance.variance().max(f64::MIN_POSITIVE).ln(),
+            2.0 / h.innovation_variance.residuals().max(1.0),
+        ];
+        Self {
+            log_weight: h.probability.ln(),
+            eta: h.eta,
+            covariance: h.covariance.matrix(),
+            size: 0.5 * (h.covariance.determinant() * level[1]).ln(),
+            level,
+        }
+    }
+}
+
+/// Mean, covariance and innovation variance of a mixture.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Joined {
+    pub eta: [f64; OPERATOR],
+    pub covariance: [[f64; OPERATOR]; OPERATOR],
+    pub variance: f64,
+}
+
+/// Output and signals behind the whitening filter; `None` where they are not known.
+type Seen = Option<(f64, Signals)>;
+
+/// The two-sided estimates of the rows of a causal run.
+///
+/// # Errors
+/// [`IdentError::BadStart`] for a start that cannot be used.
+pub(super) fn smooth(
+    alarm: f64,
+    record: &Record,
+    causal: &Causal,
+    from: &StartState,
+) -> Result<Vec<TwoSided>, IdentError> {
+    let about = causal.last.map_or([from.values[2], from.values[3]], |o| {
+        [o.omega_nm_rad_s.value, o.zeta_nm.value]
+    });
+    let joined = two_sided(record, alarm, &causal.setup, causal.largest, from, about, &causal.rows)?;
+    let mut reported = Reported::new(from, causal.setup.orders.nk, record.sample_time());
+    let p = reported.theta().len();
+    let mut row = |of: &Joined| {
+        let mut covariance = vec![0.0; p * p];
+        reported.set(of.eta);
+        reported.covariance(&of.covariance, &mut covariance);
+        TwoSided {
+            theta: reported.theta().to_vec(),
+            covariance,
+            operator: reported.operator(of.eta, &of.covariance, lead(of)),
+            innovation_variance: of.variance,
+        }
+    };
+    Ok(joined.iter().map(&mut row).collect())
+}
+
+/// The mixtures of pairs at the samples asked for, ascending.
+fn two_sided(
+    record: &Record,
+    alarm: f64,
+    setup: &Setup,
+    largest: f64,
+    from: &StartState,
+    about: [f64; 2],
+    rows: &[usize],
+) -> Result<Vec<Joined>, IdentError> {
+    let sample_time = record.sample_time();
+    let spacing = (SPACING_S / sample_time.s()).round().max(1.0);
+    let usual = change_prior(alarm, setup, sample_time)?;
+    let supposed = ChangePrior {
+        birth_interval: spacing as u32,
+        hazard: usual.hazard.min(0.5 / spacing),
+        neuromuscular_every: 0,
+        ..usual
+    };
+    let first = first_hypothesis(from, KNOWN_LITTLE, sample_time)?;
+    let bank = |first: Hypothesis| -> Result<Box<Bank<HYPOTHESES>>, IdentError> {
+        Ok(Box::new(Bank::new(first, supposed).ok_or_else(outside)?))
+    };
+    let d = &from.values[OPERATOR..];
+    let seen = whitened(record, setup.orders.nk, largest, d, about);
+    let mut front = bank(first)?;
+    let mut before: Vec<Vec<Side>> = Vec::with_capacity(rows.len());
+    for (k, seen) in seen.iter().enumerate() {
+        front.update_hypotheses(seen.as_ref().map(|(y, r)| (*y, DelayedSignals::known(r))), about);
+        if rows.get(before.len()) == Some(&k) {
+            before.push(sides(&front));
+        }
+    }
+    let mut last = first;
+    last.eta = front.mixture().eta;
+    let mut back = bank(last)?;
+    let mut joined = Vec::with_capacity(rows.len());
+    for (k, seen) in seen.iter().enumerate().rev() {
+        if before.len().checked_sub(1).and_then(|last| rows.get(last)) == Some(&k)
+            && let Some(before) = before.pop()
+        {
+            joined.push(join(&before, &sides(&back)));
+        }
+        back.update_hypotheses(seen.as_ref().map(|(y, r)| (*y, DelayedSignals::known(r))), about);
+    }
+    joined.reverse();
+    Ok(joined)
+}
+
+/// Output and signals of every sample behind D, for filters about a point that began at rest.
+fn whitened(record: &Record, nk: usize, largest: f64, d: &[f64], about: [f64; 2]) -> Vec<Seen> {
+    let (e, u) = (record.input(), record.output());
+    let sound = |v: f64| v.abs() <= largest;
+    let mut response = Response::new(about, record.sample_time().s());
+    let settled = SETTLED / (about[0] * about[1] * record.sample_time().s());
+    let begin = nk + d.len() + settled.min(record.len() as f64 / 4.0) as usize;
+    let mut signals: Vec<Signals> = Vec::with_capacity(e.len());
+    let (mut last, mut held) = (0.0, vec![0.0; e.len()]);
+    for (held, e) in held.iter_mut().zip(e) {
+        if sound(*e) {
+            last = *e;
+        }
+        *held = last;
+    }
+    (0..u.len())
+        .map(|t| {
+            let x = t.checked_sub(nk).map_or(0.0, |s| held[s]);
+            signals.push(response.step(x));
+            let known = t >= begin && sound(e[t]) && (0..=d.len()).all(|j| sound(u[t - j]));
+            if !known {
+                return None;
+            }
+            let (mut y, mut r) = (u[t], signals[t]);
+            for (j, d) in d.iter().enumerate() {
+                y += d * u[t - 1 - j];
+                for (r, past) in r.iter_mut().zip(&signals[t - 1 - j]) {
+                    *r += d * past;
+                }
+            }
+            let finite = y.abs() < LARGEST && r.iter().all(|r| r.abs() < LARGEST);
+            finite.then_some((y, r))
+        })
+        .collect()
+}
+
+/// The likely hypotheses, the likeliest first: a pair of these leaves out most of the others.
+fn sides(bank: &Bank<HYPOTHESES>) -> Vec<Side> {
+    let likely = bank.hypotheses().filter(|h| h.probability >= LEAST);
+    let mut sides: Vec<Side> = likely.map(Side::of).collect();
+    sides.sort_by(|a, b| b.log_weight.total_cmp(&a.log_weight));
+    sides
+}
+
+/// The product of two mixtures.
+fn join(before: &[Side], after: &[Side]) -> Joined {
+    let mut pairs: Vec<(f64, Pair)> = Vec::with_capacity(before.len() + after.len());
+    let (mut most, least) = (f64::NEG_INFINITY, LEAST.ln());
+    for f in before {
+        for b in after {
+            // Not a number where nothing is bounded: such a pair is tried.
+            let highest = f.log_weight + b.log_weight - f.size.max(b.size);
+            if highest < most + least || highest - Pair::half_square(f, b) < most + least {
+                continue;
+            }
+            if let Some((log, pair)) = Pair::of(f, b) {
+                most = most.max(log);
+                pairs.push((log, pair));
+            }
+        }
+    }
+    pairs.retain(|(log, _)| *log >= most + least);
+    let each: Vec<(f64, Joined)> = if pairs.is_empty() {
+        // Nothing could be joined: what the past says alone.
+        let shares = before.iter().map(|f| (f.log_weight.exp(), alone(f)));
+        shares.collect()
+    } else {
+        let shares = pairs.iter().map(|(log, pair)| ((log - most).exp(), pair.product()));
+        shares.collect()
+    };
+    mixed(&each)
+}
+
+/// Mean and covariance of a mixture.
+fn mixed(each: &[(f64, Joined)]) -> Joined {
+    let total: f64 = each.iter().map(|(share, _)| share).sum();
+    let mut mixture = Joined {
+        eta: [0.0; OPERATOR],
+        covariance: [[0.0; OPERATOR]; OPERATOR],
+        variance: 0.0,
+    };
+    for (share, of) in each {
+        for i in 0..OPERATOR {
+            mixture.eta[i] += share / total * of.eta[i];
+        }
+        mixture.variance += share / total * of.variance;
+    }
+    for (share, of) in each {
+        let away: [f64; OPERATOR] = std::array::from_fn(|i| of.eta[i] - mixture.eta[i]);
+        for i in 0..OPERATOR {
+            for j in 0..OPERATOR {
+                mixture.covariance[i][j] += share / total * (of.covariance[i][j] + away[i] * away[j]);
+            }
+        }
+    }
+    mixture
+}
+
+fn alone(f: &Side) -> Joined {
+    Joined {
+        eta: f.eta,
+        covariance: f.covariance,
+        variance: f.level[0].exp(),
+    }
+}
+
+/// A past and a future, with `L L' = S` and `z = L^-1 (m_b - m_f)`.
+struct Pair<'a> {
+    f: &'a Side,
+    b: &'a Side,
+    root: [[f64; OPERATOR]; OPERATOR],
+    z: [f64; OPERATOR],
+}
+
+impl<'a> Pair<'a> {
+    /// What the difference takes from the logarithm of the weight, at least: `z'z` is no less than
+    /// the square of one difference over its variance. As S is larger than either covariance,
+    /// neither of these bounds is crossed but for rounding.
+    fn half_square(f: &Side, b: &Side) -> f64 {
+        let apart = b.level[0] - f.level[0];
+        let mut square = 0.0_f64;
+        for i in 0..OPERATOR {
+            let away = b.eta[i] - f.eta[i];
+            square = square.max(away * away / (f.covariance[i][i] + b.covariance[i][i]));
+        }
+        0.5 * (square + apart * apart / (f.level[1] + b.level[1])) - 0.01
+    }
+
+    /// The pair with the logarithm of its weight up to a constant. `None` where S is not positive.
+    fn of(f: &'a Side, b: &'a Side) -> Option<(f64, Self)> {
+        let sum = std::array::from_fn(|i| std::array::from_fn(|j| f.covariance[i][j] + b.covariance[i][j]));
+        let root = factor(&sum)?;
+        let mut z = std::array::from_fn(|i| b.eta[i] - f.eta[i]);
+        cholesky::forward(&root, OPERATOR, &mut z);
+        let determinant: f64 = (0..OPERATOR).map(|i| root[i][i]).product();
+        let spread = f.level[1] + b.level[1];
+        let apart = b.level[0] - f.level[0];
+        let square = dot(&z, &z) + apart * apart / spread;
+        let log = f.log_weight + b.log_weight - (determinant * spread.sqrt()).ln() - 0.5 * square;
+        log.is_finite().then_some((log, Self { f, b, root, z }))
+    }
+
+    /// `P_f S^-1 x = (L^-1 P_f)' L^-1 x`.
+    fn product(&self) -> Joined {
+        let (f, b) = (self.f, self.b);
+        let mut columns = f.covariance;
+        columns
+            .iter_mut()
+            .for_each(|column| cholesky::forward(&self.root, OPERATOR, column));
+        let taken = |i: usize, j: usize| f.covariance[i][j] - dot(&columns[i], &columns[j]);
+        let level = (f.level[0] * b.level[1] + b.level[0] * f.level[1]) / (f.level[1] + b.level[1]);
+        Joined {
+            eta: std::array::from_fn(|i| f.eta[i] + dot(&columns[i], &self.z)),
+            covariance: std::array::from_fn(|i| std::array::from_fn(|j| taken(i, j))),
+            variance: level.exp(),
+        }
+    }
+}
+
+/// L with `L L' = s`. Known products are added up before they are taken away, as [`cholesky::forward`] does;
+/// [`cholesky::factor`] is the same but for rounding.
+fn factor(s: &[[f64; OPERATOR]; OPERATOR]) -> Option<[[f64; OPERATOR]; OPERATOR]> {
+    let mut l = [[0.0; OPERATOR]; OPERATOR];
+    for i in 0..OPERATOR {
+        for j in 0..=i {
+            let rest = s[i][j] - (0..j).map(|k| l[i][k] * l[j][k]).sum::<f64>();
+            if i == j {
+                if !(rest > 0.0 && rest.is_finite()) {
+                    return None;
+                }
+                l[i][i] = rest.sqrt();
+            } else {
+                l[i][j] = rest / l[j][j];
+            }
+        }
+    }
+    Some(l)
+}
+
+/// T_L in s and its variance, from `E[K_e K_e_dot]/E[K_e^2]`.
+fn lead(row: &Joined) -> [f64; 2] {
+    let ([k_e, k_e_dot, ..], c) = (row.eta, &row.covariance);
+    let square = k_e * k_e + c[0][0];
+    let lead = (k_e * k_e_dot + c[0][1]) / square;
+    let of_ratio = c[1][1] - 2.0 * lead * c[0][1] + lead * lead * c[0][0];
+    [lead, of_ratio.max(0.0) / square]
+}
+
+#[cfg(test)]
+mod tests;

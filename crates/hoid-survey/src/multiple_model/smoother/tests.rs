@@ -1,0 +1,146 @@
+#![allow(clippy::unwrap_used)]
+use super::*;
+use crate::{methods, multiple_model};
+use hoid_model::{
+    Channel, SampleTime,
+    scenario::{Condition, Scenario},
+};
+use hoid_sim::{RunSeed, Simulator};
+use hoid_track::{StartAt, TrackOptions, track};
+
+fn side(eta: [f64; OPERATOR], scale: f64, weight: f64) -> Side {
+    // Positive: a unit matrix and a rank-one matrix.
+    let direction = [0.3, -0.5, 0.2, 0.7];
+    Side {
+        log_weight: weight.ln(),
+        eta,
+        covariance: std::array::from_fn(|i| {
+            std::array::from_fn(|j| scale * (f64::from(u8::from(i == j)) + direction[i] * direction[j]))
+        }),
+        // 1 + |direction|^2 is the eigenvalue that is not one.
+        size: 0.5 * (scale.powi(4) * 1.87 * 0.02).ln(),
+        level: [0.1 * scale, 0.02],
+    }
+}
+
+#[test]
+fn a_product_is_that_of_the_information_form() {
+    let (f, b) = (
+        side([1.0, 2.0, 3.0, 4.0], 0.5, 0.4),
+        side([1.5, 1.0, 3.5, 4.2], 2.0, 0.6),
+    );
+    let (_, pair) = Pair::of(&f, &b).unwrap();
+    let joined = pair.product();
+    let square = |m: &[[f64; OPERATOR]; OPERATOR]| nalgebra::Matrix4::from_fn(|i, j| m[i][j]);
+    let inverse = |s: &Side| square(&s.covariance).try_inverse().unwrap();
+    let covariance = (inverse(&f) + inverse(&b)).try_inverse().unwrap();
+    let vector = |s: &Side| nalgebra::Vector4::from(s.eta);
+    let mean = covariance * (inverse(&f) * vector(&f) + inverse(&b) * vector(&b));
+    for i in 0..OPERATOR {
+        assert!((joined.eta[i] - mean[i]).abs() < 1e-13);
+        for j in 0..OPERATOR {
+            assert!((joined.covariance[i][j] - covariance[(i, j)]).abs() < 1e-13);
+        }
+    }
+}
+
+#[test]
+fn a_past_and_a_future_that_contradict_each_other_are_not_joined() {
+    let old = side([1.0; OPERATOR], 0.01, 0.9);
+    let (same, other) = (side([1.0; OPERATOR], 0.01, 0.5), side([9.0; OPERATOR], 0.01, 0.5));
+    let joined = join(&[old], &[same, other]);
+    assert!((joined.eta[0] - 1.0).abs() < 1e-9);
+    // Which is which does not matter.
+    let mirrored = join(&[same, other], &[old]);
+    for i in 0..OPERATOR {
+        assert!((joined.eta[i] - mirrored.eta[i]).abs() < 1e-12);
+    }
+    // Covariances that are no numbers leave the past alone.
+    let broken = Side {
+        covariance: [[f64::NAN; OPERATOR]; OPERATOR],
+        ..old
+    };
+    assert_eq!(join(&[old], &[broken]).eta, old.eta);
+}
+
+fn options() -> TrackOptions {
+    TrackOptions {
+        start: StartAt::Span(Some((0.0, 30.72))),
+        ..TrackOptions::new(
+            multiple_model().with("smooth", "true").unwrap(),
+            multiple_model().usual_structure(),
+            multiple_model().usual_orders(29),
+        )
+    }
+}
+
+fn run(condition: Condition) -> Record {
+    let run_seed = RunSeed {
+        seed: 77,
+        cell: 0,
+        replication: 0,
+    };
+    Simulator::new(&Scenario::condition(condition))
+        .unwrap()
+        .run(run_seed, false)
+        .unwrap()
+}
+
+#[test]
+fn without_a_change_all_rows_say_nearly_the_same() {
+    let trace = track(&run(Condition::C1), &options(), 256).unwrap();
+    let rows: Vec<_> = (0..trace.len()).map(|row| trace.operator(row).unwrap()).collect();
+    let last = rows[rows.len() / 2];
+    for row in &rows {
+        for ((_, _, a), (_, _, b)) in row.rows()[..5].iter().zip(last.rows()) {
+            let se = b.standard_error.unwrap();
+            // What drifts within half a run is less than what is known of it.
+            assert!((a.value - b.value).abs() < 2.0 * se, "{a:?} {b:?}");
+        }
+    }
+    assert_eq!(trace.updated_from_s(), 0.0);
+}
+
+#[test]
+fn a_record_with_faults_and_one_that_is_too_short() {
+    let record = run(Condition::C4);
+    let (mut e, mut u) = (record.input().to_vec(), record.output().to_vec());
+    let clean = track(&record, &options(), 512).unwrap();
+    for k in [3200, 3201, 5000, 8191] {
+        u[k] = 2e6;
+    }
+    (e[4000], u[4001]) = (-1e9, 1e300);
+    assert!(
+        Record::new(
+            SampleTime::HUNDREDTH,
+            Channel::new("e", "deg", vec![f64::NAN; 2]),
+            Channel::new("u", "deg", vec![0.0; 2])
+        )
+        .is_err()
+    );
+    let faulty = Record::new(
+        SampleTime::HUNDREDTH,
+        Channel::new("e", "deg", e),
+        Channel::new("u", "deg", u),
+    )
+    .unwrap();
+    let trace = track(&faulty, &options(), 512).unwrap();
+    for row in 0..trace.len() {
+        let (a, b) = (clean.operator(row).unwrap(), trace.operator(row).unwrap());
+        assert!((a.k_e_dot.value - b.k_e_dot.value).abs() < 0.5 * a.k_e_dot.standard_error.unwrap().max(1e-3));
+    }
+    let short = record.span(0.0, 0.5).unwrap();
+    let all = TrackOptions {
+        start: StartAt::Span(None),
+        ..options()
+    };
+    assert!(track(&short, &all, 1).is_err());
+}
+
+#[test]
+fn other_methods_have_no_two_sided_estimate() {
+    for method in methods().into_iter().filter(|m| *m != multiple_model()) {
+        let name = method.name();
+        assert!(method.with("smooth", "true").is_err(), "{name}");
+    }
+}

@@ -1,0 +1,109 @@
+//! The recursive prediction-error method in the operator's parameters: its gradient is that of the
+//! polynomials times the Jacobian of theta.
+
+mod recursion;
+
+use std::collections::BTreeMap;
+
+use hoid_core::recursion::Stable;
+use hoid_ident::{Constraint, IdentError, settings};
+use hoid_model::{SampleTime, Structure};
+
+use hoid_track::{
+    BoundOptions, DelayOptions, GainOptions, GuardChoice, GuardOptions, Memory, StabilityOptions,
+    building::{
+        About, Plan, Recursion, RecursiveMethod, Setup, StartState, USUAL_LIMIT, check_delay, check_operator_orders,
+    },
+};
+
+settings! {
+    /// Options of the recursion in physical parameters.
+    pub struct PhysicalOptions {}
+    groups {
+        /// The gain.
+        pub gain: GainOptions,
+        /// Stability.
+        pub stability: StabilityOptions,
+        /// Bounds.
+        pub bounds: BoundOptions,
+        /// A delay that is followed.
+        pub delay: DelayOptions,
+        /// The guard.
+        pub guard: GuardOptions,
+    }
+}
+
+impl RecursiveMethod for PhysicalOptions {
+    fn about(&self) -> About {
+        About {
+            name: "physical",
+            help: "recursive prediction-error method in the operator's parameters",
+            source: "Ljung 1999, section 11.5, with the Jacobian of the exact hold",
+            structures: &[Structure::BoxJenkins, Structure::OutputError, Structure::General],
+            defaults: &[
+                ("memory", "5s for K_e, 1.5s for K_e_dot, inf for the others"),
+                ("limit", "5"),
+            ],
+        }
+    }
+
+    /// A person hardly changes the others within a run.
+    fn usual_memory(&self, parameter: &str) -> Memory {
+        match parameter {
+            "K_e" => Memory::Seconds(5.0),
+            "K_e_dot" => Memory::Seconds(1.5),
+            _ => Memory::Infinite,
+        }
+    }
+
+    fn check(&self, setup: &Setup) -> Result<(), IdentError> {
+        check_operator_orders("physical", setup)?;
+        check_delay(&setup.orders)
+    }
+
+    fn build(
+        &self,
+        setup: &Setup,
+        from: &StartState,
+        sample_time: SampleTime,
+    ) -> Result<Box<dyn Recursion>, IdentError> {
+        recursion::build(&Plan::new(setup, from, sample_time))
+    }
+
+    fn is_physical(&self) -> bool {
+        true
+    }
+
+    fn gain(&self) -> Option<&GainOptions> {
+        Some(&self.gain)
+    }
+
+    fn guard(&self) -> Option<GuardChoice> {
+        self.guard.guard.or(Some(GuardChoice::Yes))
+    }
+
+    fn limit(&self) -> f64 {
+        self.gain.limit_or(USUAL_LIMIT)
+    }
+
+    fn stable(&self) -> Stable {
+        self.stability.stable
+    }
+
+    fn bounds(&self) -> BTreeMap<String, Constraint> {
+        self.bounds.bound.clone()
+    }
+
+    fn track_delay_s(&self) -> Option<(f64, f64)> {
+        self.delay.track_delay_s
+    }
+
+    fn delay_is_parameter(&self) -> bool {
+        true
+    }
+
+    fn retain(&mut self, known: &dyn Fn(&str) -> bool) {
+        self.gain.retain(known);
+        self.bounds.bound.retain(|key, _| known(key));
+    }
+}

@@ -1,0 +1,210 @@
+//! All recursive methods by name: those of [`hoid_track`] and those of this crate. A new one is a line
+//! in the list.
+
+use hoid_ident::{IdentError, settings::MethodSpec};
+use hoid_track::{AdaptiveOptions, Method, RlsOptions, RpemOptions, building::bad};
+
+use crate::{
+    DualEkfOptions, EkfOptions, FusedOptions, LinearNetworkOptions, MultipleModelOptions, PhysicalOptions, RrivOptions,
+    UkfOptions, WindowOptions,
+};
+
+macro_rules! methods {
+    ($($(#[doc = $doc:literal])+ $name:ident = $options:ty),+ $(,)?) => {
+        $(
+            $(#[doc = $doc])+
+            pub fn $name() -> Method {
+                <$options>::default().into()
+            }
+        )+
+    };
+}
+
+methods! {
+    /// Recursive prediction-error method in physical parameters.
+    physical = PhysicalOptions,
+    /// Batch fit of the last seconds, again and again.
+    window = WindowOptions,
+    /// Recursive refined instrumental variable: Box-Jenkins with nc = 0.
+    rriv = RrivOptions,
+    /// A bank of hypotheses of when the person changed, in physical parameters: Box-Jenkins with nc
+    /// = 0.
+    multiple_model = MultipleModelOptions,
+    /// Recursive least squares for B with the poles of the recursive prediction-error method:
+    /// Box-Jenkins.
+    fused = FusedOptions,
+    /// Extended Kalman filter of state and physical parameters: Box-Jenkins with nc = 0.
+    ekf = EkfOptions,
+    /// Unscented Kalman filter of state and physical parameters: Box-Jenkins with nc = 0.
+    ukf = UkfOptions,
+    /// Two extended Kalman filters that take turns, of state and of physical parameters: Box-Jenkins with
+    /// nc = 0 and nd = 1.
+    dual_ekf = DualEkfOptions,
+    /// A linear layer that learns K_e and K_e_dot: Box-Jenkins with nc = 0 and nd = 1.
+    linear_network = LinearNetworkOptions,
+}
+
+/// All methods with their defaults, in the order of help.
+pub fn methods() -> Vec<Method> {
+    vec![
+        RlsOptions::default().into(),
+        RpemOptions::default().into(),
+        physical(),
+        window(),
+        rriv(),
+        multiple_model(),
+        AdaptiveOptions::default().into(),
+        fused(),
+        ekf(),
+        ukf(),
+        dual_ekf(),
+        linear_network(),
+    ]
+}
+
+/// True for a method of this crate: help in short does without it.
+pub fn is_for_comparison(method: &Method) -> bool {
+    ![Method::rls(), Method::rpem(), Method::default()]
+        .iter()
+        .any(|own| own.name() == method.name())
+}
+
+/// What is known of each method: what command line, plans, Python and the book read.
+pub fn registry() -> Vec<MethodSpec> {
+    methods().iter().map(Method::spec).collect()
+}
+
+/// A name as it was typed, in the form of the list.
+fn plain(text: &str) -> String {
+    text.trim().to_ascii_lowercase()
+}
+
+/// The method of a name, with its defaults. An earlier name stands in plans and in saved trackers, and is read
+/// as well; who can tell the user says it ([`renamed`]).
+///
+/// # Errors
+/// [`IdentError::BadOption`] for a name that no method has.
+pub fn method(text: &str) -> Result<Method, IdentError> {
+    let plain = plain(text);
+    let name = renamed(&plain).map_or(plain.as_str(), |(now, _)| now);
+    let all = methods();
+    let names: Vec<&str> = all.iter().map(Method::name).collect();
+    let found = all.iter().find(|method| method.name() == name).cloned();
+    found.ok_or_else(|| bad("the method", text.to_owned(), &format!("one of {}", names.join(", "))))
+}
+
+/// Of an earlier name of a method that of now, and the sentence that says so.
+pub fn renamed(text: &str) -> Option<(&'static str, String)> {
+    let earlier = plain(text);
+    let found = methods()
+        .into_iter()
+        .find(|method| method.earlier_name() == Some(earlier.as_str()))?;
+    let name = found.name();
+    Some((name, format!("the method `{earlier}` is now called `{name}`")))
+}
+
+/// Sets an option from its text.
+///
+/// # Errors
+/// As [`Method::set`]; for an option of other methods with their names.
+pub fn set(method: &mut Method, name: &str, text: &str) -> Result<(), IdentError> {
+    let has = |spec: &MethodSpec| spec.settings.iter().any(|setting| setting.name == name);
+    if has(&method.spec()) {
+        return method.set(name, text);
+    }
+    let of: Vec<&str> = registry()
+        .iter()
+        .filter(|spec| has(spec))
+        .map(|spec| spec.name)
+        .collect();
+    match of.as_slice() {
+        [] => method.set(name, text),
+        of => Err(bad(
+            name,
+            format!("with the method {}", method.name()),
+            &format!("the method {}, to which it belongs", of.join(" or ")),
+        )),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use hoid_model::Structure;
+    use hoid_track::TrackOptions;
+
+    use super::*;
+
+    #[test]
+    fn names_lead_back_to_methods() {
+        for method in methods() {
+            assert_eq!(self::method(method.name()).unwrap(), method);
+            let spec = method.spec();
+            assert!(!spec.help.is_empty() && !spec.source.is_empty(), "{method}");
+            assert!(spec.settings.iter().all(|s| !s.help.is_empty()), "{method}");
+        }
+        assert!(method("kalman").unwrap_err().to_string().contains("rpem, physical"));
+    }
+
+    #[test]
+    fn an_earlier_name_is_read_and_said_to_be_one() {
+        assert_eq!(method("population").unwrap(), Method::adaptive());
+        let (name, note) = renamed(" Population").unwrap();
+        assert_eq!(name, "adaptive");
+        assert_eq!(note, "the method `population` is now called `adaptive`");
+        let refused = method("kalman").unwrap_err().to_string();
+        assert!(!refused.contains("population"), "{refused}");
+        for method in methods() {
+            assert_eq!(renamed(method.name()), None, "a name belongs to one method");
+        }
+    }
+
+    #[test]
+    fn an_option_of_one_name_is_the_same_for_all() {
+        let all: Vec<_> = registry().into_iter().flat_map(|spec| spec.settings).collect();
+        for a in &all {
+            let same = all.iter().filter(|b| a.name == b.name);
+            assert!(
+                same.clone()
+                    .all(|b| (a.kind, a.unit, &a.help) == (b.kind, b.unit, &b.help)),
+                "{}",
+                a.name
+            );
+        }
+    }
+
+    #[test]
+    fn structures_that_are_not_served_are_refused() {
+        for method in methods() {
+            for structure in Structure::ALL {
+                let orders = match structure {
+                    Structure::BoxJenkins => method.usual_orders(29),
+                    _ => structure.operator_orders(if structure.has_input() { 29 } else { 0 }),
+                };
+                let options = TrackOptions::new(method.clone(), structure, orders);
+                let served = method.spec().structures.contains(&structure);
+                assert_eq!(
+                    options.check().is_ok(),
+                    served,
+                    "{method} {structure}: {:?}",
+                    options.check()
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn what_belongs_to_another_method_is_refused_by_name() {
+        let refused = set(&mut Method::rls(), "alarm", "3").unwrap_err().to_string();
+        assert!(
+            refused.contains("alarm") && refused.contains("multiple-model"),
+            "{refused}"
+        );
+        let refused = set(&mut window(), "windup_guard", "off").unwrap_err().to_string();
+        assert!(refused.contains("rls or rpem"), "{refused}");
+        let refused = set(&mut Method::rls(), "colour", "3").unwrap_err().to_string();
+        assert!(refused.contains("memory"), "{refused}");
+        let set = multiple_model().with("alarm", "3").unwrap();
+        assert_eq!(set.settings().get("alarm").as_deref(), Some("3"));
+    }
+}

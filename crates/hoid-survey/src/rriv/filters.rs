@@ -1,0 +1,104 @@
+//! The filters of the refined recursion: what D/F makes of a signal, and the response of a model to
+//! an input.
+
+use hoid_model::Orders;
+
+use hoid_track::building::{Past, bounded, weighted};
+
+/// A signal and what D/F makes of it.
+#[derive(Debug, Clone)]
+pub(crate) struct Filtered {
+    pub raw: Past,
+    pub out: Past,
+}
+
+hoid_core::state!([] Filtered { raw, out });
+
+impl Filtered {
+    pub fn new(orders: &Orders) -> Self {
+        Self {
+            raw: Past::new(orders.nd),
+            out: Past::new(orders.nf.max(orders.nb)),
+        }
+    }
+
+    pub fn next(&self, d: &[f64], f: &[f64], x: f64) -> f64 {
+        bounded(x + weighted(d, self.raw.newest()) - weighted(f, self.out.newest()))
+    }
+
+    pub fn push(&mut self, d: &[f64], f: &[f64], x: f64) {
+        let y = self.next(d, f, x);
+        self.raw.push(x);
+        self.out.push(y);
+    }
+}
+
+/// An input, its response and both filtered.
+#[derive(Debug, Clone)]
+pub(crate) struct Simulated {
+    pub input: Past,
+    pub response: Past,
+    pub input_filtered: Filtered,
+    pub response_filtered: Filtered,
+}
+
+hoid_core::state!([] Simulated { input, response, input_filtered, response_filtered });
+
+impl Simulated {
+    pub fn new(orders: &Orders) -> Self {
+        Self {
+            input: Past::new(orders.nk + orders.nb),
+            response: Past::new(orders.nf),
+            input_filtered: Filtered::new(orders),
+            response_filtered: Filtered::new(orders),
+        }
+    }
+
+    /// `(B/F) q^-nk` of the input, now.
+    pub fn response(&self, b: &[f64], f: &[f64], nk: usize) -> f64 {
+        bounded(weighted(b, &self.input.newest()[nk..]) - weighted(f, self.response.newest()))
+    }
+
+    /// `[e_f(t-nk) .., -x_f(t-1) ..]`, in the places of B and F in theta.
+    pub fn regressors(&self, p: &Parts<'_>, nk: usize, into: &mut [f64]) {
+        let now = self.input_filtered.next(p.d, p.f, self.input.newest()[nk]);
+        fill_b(now, &self.input_filtered, p.b.len(), into);
+        fill_f(&self.response_filtered, p.f.len(), into);
+    }
+
+    /// Takes the filters to the next sample.
+    pub fn advance(&mut self, p: &Parts<'_>, nk: usize) {
+        let x = self.response(p.b, p.f, nk);
+        self.response.push(x);
+        self.response_filtered.push(p.d, p.f, x);
+        let delayed = self.input.newest()[nk];
+        self.input_filtered.push(p.d, p.f, delayed);
+    }
+}
+
+pub(crate) fn fill_b(now: f64, input: &Filtered, nb: usize, into: &mut [f64]) {
+    into[0] = now;
+    into[1..nb].copy_from_slice(&input.out.newest()[..nb - 1]);
+}
+
+pub(crate) fn fill_f(output: &Filtered, nf: usize, into: &mut [f64]) {
+    let first = into.len() - nf;
+    for (place, y) in into[first..].iter_mut().zip(output.out.newest()) {
+        *place = -y;
+    }
+}
+
+/// Theta, `[b, d, f]`.
+pub(crate) struct Parts<'t> {
+    pub b: &'t [f64],
+    pub d: &'t [f64],
+    pub f: &'t [f64],
+}
+
+impl<'t> Parts<'t> {
+    pub fn of(theta: &'t [f64], orders: &Orders) -> Self {
+        let (b, rest) = theta.split_at(orders.nb);
+        let (d, f) = rest.split_at(orders.nd);
+        Self { b, d, f }
+    }
+}

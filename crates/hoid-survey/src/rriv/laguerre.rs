@@ -1,0 +1,128 @@
+//! The part of the input that follows an external signal, sample by sample.
+//!
+//! As in the batch method ([`hoid_ident::iv`]) the response of e to f_t is an expansion in Laguerre
+//! filters, `L_0 = sqrt(1 - p^2)/(1 - p q^-1)`, `L_k = L_{k-1} (q^-1 - p)/(1 - p q^-1)` (B.
+//! Wahlberg, *IEEE Trans. Automatic Control* 36 (1991) 551-562); its weights follow by recursive
+//! least squares with a long memory. The value at t is made with the weights of t - 1: they hold
+//! the noise of the past alone, and of that one part in memory over filters.
+
+use super::forgetting::Forgetting;
+use hoid_track::building::{bounded, weighted};
+
+/// Number of filters. A loop remembers a second or two: 16 filters with a time constant of 16
+/// samples span about 500.
+const FILTERS: usize = 16;
+/// Time constant of the filters in samples.
+const TIME_CONSTANT: f64 = 16.0;
+/// Memory of the weights in samples.
+const MEMORY: f64 = 4096.0;
+/// P of the weights at the start, for signals of unit power: they are drawn to zero by a hundredth
+/// of a sample.
+const START: f64 = 100.0;
+
+/// Filters and weights.
+#[derive(Debug, Clone)]
+pub(crate) struct Following {
+    pole: f64,
+    filters: [f64; FILTERS],
+    weights: [f64; FILTERS],
+    p: Forgetting,
+    /// Mean square of the external signal, and the samples in it.
+    power: f64,
+    samples: f64,
+}
+
+hoid_core::state!([] Following { pole, filters, weights, p, power, samples });
+
+impl Following {
+    /// At rest, with no weights.
+    pub fn new() -> Self {
+        Self {
+            pole: (-1.0 / TIME_CONSTANT).exp(),
+            filters: [0.0; FILTERS],
+            weights: [0.0; FILTERS],
+            p: Forgetting::diagonal(START, 1.0 - 1.0 / MEMORY),
+            power: 0.0,
+            samples: 0.0,
+        }
+    }
+
+    /// The part of e(t) that follows the external signal up to t.
+    pub fn step(&mut self, external: f64, e: f64) -> f64 {
+        let external = bounded(external);
+        self.filter(external);
+        let following = bounded(weighted(&self.weights, &self.filters));
+        self.samples += 1.0;
+        self.power += (external * external - self.power) / self.samples.min(MEMORY);
+        // In units of the external signal, so that P knows no scale.
+        let scale = self.power.sqrt().recip();
+        if scale.is_finite() {
+            let z = self.filters.map(|v| bounded(scale * v));
+            let mut gain = [0.0; FILTERS];
+            self.p.gain(&z, &mut gain);
+            let error = bounded(scale * (e - following));
+            for (w, g) in self.weights.iter_mut().zip(gain) {
+                *w = bounded(*w + g * error);
+            }
+        }
+        following
+    }
+
+    fn filter(&mut self, external: f64) {
+        let p = self.pole;
+        // v_k(t) = p v_k(t-1) + v_{k-1}(t-1) - p v_{k-1}(t).
+        let (mut before, mut now) = (self.filters[0], 0.0);
+        for (k, v) in self.filters.iter_mut().enumerate() {
+            let old = *v;
+            *v = if k == 0 {
+                p * old + (1.0 - p * p).sqrt() * external
+            } else {
+                p * old + before - p * now
+            };
+            (before, now) = (old, *v);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn filters_are_orthonormal() {
+        let mut following = Following::new();
+        let mut gram = [[0.0; FILTERS]; FILTERS];
+        for t in 0..4000 {
+            following.filter(f64::from(u8::from(t == 0)));
+            for i in 0..FILTERS {
+                for j in 0..FILTERS {
+                    gram[i][j] += following.filters[i] * following.filters[j];
+                }
+            }
+        }
+        for i in 0..FILTERS {
+            for j in 0..FILTERS {
+                // The impulse responses have died out to rounding.
+                assert!((gram[i][j] - f64::from(u8::from(i == j))).abs() < 1e-12, "{i} {j}");
+            }
+        }
+    }
+
+    #[test]
+    fn follows_a_delayed_response_at_any_scale() {
+        for scale in [1e-6, 1.0, 1e6] {
+            let mut following = Following::new();
+            let f = |t: i32| scale * ((0.05 * f64::from(t)).sin() + (0.31 * f64::from(t)).sin());
+            let (mut y, mut rest, mut power) = (0.0, 0.0, 0.0);
+            for t in 0..4000 {
+                y = 0.8 * y + 0.2 * f(t - 20);
+                let found = following.step(f(t), y);
+                if t > 2000 {
+                    rest += (found - y).powi(2);
+                    power += y * y;
+                }
+            }
+            assert!(rest < 1e-4 * power, "{}", rest / power);
+        }
+    }
+}

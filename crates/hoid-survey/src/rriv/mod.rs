@@ -1,0 +1,444 @@
+//! Recursive refined instrumental variable for `u = (B/F) q^-nk e + (1/D) eps` (P. C. Young,
+//! *Recursive Estimation and Time-Series Analysis*, 2nd ed. 2011, ch. 7 and 8; his C is D here;
+//! *Automatica* 52 (2015) 35-46).
+//!
+//! With the auxiliary model, e, u and its noise-free output `x = (B/F) q^-nk e'` are filtered by
+//! D/F (index f), and for
+//!
+//! `phi = [e_f(t-nk) .., -u_f(t-1) ..]`,  `z = [e'_f(t-nk) .., -x_f(t-1) ..]`
+//!
+//! the symmetric form of the method takes the gain from the instruments alone,
+//! `g = P z/(1 + z' P z)`, `rho <- rho + g (u_f - phi' rho)`; D follows by recursive least squares
+//! on `xi = u - (B/F) q^-nk e`. Histories are a-posteriori: each filter takes a sample again with
+//! the auxiliary model that has just moved.
+//!
+//! **Auxiliary model.** It is the estimate, low-pass filtered with the shortest memory of B and F.
+//! The estimate itself in its place makes its own instruments out of its errors, and with short
+//! memories runs are lost. The innovation that is reported, and the innovation variance, are those
+//! of the auxiliary model, whose filters run in any case.
+//!
+//! **Instruments.** e' is e itself, or the part of e that follows an external signal
+//! ([`super::laguerre`]). With e the method needs the right noise model in a closed loop: z then
+//! holds past noise, which is independent of a white eps only.
+//!
+//! **Covariance.** To first order the errors go on as `t <- (I - A) t - g eps` with rows `g_i phi'`
+//! for B and F and `g_i psi'` for D (psi the gradient for all parameters: D inherits what B and F
+//! are wrong by), so that `sigma^2 C` with `C <- (I - A) C (I - A)' + g g'` is the covariance of
+//! theta, whatever gain was used: for lambda = 1 that of the batch method, with forgetting about
+//! `P/(1 + lambda)`.
+//!
+//! **Stability.** A step of B and F is halved until the roots of F lie within [`RADIUS`].
+
+mod filters;
+mod forgetting;
+mod laguerre;
+mod options;
+
+use hoid_core::{
+    error_bars::LARGEST_GROWTH,
+    stability::roots_inside,
+    state::{State, visit_all},
+};
+use hoid_ident::{IdentError, linalg::dot};
+use hoid_model::Orders;
+
+use hoid_track::{
+    Sample,
+    building::{Past, Recursion, StepOutcome, bounded, weighted},
+};
+
+use filters::{Filtered, Parts, Simulated, fill_f};
+use forgetting::{Forgetting, ROOM};
+use laguerre::Following;
+
+pub use options::RrivOptions;
+
+/// Circle that holds the roots of F: the filters forget within 10 000 samples.
+const RADIUS: f64 = 0.9999;
+/// Halvings after which a step is left out.
+const HALVINGS: usize = 20;
+/// Smallest share of the newest theta in that of the filters.
+const LEAST_SHARE: f64 = 1.0 / 1024.0;
+/// Smallest innovation variance as a share of the one at the start.
+const LEAST: f64 = 1e-16;
+
+/// What the recursion goes on from: a batch fit, or a guess.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct RefinedStart<'a> {
+    /// In the order of [`Orders::parameter_names`].
+    pub theta: &'a [f64],
+    /// By rows.
+    pub covariance: &'a [f64],
+    /// Variance of eps.
+    pub innovation_variance: f64,
+    /// Number of samples that they come from: how far P is from its level in the long run.
+    pub samples: usize,
+}
+
+/// The recursion.
+#[derive(Debug, Clone)]
+pub(crate) struct RefinedRecursion {
+    orders: Orders,
+    theta: Vec<f64>,
+    /// Theta of the filters.
+    auxiliary: Vec<f64>,
+    /// Share of the newest theta in it.
+    share: f64,
+    /// C, the covariance over sigma^2.
+    spread: Vec<f64>,
+    first_spread: Vec<f64>,
+    variance: f64,
+    least_variance: f64,
+    samples: f64,
+    /// Share of the newest sample in the variance when the recursion has run for long.
+    newest_share: f64,
+    system_gain: Forgetting,
+    noise_gain: Forgetting,
+    measured: Simulated,
+    /// With an external signal: the instruments' own filters.
+    instrument: Option<(Following, Simulated, f64)>,
+    output: Filtered,
+    /// xi.
+    rest: Past,
+    shortened: usize,
+    work: Work,
+}
+
+impl State for RefinedRecursion {
+    fn visit(&mut self, each: &mut dyn FnMut(&mut f64)) {
+        let parts: &mut [&mut dyn State] = &mut [
+            &mut self.theta.as_mut_slice(),
+            &mut self.auxiliary.as_mut_slice(),
+            &mut self.share,
+            &mut self.spread.as_mut_slice(),
+            &mut self.first_spread.as_mut_slice(),
+            &mut self.variance,
+            &mut self.least_variance,
+            &mut self.samples,
+            &mut self.newest_share,
+            &mut self.system_gain,
+            &mut self.noise_gain,
+            &mut self.measured,
+            &mut self.output,
+            &mut self.rest,
+            &mut self.shortened,
+        ];
+        visit_all(parts, each);
+        if let Some((following, simulated, last)) = &mut self.instrument {
+            visit_all(&mut [following, simulated, last], each);
+        }
+    }
+}
+
+/// Vectors of one step, all of the length of theta.
+#[derive(Debug, Clone)]
+struct Work {
+    phi: Vec<f64>,
+    z: Vec<f64>,
+    psi: Vec<f64>,
+    gain: Vec<f64>,
+    trial: Vec<f64>,
+    short: Vec<f64>,
+    short_gain: Vec<f64>,
+    along_phi: Vec<f64>,
+    along_psi: Vec<f64>,
+    half: Vec<f64>,
+}
+
+impl RefinedRecursion {
+    /// From a start, with a forgetting factor in (0, 1] for each parameter; `external` makes the
+    /// instruments of the external signal of each sample (where one is missing, the last one
+    /// holds).
+    ///
+    /// # Errors
+    /// [`IdentError::BadOption`] for orders with A or C, or factors out of range;
+    /// [`IdentError::BadStart`].
+    pub fn new(orders: Orders, start: RefinedStart<'_>, lambda: &[f64], external: bool) -> Result<Self, IdentError> {
+        let p = orders.parameters();
+        check(&orders, &start, lambda)?;
+        let variance = start.innovation_variance;
+        let spread: Vec<f64> = start.covariance.iter().map(|c| c / variance).collect();
+        let gain_of = |places: &[usize]| {
+            let element = |k: usize| spread[places[k / places.len()] * p + places[k % places.len()]];
+            let block: Vec<f64> = (0..places.len() * places.len()).map(element).collect();
+            let factors: Vec<f64> = places.iter().map(|i| lambda[*i]).collect();
+            Forgetting::new(&block, &factors).ok_or_else(|| IdentError::BadStart {
+                reason: format!("its covariance is not positive, or {orders} are more than {ROOM} parameters"),
+            })
+        };
+        let noise: Vec<usize> = (orders.nb..orders.nb + orders.nd).collect();
+        let system: Vec<usize> = (0..p).filter(|i| !noise.contains(i)).collect();
+        let zeros = vec![0.0; p];
+        Ok(Self {
+            theta: start.theta.to_vec(),
+            auxiliary: start.theta.to_vec(),
+            share: system.iter().map(|i| 1.0 - lambda[*i]).fold(LEAST_SHARE, f64::max),
+            system_gain: gain_of(&system)?,
+            noise_gain: gain_of(&noise)?,
+            variance,
+            least_variance: LEAST * variance,
+            samples: start.samples as f64,
+            newest_share: 1.0 - lambda.iter().copied().fold(1.0, f64::min),
+            measured: Simulated::new(&orders),
+            instrument: external.then(|| (Following::new(), Simulated::new(&orders), 0.0)),
+            output: Filtered::new(&orders),
+            rest: Past::new(orders.nd),
+            shortened: 0,
+            work: Work {
+                phi: zeros.clone(),
+                z: zeros.clone(),
+                psi: zeros.clone(),
+                gain: zeros.clone(),
+                trial: zeros.clone(),
+                short: vec![0.0; system.len()],
+                short_gain: vec![0.0; system.len().max(noise.len())],
+                along_phi: zeros.clone(),
+                along_psi: zeros.clone(),
+                half: vec![0.0; p * p],
+            },
+            first_spread: spread.clone(),
+            spread,
+            orders,
+        })
+    }
+
+    /// Steps that stability made shorter.
+    #[cfg(test)]
+    pub fn shortened(&self) -> usize {
+        self.shortened
+    }
+
+    /// Without an output the prediction takes its place.
+    fn take(&mut self, sample: Sample, output: Option<f64>, moves: bool) -> StepOutcome {
+        let e = bounded(sample.e);
+        let nk = self.orders.nk;
+        self.measured.input.push(e);
+        if let Some((following, simulated, last)) = &mut self.instrument {
+            *last = sample.reference.unwrap_or(*last);
+            let followed = following.step(*last, e);
+            simulated.input.push(followed);
+        }
+        let before = Parts::of(&self.auxiliary, &self.orders);
+        let predicted = self.measured.response(before.b, before.f, nk) - weighted(before.d, self.rest.newest());
+        let u = bounded(output.unwrap_or(predicted));
+        let innovation = bounded(u - predicted);
+        let shortened = moves && self.estimate(u, innovation);
+        if moves {
+            self.follow_theta();
+        }
+        let after = Parts::of(&self.auxiliary, &self.orders);
+        let xi = u - self.measured.response(after.b, after.f, nk);
+        self.rest.push(xi);
+        self.measured.advance(&after, nk);
+        if let Some((_, simulated, _)) = &mut self.instrument {
+            simulated.advance(&after, nk);
+        }
+        self.output.push(after.d, after.f, u);
+        StepOutcome { innovation, shortened }
+    }
+
+    /// The filters' theta takes its step, unless that leads out of the region of stable F, which is
+    /// not convex for nf > 2.
+    fn follow_theta(&mut self) {
+        let w = &mut self.work;
+        for (trial, (auxiliary, theta)) in w.trial.iter_mut().zip(self.auxiliary.iter().zip(&self.theta)) {
+            *trial = auxiliary + self.share * (theta - auxiliary);
+        }
+        if roots_inside(&w.trial[self.orders.nb + self.orders.nd..], RADIUS) {
+            self.auxiliary.copy_from_slice(&w.trial);
+        }
+    }
+
+    /// Moves theta, C and the variance; true when the step was made shorter.
+    fn estimate(&mut self, u: f64, innovation: f64) -> bool {
+        let Orders { nb, nd, nf, nk, .. } = self.orders;
+        let noise = nb..nb + nd;
+        let parts = Parts::of(&self.auxiliary, &self.orders);
+        let now = Parts::of(&self.theta, &self.orders);
+        let w = &mut self.work;
+        self.measured.regressors(&parts, nk, &mut w.psi);
+        w.phi.copy_from_slice(&w.psi);
+        fill_f(&self.output, nf, &mut w.phi);
+        w.phi[noise.clone()].fill(0.0);
+        match &self.instrument {
+            Some((_, simulated, _)) => simulated.regressors(&parts, nk, &mut w.z),
+            None => w.z.copy_from_slice(&w.psi),
+        }
+        for (place, xi) in w.psi[noise.clone()].iter_mut().zip(self.rest.newest()) {
+            *place = -xi;
+        }
+        let error = self.output.next(parts.d, parts.f, u)
+            - weighted(now.b, &w.phi[..nb])
+            - weighted(now.f, &w.phi[noise.end..]);
+
+        // B and F.
+        w.short[..nb].copy_from_slice(&w.z[..nb]);
+        w.short[nb..].copy_from_slice(&w.z[noise.end..]);
+        self.system_gain.gain(&w.short, &mut w.short_gain[..nb + nf]);
+        w.gain[..nb].copy_from_slice(&w.short_gain[..nb]);
+        w.gain[noise.clone()].fill(0.0);
+        w.gain[noise.end..].copy_from_slice(&w.short_gain[nb..nb + nf]);
+        let mut share = 1.0;
+        for _ in 0..HALVINGS {
+            for (i, t) in w.trial.iter_mut().enumerate() {
+                *t = bounded(self.theta[i] + share * w.gain[i] * error);
+            }
+            if roots_inside(&w.trial[noise.end..], RADIUS) {
+                break;
+            }
+            share *= 0.5;
+        }
+        if !roots_inside(&w.trial[noise.end..], RADIUS) {
+            share = 0.0;
+            w.trial.copy_from_slice(&self.theta);
+        }
+        self.theta.copy_from_slice(&w.trial);
+        w.gain.iter_mut().for_each(|g| *g *= share);
+
+        // D, on the rest that the system just found leaves.
+        let gain = &mut w.short_gain[..nd];
+        self.noise_gain.gain(&w.psi[noise.clone()], gain);
+        let parts = Parts::of(&self.auxiliary, &self.orders);
+        let now = Parts::of(&self.theta, &self.orders);
+        let xi = u - self.measured.response(parts.b, parts.f, nk);
+        let error = bounded(xi - dot(&w.psi[noise.clone()], now.d));
+        for (t, g) in self.theta[noise.clone()].iter_mut().zip(gain.iter()) {
+            *t = bounded(*t + g * error);
+        }
+        w.gain[noise.clone()].copy_from_slice(gain);
+
+        let explained = self.spread_on(&noise);
+        self.samples += 1.0;
+        let newest = (innovation * innovation / (1.0 + explained) - self.variance)
+            * self.newest_share.max(1.0 / self.samples.max(1.0));
+        self.variance = (self.variance + newest).max(self.least_variance);
+        let shortened = share < 1.0;
+        self.shortened += usize::from(shortened);
+        shortened
+    }
+
+    /// `C <- (I - A) C (I - A)' + g g'`. Returns `psi' C psi` before.
+    fn spread_on(&mut self, noise: &std::ops::Range<usize>) -> f64 {
+        let w = &mut self.work;
+        let p = self.theta.len();
+        for i in 0..p {
+            let row = &self.spread[i * p..(i + 1) * p];
+            w.along_phi[i] = dot(row, &w.phi);
+            w.along_psi[i] = dot(row, &w.psi);
+        }
+        let explained = dot(&w.along_psi, &w.psi);
+        let row = |i: usize| noise.contains(&i);
+        for i in 0..p {
+            for j in 0..p {
+                let along = if row(i) { w.along_psi[j] } else { w.along_phi[j] };
+                w.half[i * p + j] = self.spread[i * p + j] - w.gain[i] * along;
+            }
+        }
+        for i in 0..p {
+            let half = &w.half[i * p..(i + 1) * p];
+            let (by_phi, by_psi) = (dot(half, &w.phi), dot(half, &w.psi));
+            for j in 0..=i {
+                let by = if row(j) { by_psi } else { by_phi };
+                let value = bounded(half[j] - w.gain[j] * by + w.gain[i] * w.gain[j]);
+                self.spread[i * p + j] = value;
+                self.spread[j * p + i] = value;
+            }
+        }
+        if (0..p).any(|i| self.spread[i * (p + 1)] < 0.0) {
+            // Lost to rounding, as P can be.
+            self.spread.copy_from_slice(&self.first_spread);
+        }
+        for i in 0..p {
+            // To first order the recursion can be unstable where it is not: then nothing is known,
+            // and no less than that.
+            let limit = LARGEST_GROWTH * self.first_spread[i * (p + 1)];
+            let found = self.spread[i * (p + 1)];
+            if limit > 0.0 && found > limit {
+                let share = (limit / found).sqrt();
+                for j in 0..p {
+                    self.spread[i * p + j] *= share;
+                    self.spread[j * p + i] *= share;
+                }
+            }
+        }
+        if explained.is_finite() { explained.max(0.0) } else { 0.0 }
+    }
+}
+
+impl Recursion for RefinedRecursion {
+    fn step(&mut self, sample: Sample) -> StepOutcome {
+        self.take(sample, Some(sample.u), true)
+    }
+
+    fn follow(&mut self, sample: Sample) -> StepOutcome {
+        self.take(sample, Some(sample.u), false)
+    }
+
+    fn bridge(&mut self, sample: Sample) {
+        self.take(sample, None, false);
+    }
+
+    fn theta(&self) -> &[f64] {
+        &self.theta
+    }
+
+    fn covariance(&self, into: &mut [f64]) -> bool {
+        for (c, spread) in into.iter_mut().zip(&self.spread) {
+            *c = bounded(self.variance * spread);
+        }
+        true
+    }
+
+    fn innovation_variance(&self) -> f64 {
+        self.variance
+    }
+}
+
+fn check(orders: &Orders, start: &RefinedStart<'_>, lambda: &[f64]) -> Result<(), IdentError> {
+    let p = orders.parameters();
+    let bad = |reason: String| Err(IdentError::BadStart { reason });
+    if orders.na + orders.nc > 0 || orders.nb == 0 {
+        return Err(IdentError::BadOption {
+            option: "the orders of the refined recursion".to_owned(),
+            found: orders.to_string(),
+            expected: "na = 0, nc = 0 and nb of 1 or more: Box-Jenkins with an autoregressive noise, or output error"
+                .to_owned(),
+        });
+    }
+    if lambda.len() != p || lambda.iter().any(|l| !(*l > 0.0 && *l <= 1.0)) {
+        return Err(IdentError::BadOption {
+            option: "the forgetting factors".to_owned(),
+            found: format!("{lambda:?}"),
+            expected: format!("{p} numbers above 0 and not above 1, one for each of the parameters"),
+        });
+    }
+    if start.theta.len() != p || start.covariance.len() != p * p {
+        return bad(format!(
+            "it has {} coefficients and {} elements of the covariance, the orders {orders} need {p} and {}",
+            start.theta.len(),
+            start.covariance.len(),
+            p * p
+        ));
+    }
+    let diagonal = |i: usize| start.covariance[i * p + i];
+    if start.theta.iter().chain(start.covariance).any(|v| !v.is_finite()) || (0..p).any(|i| diagonal(i) < 0.0) {
+        return bad(
+            "a coefficient is not finite, or a variance is negative; fit the start to other samples".to_owned(),
+        );
+    }
+    if !(start.innovation_variance.is_finite() && start.innovation_variance > 0.0) {
+        return bad(format!(
+            "its innovation variance is {}; a recursion needs a positive one, which an exact fit does not have",
+            start.innovation_variance
+        ));
+    }
+    if !roots_inside(&start.theta[p - orders.nf..], RADIUS) {
+        return bad(format!(
+            "F has a root outside of the circle of radius {RADIUS}; start from a span that excites its poles"
+        ));
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests;

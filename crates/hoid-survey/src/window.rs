@@ -1,0 +1,416 @@
+//! The batch fit over a sliding window.
+//!
+//! The last W samples are kept, and every k samples they are fitted by the batch estimator, from
+//! the last theta; between the fits theta stays. So the estimate has the rectangular memory of W
+//! samples, initial states, bounds and all else that the estimator has, and the covariance is that
+//! of the fit.
+//!
+//! **Wrong minima.** A search from the last theta stays in the valley it is in. The estimator's own
+//! starts are searched as well where there is no last theta or that search does not converge, where
+//! the loss has risen by [`SUSPICIOUS`] since the last comparison, and at every [`COMPARE`]-th fit
+//! at the latest; the lower of the two minima is taken.
+//!
+//! **Failures.** Where a fit fails, as for a window without excitation, theta and covariance stay
+//! as they were.
+
+use hoid_core::state::{State, visit_all};
+use std::collections::VecDeque;
+
+use hoid_model::{Channel, Record, SampleTime, Structure};
+
+use hoid_ident::{
+    Estimator, Fit, IdentError, first_residual, settings,
+    settings::{Bounds, Value},
+};
+
+use hoid_track::{
+    Memory, Sample, StartAt,
+    building::{
+        About, Predictor, Recursion, RecursiveMethod, Setup, StartState, StepOutcome, bad, bounded, short_for_b,
+    },
+};
+
+/// Fits from the last theta between two comparisons with the estimator's own starts.
+const COMPARE: usize = 8;
+/// Relative rise of the loss over that of the last comparison that calls for the next one.
+const SUSPICIOUS: f64 = 0.25;
+/// Share of the window that is enough for a first fit.
+const FIRST_SHARE: usize = 4;
+/// Residuals for each unknown that are enough for a first fit.
+const RESIDUALS_EACH: usize = 5;
+
+settings! {
+    /// Options of the sliding window.
+    pub struct WindowOptions {
+        /// Length of the window: samples or seconds
+        pub window: Memory = Memory::Seconds(20.0),
+        /// Samples between two fits
+        #[setting(bounds(Bounds::AtLeast(1.0)))]
+        pub refit: usize = 25,
+    }
+}
+
+impl RecursiveMethod for WindowOptions {
+    fn about(&self) -> About {
+        About {
+            name: "window",
+            help: "a batch fit of the last seconds, again and again",
+            source: "the reference text, section VII",
+            structures: &Structure::ALL,
+            defaults: &[],
+        }
+    }
+
+    /// Not used: the window is what it remembers.
+    fn usual_memory(&self, parameter: &str) -> Memory {
+        short_for_b(parameter)
+    }
+
+    fn memory_in_words(&self) -> Option<String> {
+        let window = self.window.text().unwrap_or_default();
+        Some(format!("window of {window}, a fit every {} samples", self.refit))
+    }
+
+    fn check(&self, _setup: &Setup) -> Result<(), IdentError> {
+        match (self.window, self.refit) {
+            (Memory::Infinite, _) => Err(bad("the window", "inf".to_owned(), "samples or seconds")),
+            (_, 0) => Err(bad("the samples between two fits", "0".to_owned(), "1 or more")),
+            _ => Ok(()),
+        }
+    }
+
+    fn check_at(&self, sample_time: SampleTime) -> Result<(), IdentError> {
+        self.window.lambda(sample_time).map(|_| ())
+    }
+
+    fn fits_anew(&self) -> bool {
+        true
+    }
+
+    fn build(
+        &self,
+        setup: &Setup,
+        from: &StartState,
+        sample_time: SampleTime,
+    ) -> Result<Box<dyn Recursion>, IdentError> {
+        let covariance: Vec<f64> = from.spread.iter().map(|s| s * from.variance).collect();
+        let known = match setup.start {
+            StartAt::Nothing => None,
+            _ => Some((from.values.as_slice(), from.from_fit.then_some(covariance.as_slice()))),
+        };
+        let window = self.window.samples(sample_time)?;
+        let recursion = WindowRecursion::new(setup.start_estimator(), sample_time, window, self.refit, known)?;
+        Ok(Box::new(recursion))
+    }
+}
+
+/// The recursion.
+#[derive(Debug, Clone)]
+pub(crate) struct WindowRecursion {
+    estimator: Estimator,
+    sample_time: SampleTime,
+    window: usize,
+    every: usize,
+    /// Samples for the first fit.
+    enough: usize,
+    e: VecDeque<f64>,
+    u: VecDeque<f64>,
+    predictor: Predictor,
+    theta: Vec<f64>,
+    /// True when theta is an estimate, or was given.
+    known: bool,
+    covariance: Option<Vec<f64>>,
+    variance: f64,
+    /// Innovations before the first fit.
+    innovations: f64,
+    since_fit: usize,
+    since_comparison: usize,
+    compared_loss: f64,
+    fits: usize,
+    failures: usize,
+    last_failure: Option<IdentError>,
+}
+
+impl State for WindowRecursion {
+    fn visit(&mut self, each: &mut dyn FnMut(&mut f64)) {
+        // The samples that are kept, and the covariance that may be there: first how many.
+        for kept in [&mut self.e, &mut self.u] {
+            let mut length = kept.len();
+            length.visit(each);
+            kept.resize(length.min(self.window.saturating_add(1)), 0.0);
+            kept.make_contiguous().visit(each);
+        }
+        let mut there = self.covariance.is_some();
+        there.visit(each);
+        self.covariance = there.then(|| {
+            let p = self.theta.len();
+            self.covariance.take().unwrap_or_else(|| vec![0.0; p * p])
+        });
+        if let Some(covariance) = &mut self.covariance {
+            covariance.as_mut_slice().visit(each);
+        }
+        let parts: &mut [&mut dyn State] = &mut [
+            &mut self.predictor,
+            &mut self.theta.as_mut_slice(),
+            &mut self.known,
+            &mut self.variance,
+            &mut self.innovations,
+            &mut self.since_fit,
+            &mut self.since_comparison,
+            &mut self.compared_loss,
+            &mut self.fits,
+            &mut self.failures,
+        ];
+        visit_all(parts, each);
+    }
+}
+
+impl WindowRecursion {
+    /// Windows of `window` samples, fitted every `every` samples, from theta and its covariance
+    /// where they are known.
+    ///
+    /// # Errors
+    /// [`IdentError`] for options, orders, a start or a window that cannot be used.
+    pub fn new(
+        estimator: Estimator,
+        sample_time: SampleTime,
+        window: usize,
+        every: usize,
+        start: Option<(&[f64], Option<&[f64]>)>,
+    ) -> Result<Self, IdentError> {
+        let orders = estimator.orders;
+        orders.check(estimator.structure)?;
+        estimator.check()?;
+        let p = orders.parameters();
+        let unknowns = p + orders.nf + orders.nc;
+        let least = first_residual(&orders, estimator.initial_state_in_use()) + RESIDUALS_EACH * unknowns;
+        let refuse = |option: &str, found: String, expected: String| {
+            Err(IdentError::BadOption {
+                option: option.to_owned(),
+                found,
+                expected,
+            })
+        };
+        if window < least {
+            return refuse(
+                "the window",
+                format!("{window} samples"),
+                format!("{least} or more for {orders}"),
+            );
+        }
+        let Some(predictor) = Predictor::new(orders) else {
+            return refuse(
+                "the orders of a window",
+                format!("{p} coefficients"),
+                "at most 64".to_owned(),
+            );
+        };
+        if every == 0 {
+            return refuse("the samples between two fits", "0".to_owned(), "1 or more".to_owned());
+        }
+        let given = start.map(|(theta, _)| theta).or(estimator.start.as_deref());
+        if let Some(theta) = given
+            && (theta.len() != p || theta.iter().any(|v| !v.is_finite()))
+        {
+            return Err(IdentError::BadStart {
+                reason: format!("it is {theta:?}, the orders {orders} need {p} finite coefficients"),
+            });
+        }
+        let covariance = start.and_then(|(_, covariance)| covariance);
+        if let Some(c) = covariance
+            && (c.len() != p * p || c.iter().any(|v| !v.is_finite()))
+        {
+            return Err(IdentError::BadStart {
+                reason: format!("its covariance has to have {} finite elements", p * p),
+            });
+        }
+        Ok(Self {
+            sample_time,
+            window,
+            every,
+            enough: (window / FIRST_SHARE).max(least),
+            e: VecDeque::with_capacity(window),
+            u: VecDeque::with_capacity(window),
+            predictor,
+            theta: given.map_or_else(|| vec![0.0; p], <[f64]>::to_vec),
+            known: given.is_some(),
+            covariance: covariance.map(<[f64]>::to_vec),
+            variance: 0.0,
+            innovations: 0.0,
+            since_fit: if given.is_some() { 0 } else { every },
+            since_comparison: COMPARE,
+            compared_loss: f64::INFINITY,
+            fits: 0,
+            failures: 0,
+            last_failure: None,
+            estimator: Estimator {
+                start: None,
+                ..estimator
+            },
+        })
+    }
+
+    /// Fits that gave theta.
+    #[cfg(test)]
+    pub fn fits(&self) -> usize {
+        self.fits
+    }
+
+    /// Takes a sample into window and predictor; returns the innovation.
+    fn take(&mut self, sample: Sample) -> f64 {
+        self.keep(sample.e, sample.u);
+        self.predictor.step(&self.theta, sample.e, sample.u)
+    }
+
+    fn keep(&mut self, e: f64, u: f64) {
+        for (kept, value) in [(&mut self.e, e), (&mut self.u, u)] {
+            if kept.len() == self.window {
+                kept.pop_front();
+            }
+            kept.push_back(bounded(value));
+        }
+    }
+
+    fn refit(&mut self) {
+        self.since_fit = 0;
+        let found = self.record().and_then(|record| self.fit(&record));
+        match found {
+            Ok(fit) => {
+                self.fits += 1;
+                self.known = true;
+                self.theta.copy_from_slice(fit.model().theta());
+                self.covariance = fit.covariance().map(<[f64]>::to_vec);
+                self.variance = fit.innovation_variance();
+                // Innovations of the samples to come shall not hold what the theta before has left
+                // in the filters.
+                self.predictor.reset();
+                for (e, u) in self.e.iter().zip(&self.u) {
+                    self.predictor.step(&self.theta, *e, *u);
+                }
+            }
+            Err(failure) => {
+                self.failures += 1;
+                // The loss to compare with is that of another time.
+                self.since_comparison = COMPARE;
+                self.last_failure = Some(failure);
+            }
+        }
+    }
+
+    fn record(&mut self) -> Result<Record, IdentError> {
+        let output = Channel::new("u", "", self.u.make_contiguous().to_vec());
+        let record = if self.estimator.structure.has_input() {
+            let input = Channel::new("e", "", self.e.make_contiguous().to_vec());
+            Record::new(self.sample_time, input, output)?
+        } else {
+            Record::of_output(self.sample_time, output)?
+        };
+        Ok(record.labelled("of the window"))
+    }
+
+    /// The best minimum that the last theta and, where called for, the own starts lead to.
+    fn fit(&mut self, record: &Record) -> Result<Fit, IdentError> {
+        let records = std::slice::from_ref(record);
+        let own = |estimator: &Estimator| estimator.fit(records).and_then(settled);
+        if !self.known {
+            let fit = own(&self.estimator)?;
+            self.compared(&fit);
+            return Ok(fit);
+        }
+        self.estimator.start = Some(self.theta.clone());
+        let warm = own(&self.estimator);
+        self.estimator.start = None;
+        self.since_comparison += 1;
+        if let Ok(fit) = &warm
+            && self.since_comparison < COMPARE
+            && fit.loss() <= (1.0 + SUSPICIOUS) * self.compared_loss
+        {
+            return warm;
+        }
+        let cold = own(&self.estimator);
+        let fit = match (warm, cold) {
+            (Ok(warm), Ok(cold)) => {
+                if cold.loss() < warm.loss() {
+                    cold
+                } else {
+                    warm
+                }
+            }
+            (Ok(fit), Err(_)) | (Err(_), Ok(fit)) => fit,
+            (Err(_), Err(failure)) => return Err(failure),
+        };
+        self.compared(&fit);
+        Ok(fit)
+    }
+
+    fn compared(&mut self, fit: &Fit) {
+        self.since_comparison = 0;
+        self.compared_loss = fit.loss();
+    }
+}
+
+/// A fit whose search came to rest; one that did not says more about the limit of iterations than
+/// about the window.
+fn settled(fit: Fit) -> Result<Fit, IdentError> {
+    if fit.termination().converged() {
+        Ok(fit)
+    } else {
+        Err(IdentError::NotSettled {
+            reason: fit.termination().reason.to_string(),
+        })
+    }
+}
+
+impl Recursion for WindowRecursion {
+    fn step(&mut self, sample: Sample) -> StepOutcome {
+        let innovation = self.take(sample);
+        self.since_fit = self.since_fit.saturating_add(1);
+        if self.fits == 0 {
+            self.innovations += 1.0;
+            self.variance = bounded(self.variance + (innovation * innovation - self.variance) / self.innovations);
+        }
+        if self.u.len() >= self.enough && self.since_fit >= self.every {
+            self.refit();
+        }
+        StepOutcome {
+            innovation,
+            shortened: false,
+        }
+    }
+
+    fn follow(&mut self, sample: Sample) -> StepOutcome {
+        StepOutcome {
+            innovation: self.take(sample),
+            shortened: false,
+        }
+    }
+
+    fn bridge(&mut self, sample: Sample) {
+        let predicted = self.predictor.bridge(&self.theta, sample.e);
+        self.keep(sample.e, predicted);
+    }
+
+    fn theta(&self) -> &[f64] {
+        &self.theta
+    }
+
+    fn covariance(&self, into: &mut [f64]) -> bool {
+        let Some(covariance) = &self.covariance else {
+            return false;
+        };
+        into.copy_from_slice(covariance);
+        true
+    }
+
+    fn innovation_variance(&self) -> f64 {
+        self.variance
+    }
+
+    fn failures(&self) -> Option<(usize, String)> {
+        let why = self.last_failure.as_ref().map(IdentError::to_string);
+        Some((self.failures, why.unwrap_or_default()))
+    }
+}
+
+#[cfg(test)]
+mod tests;

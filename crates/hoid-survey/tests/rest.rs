@@ -1,0 +1,257 @@
+//! Rests, frozen channels and a constant error, of 10 s to 1000 s: nothing arrives, and no error bar
+//! shrinks.
+#![allow(clippy::unwrap_used)]
+
+use hoid_model::{
+    Channel, Record,
+    scenario::{Condition, Scenario},
+};
+use hoid_sim::{RunSeed, Simulator};
+use hoid_track::{GuardKind, Method, Sample, TrackOptions, Tracker, track};
+
+const DELAY: usize = 29;
+/// Tracking before the rest, s.
+const BEFORE_S: f64 = 41.0;
+
+fn record(condition: Condition) -> Record {
+    let seed = RunSeed {
+        seed: 7,
+        ..RunSeed::default()
+    };
+    Simulator::new(&Scenario::condition(condition))
+        .unwrap()
+        .run(seed, false)
+        .unwrap()
+}
+
+/// The answer to a step of e, and the second in which its end is found, s.
+const ANSWER_S: f64 = 4.0;
+
+/// What stands still.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Stand {
+    /// e and u are zero.
+    Rest,
+    /// Both are nearly zero: noise of a sensor.
+    Noise,
+    FrozenE,
+    FrozenU,
+    Frozen,
+    /// e is constant, and u what the person answers, by their gain.
+    ConstantE,
+}
+
+impl Stand {
+    fn sample(self, before: &Sample, now: &Sample, k: usize) -> Sample {
+        let noise = |seed: f64| 1e-5 * (k as f64 * 12.9898 + seed).sin() * (k as f64 * 0.7).cos();
+        let (e, u) = match self {
+            Self::Rest => (0.0, 0.0),
+            Self::Noise => (noise(0.0), noise(1.0)),
+            Self::FrozenE => (before.e, now.u),
+            Self::FrozenU => (now.e, before.u),
+            Self::Frozen => (before.e, before.u),
+            Self::ConstantE => {
+                let gone = (k as f64 - 28.0).max(0.0) * 0.01;
+                (0.3, 0.03 * (1.0 - (-3.0 * gone).exp()))
+            }
+        };
+        Sample { e, u, reference: None }
+    }
+}
+
+fn bars(tracker: &Tracker) -> Vec<(String, f64)> {
+    let names = tracker.parameter_names();
+    let theta = names.into_iter().zip(tracker.parameters());
+    let theta = theta.map(|(name, estimate)| (name, estimate.standard_error.unwrap_or(0.0)));
+    let operator = tracker.operator().ok();
+    let operator = operator.iter().flat_map(|operator| operator.rows());
+    let operator = operator.map(|(name, _, estimate)| (name.to_owned(), estimate.standard_error.unwrap_or(0.0)));
+    theta.chain(operator.collect::<Vec<_>>()).collect()
+}
+
+/// How far back the numbers of a guard are that it goes back to, s.
+const KEPT_S: f64 = 10.0;
+
+/// The smaller of each bar.
+fn smallest(of: &mut [(String, f64)], others: Vec<(String, f64)>) {
+    for ((_, one), (_, other)) in of.iter_mut().zip(others) {
+        *one = one.min(other);
+    }
+}
+
+/// A tracker after the stand, and the bars before it: of a guard that goes back the smallest of the numbers that
+/// it may have kept.
+fn through(options: &TrackOptions, record: &Record, stand: Stand, length_s: f64) -> (Tracker, Vec<(String, f64)>) {
+    let goes_back = match options.method.name() {
+        // From the first sample on it learns, and its bars are not the same from one reading to the next.
+        "adaptive" => true,
+        "multiple-model" | "physical" => stand == Stand::FrozenU,
+        _ => false,
+    };
+    let ts = record.sample_time().s();
+    let first = (BEFORE_S / ts) as usize;
+    let span = record.span(0.0, 20.0).unwrap();
+    let mut tracker = Tracker::new(options, Some(&span), record.sample_time()).unwrap();
+    let at = |k: usize| Sample {
+        e: record.input()[k % record.len()],
+        u: record.output()[k % record.len()],
+        reference: None,
+    };
+    let mut kept: Option<Vec<(String, f64)>> = None;
+    for k in 0..first {
+        tracker.update(at(k), options.method.starts_itself() || k as f64 * ts >= 20.0);
+        if goes_back && (k as f64 * ts) >= BEFORE_S - KEPT_S {
+            smallest(kept.get_or_insert_with(|| bars(&tracker)), bars(&tracker));
+        }
+    }
+    let (mut begin, before) = (kept.unwrap_or_else(|| bars(&tracker)), at(first - 1));
+    let mut told = Vec::new();
+    for k in 0..(length_s / ts) as usize {
+        // Where e has stepped the answer is news, as long as it moves.
+        if stand == Stand::ConstantE && k as f64 * ts <= ANSWER_S {
+            begin = bars(&tracker);
+        }
+        tracker.update(stand.sample(&before, &at(first + k), k), true);
+        told.extend(tracker.event().map(|event| event.kind));
+    }
+    assert!(
+        told.iter()
+            .any(|kind| matches!(kind, GuardKind::Idle | GuardKind::Frozen)),
+        "{:?} {stand:?} is not told: {told:?}",
+        options.method.name()
+    );
+    (tracker, begin)
+}
+
+fn all_options() -> Vec<TrackOptions> {
+    let mut all: Vec<TrackOptions> = hoid_survey::methods()
+        .into_iter()
+        .map(|method| TrackOptions::usual(method, DELAY))
+        .collect();
+    all.extend(TrackOptions::usual(Method::adaptive(), DELAY).with(&[("replay", "0")]));
+    for (name, text) in [
+        ("memory", "100"),
+        ("forgetting", "directional"),
+        ("forgetting", "variable"),
+    ] {
+        for method in [Method::rls(), Method::rpem()] {
+            all.extend(TrackOptions::usual(method, DELAY).with(&[(name, text)]));
+        }
+    }
+    all
+}
+
+fn no_bar_shrinks(stand: Stand, lengths_s: &[f64]) {
+    let record = record(Condition::C1);
+    for options in all_options() {
+        for length in lengths_s {
+            let (tracker, begin) = through(&options, &record, stand, *length);
+            let end = bars(&tracker);
+            assert_eq!(begin.len(), end.len());
+            for ((name, before), (_, after)) in begin.iter().zip(&end) {
+                assert!(
+                    *after >= before * (1.0 - 1e-9),
+                    "{}: {stand:?} of {length} s, {name} from {before:e} to {after:e}",
+                    options.method.name()
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn no_error_bar_shrinks_through_rests() {
+    no_bar_shrinks(Stand::Rest, &[10.0, 100.0]);
+}
+
+#[test]
+fn no_error_bar_shrinks_through_rests_with_the_noise_of_a_sensor() {
+    no_bar_shrinks(Stand::Noise, &[10.0, 100.0]);
+}
+
+#[test]
+fn no_error_bar_shrinks_through_a_frozen_error() {
+    no_bar_shrinks(Stand::FrozenE, &[10.0, 100.0]);
+}
+
+#[test]
+fn no_error_bar_shrinks_through_a_frozen_output() {
+    no_bar_shrinks(Stand::FrozenU, &[10.0, 100.0]);
+}
+
+#[test]
+fn no_error_bar_shrinks_through_two_frozen_channels() {
+    no_bar_shrinks(Stand::Frozen, &[10.0, 100.0]);
+}
+
+#[test]
+fn no_error_bar_shrinks_through_a_constant_error() {
+    no_bar_shrinks(Stand::ConstantE, &[10.0, 100.0]);
+}
+
+#[test]
+fn a_long_rest_is_as_a_short_one_and_tracking_goes_on_behind_it() {
+    let record = record(Condition::C1);
+    for options in all_options() {
+        let (mut tracker, begin) = through(&options, &record, Stand::Rest, 1000.0);
+        for ((name, before), (_, after)) in begin.iter().zip(bars(&tracker)) {
+            assert!(after >= before * (1.0 - 1e-9), "{}: {name}", options.method.name());
+        }
+        let theta = tracker.theta().to_vec();
+        let first = (BEFORE_S / record.sample_time().s()) as usize;
+        for k in first..record.len() {
+            tracker.step(record.input()[k], record.output()[k]);
+        }
+        assert!(
+            !tracker.is_paused() && tracker.theta() != theta,
+            "{}",
+            options.method.name()
+        );
+        // A few seconds of news do not make bars that are a hundredth of what they were.
+        for ((name, before), (_, after)) in begin.iter().zip(bars(&tracker)) {
+            assert!(
+                after >= 0.05 * before,
+                "{}: {name} {before:e} {after:e}",
+                options.method.name()
+            );
+        }
+    }
+}
+
+/// A record with a rest: the trace says when nothing arrived, and one without is not told of any.
+#[test]
+fn the_time_without_excitation_is_a_finding() {
+    let whole = record(Condition::C1);
+    let rest = |signal: &[f64]| {
+        let (head, tail) = signal.split_at(4100);
+        [head, &[0.0; 3000], tail].concat()
+    };
+    let channel = |name: &str, values: Vec<f64>| Channel::new(name, "", values);
+    let with_rest = Record::new(
+        whole.sample_time(),
+        channel("e", rest(whole.input())),
+        channel("u", rest(whole.output())),
+    )
+    .unwrap();
+    for method in [
+        Method::rls(),
+        Method::rpem(),
+        hoid_survey::rriv(),
+        hoid_survey::window(),
+        hoid_survey::fused(),
+    ] {
+        let options = TrackOptions::usual(method.clone(), DELAY);
+        let trace = track(&with_rest, &options, 50).unwrap();
+        let said = trace.verdict(&with_rest, None).unwrap();
+        let said: Vec<&str> = said.reasons().collect();
+        assert!(
+            said.iter().any(|words| words.contains("idle in e, u at 41")),
+            "{method}: {said:?}"
+        );
+        assert_eq!(track(&whole, &options, 50).unwrap().faults(), [], "{method}");
+    }
+    let as_it_comes = TrackOptions::usual(Method::rls(), DELAY)
+        .with(&[("guard", "no")])
+        .unwrap();
+    assert_eq!(track(&with_rest, &as_it_comes, 50).unwrap().faults(), []);
+}

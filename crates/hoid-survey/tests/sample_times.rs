@@ -1,0 +1,89 @@
+//! Trackers at every sample time, from a microsecond to days: each takes its samples or refuses with the
+//! sample time and the remedy.
+#![allow(clippy::unwrap_used)]
+
+use hoid_ident::{IdentError, NamedOrders, order_selection::Criterion};
+use hoid_model::{Channel, Record, SampleTime};
+use hoid_track::{Method, StartAt, TrackOptions, TrackPlan, Tracker, ranges_of};
+
+const LONGEST_S: f64 = std::f64::consts::PI;
+
+fn sample_times() -> impl Iterator<Item = f64> {
+    (-24..=24).map(|quarter| 10_f64.powf(f64::from(quarter) / 4.0))
+}
+
+/// Two sums of sines with a lag, which is enough to be taken.
+fn signals(k: usize) -> (f64, f64) {
+    let x = k as f64;
+    (
+        (0.3 * x).sin() + (0.071 * x).cos(),
+        (0.3 * x - 0.6).sin() + 0.4 * (0.071 * x).cos(),
+    )
+}
+
+fn starts(options: &TrackOptions) -> Vec<TrackOptions> {
+    let of = |start: StartAt| TrackOptions {
+        start,
+        ..options.clone()
+    };
+    let p = options.orders.parameter_names().len();
+    vec![
+        of(StartAt::Span(None)),
+        of(StartAt::Nothing),
+        of(StartAt::Theta(vec![0.1; p])),
+    ]
+}
+
+fn refused_as_it_should_be(error: &IdentError, ts: f64) -> bool {
+    let text = error.to_string();
+    text.contains("sample time of a tracker") && text.contains(&format!("{ts} s")) && text.contains("ms")
+}
+
+#[test]
+fn every_method_takes_samples_or_says_that_the_sample_time_is_too_long() {
+    for method in hoid_survey::methods() {
+        for ts in sample_times() {
+            let sample_time = SampleTime::new(ts).unwrap();
+            for options in starts(&TrackOptions::told_nothing(method.clone(), sample_time)) {
+                let made = Tracker::new(&options, None, sample_time);
+                if ts >= LONGEST_S {
+                    assert!(refused_as_it_should_be(&made.unwrap_err(), ts), "{method} at {ts} s");
+                    continue;
+                }
+                let Ok(mut tracker) = made else { continue };
+                for k in 0..300 {
+                    let (e, u) = signals(k);
+                    tracker.step(e, u);
+                }
+                assert_eq!(tracker.counts().samples, 300);
+                let _ = (tracker.operator(), tracker.response(1.0), tracker.open_loop());
+            }
+        }
+    }
+}
+
+#[test]
+fn a_start_from_a_span_and_a_plan_say_so_too() {
+    for ts in sample_times().filter(|ts| *ts >= LONGEST_S) {
+        let sample_time = SampleTime::new(ts).unwrap();
+        let (e, u) = (0..400).map(signals).unzip();
+        let record = Record::new(sample_time, Channel::new("e", "", e), Channel::new("u", "", u)).unwrap();
+        for method in hoid_survey::methods() {
+            let options = TrackOptions::usual(method.clone(), 2);
+            let made = Tracker::new(&options, Some(&record), sample_time);
+            assert!(refused_as_it_should_be(&made.unwrap_err(), ts), "{method} at {ts} s");
+            let ranges = ranges_of(&method, options.structure, &NamedOrders::new(), &[], sample_time).unwrap();
+            let planned = TrackPlan::new(options, ranges, Criterion::Bic, sample_time);
+            assert!(refused_as_it_should_be(&planned.unwrap_err(), ts), "{method} at {ts} s");
+        }
+    }
+}
+
+#[test]
+fn adaptive_by_default_takes_every_sample_time_of_recordings() {
+    for ts in [0.001, 0.01, 1.0 / 60.0, 0.1] {
+        let sample_time = SampleTime::new(ts).unwrap();
+        let options = TrackOptions::told_nothing(Method::default(), sample_time);
+        assert!(Tracker::new(&options, None, sample_time).is_ok(), "{ts}");
+    }
+}

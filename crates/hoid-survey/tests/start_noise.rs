@@ -1,0 +1,48 @@
+//! A start whose operator is that of the grey box keeps the noise model that was asked for.
+#![allow(clippy::unwrap_used)]
+
+use std::collections::BTreeMap;
+
+use hoid_ident::Constraint;
+use hoid_model::{
+    Record, SampleTime,
+    scenario::{Condition, Scenario},
+};
+use hoid_sim::{RunSeed, Simulator};
+use hoid_survey::MultipleModelOptions;
+use hoid_track::{TrackOptions, Tracker};
+
+fn span() -> Record {
+    let simulator = Simulator::new(&Scenario::condition(Condition::C1)).unwrap();
+    simulator
+        .run(RunSeed::default(), false)
+        .unwrap()
+        .span(0.0, 30.0)
+        .unwrap()
+}
+
+/// Bounds that the Box-Jenkins fit cannot keep lead to the grey box.
+fn outside() -> TrackOptions {
+    let mut own = MultipleModelOptions::default();
+    own.bounds.bound = BTreeMap::from([("omega_nm".to_owned(), Constraint::Between(20.0, 30.0))]);
+    TrackOptions::usual(own.into(), 29)
+}
+
+#[test]
+fn a_start_outside_the_bounds_keeps_the_order_of_its_noise_model() {
+    let (span, options) = (span(), outside());
+    let tracker = Tracker::new(&options, Some(&span), SampleTime::HUNDREDTH).unwrap();
+    let names = tracker.parameter_names();
+    let d: Vec<f64> = names
+        .iter()
+        .zip(tracker.theta())
+        .filter(|(name, _)| name.starts_with('d'))
+        .map(|(_, d)| *d)
+        .collect();
+    assert_eq!(d.len(), 6);
+    assert!(d.iter().skip(1).any(|d| d.abs() > 0.02), "{d:?}");
+    // The innovations of its first samples are as white as those of the fit: their variance is
+    // that of the start.
+    let fit = tracker.start().unwrap();
+    assert!(tracker.innovation_variance() <= fit.innovation_variance() * 1.001);
+}
