@@ -6,7 +6,7 @@ use std::{collections::BTreeMap, process::Command};
 use serde_json::Value;
 
 /// What each crate may depend on within the workspace.
-const ALLOWED: [(&str, &[&str]); 21] = [
+const ALLOWED: [(&str, &[&str]); 22] = [
     ("hoid-numerics", &[]),
     ("hoid-core", &["hoid-numerics"]),
     ("hoid-embedded", &["hoid-core"]),
@@ -74,10 +74,15 @@ const ALLOWED: [(&str, &[&str]); 21] = [
         ],
     ),
     (
+        "hoid-design",
+        &["hoid-numerics", "hoid-model", "hoid-io", "hoid-analysis", "hoid-study"],
+    ),
+    (
         "hoid-report",
         &[
             "hoid-numerics",
             "hoid-analysis",
+            "hoid-design",
             "hoid-model",
             "hoid-ident",
             "hoid-io",
@@ -104,6 +109,7 @@ const ALLOWED: [(&str, &[&str]); 21] = [
             "hoid-numerics",
             "hoid-analysis",
             "hoid-core",
+            "hoid-design",
             "hoid-model",
             "hoid-ident",
             "hoid-lanes",
@@ -120,6 +126,7 @@ const ALLOWED: [(&str, &[&str]); 21] = [
         "hoid-python",
         &[
             "hoid-analysis",
+            "hoid-design",
             "hoid-model",
             "hoid-ident",
             "hoid-sim",
