@@ -1,6 +1,7 @@
 //! What ends a command early, and with which exit code.
 
 use hoid::analysis::{AnalysisError, registry::estimator_setting};
+use hoid::design::compare::CompareError;
 use hoid::ident::IdentError;
 use hoid::io::{IoError, ScenarioFileError};
 use hoid::model::{ModelError, Verdict, VerdictLevel};
@@ -38,6 +39,8 @@ pub enum CliError {
     Stopped(String),
     #[error(transparent)]
     Study(#[from] StudyError),
+    #[error(transparent)]
+    Compare(#[from] CompareError),
     #[error(transparent)]
     Model(#[from] ModelError),
     #[error(transparent)]
@@ -136,6 +139,9 @@ impl CliError {
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::Usage(_)
+            | Self::Compare(
+                CompareError::Factor { .. } | CompareError::Quantity { .. } | CompareError::NotInJson { .. },
+            )
             | Self::Io(IoError::OutputIsInput { .. } | IoError::OutputAmongInputs { .. })
             | Self::Study(StudyError::Io(IoError::OutputIsInput { .. } | IoError::OutputAmongInputs { .. }))
             | Self::Study(StudyError::Plan { .. } | StudyError::BadShard { .. } | StudyError::Pattern { .. }) => 2,

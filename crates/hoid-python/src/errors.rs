@@ -6,6 +6,7 @@ use hoid_analysis::{
     AnalysisError,
     registry::{CHANGE, OPERATOR, REMNANT},
 };
+use hoid_design::compare::CompareError;
 use hoid_ident::IdentError;
 use hoid_io::{IoError, ScenarioFileError};
 use hoid_model::{ModelError, NotConvertible, UnknownName};
@@ -165,6 +166,21 @@ impl From<SimError> for Failure {
             SimError::Model(error) => error.into(),
             other => Self(OptionError::new_err(other.to_string())),
         }
+    }
+}
+
+impl From<CompareError> for Failure {
+    fn from(error: CompareError) -> Self {
+        let text = in_python(&error.to_string());
+        Self(match error {
+            CompareError::Study(error) => return error.into(),
+            CompareError::Analysis(error) => return error.into(),
+            CompareError::Quantity { .. } | CompareError::Factor { .. } | CompareError::NotInJson { .. } => {
+                OptionError::new_err(text)
+            }
+            CompareError::NoGroup { .. } => FormatError::new_err(text),
+            _ => DataError::new_err(text),
+        })
     }
 }
 

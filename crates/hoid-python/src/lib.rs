@@ -15,6 +15,7 @@
 //! | `track`, `tracker` | recursive estimates, over a record and live |
 //! | `simulate` | scenarios, margins, conversions |
 //! | `describing` | describing functions |
+//! | `compare` | conditions and people compared |
 //! | `study`, `group` | studies, the reproduction, groups |
 //! | `files`, `survey` | files of records and tables, and what is in them |
 //! | `interrupt` | long work that an interrupt can end |
@@ -24,6 +25,7 @@
 )]
 
 mod arrays;
+mod compare;
 mod controlled_element;
 mod describing;
 mod errors;
@@ -59,6 +61,8 @@ fn _pyhoid(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<track::PyTrace>()?;
     module.add_class::<tracker::PyTracker>()?;
     for function in [
+        wrap_pyfunction!(compare::compare, module)?,
+        wrap_pyfunction!(compare::comparison_figure_of, module)?,
         wrap_pyfunction!(describing::describe, module)?,
         wrap_pyfunction!(describing::describing_function, module)?,
         wrap_pyfunction!(files::check_record, module)?,

@@ -42,6 +42,7 @@
 //! | [`Report::of_operator`], [`operator_figure`], [`sentence_of_operator`] | the page of the operator of a person |
 //! | [`TrackReport`], [`TraceSection`], [`BatchLine`], [`batch_fit`], [`default_batch_fits`] | one such page about recursive estimates over a record |
 //! | [`GroupReport`], [`GroupTables`], [`write_group_pages`], [`group_figures`] | one such page about a group of recorded runs |
+//! | [`comparison_figure`] | people by condition, with the means |
 //! | [`PaperTable`] | a result as a table for a paper |
 //! | [`facts`] | the settings on all of these pages |
 //! | [`figures`] | the figures of these pages, each as an SVG text of its own |
@@ -52,6 +53,7 @@
 
 mod answer;
 mod cells;
+mod comparison;
 mod error;
 mod facts;
 pub mod figures;
@@ -66,6 +68,7 @@ mod tables;
 mod track;
 
 pub use answer::{Answer, AnswerRow, sentence};
+pub use comparison::comparison_figure;
 pub use error::ReportError;
 pub use facts::facts;
 pub use group::{

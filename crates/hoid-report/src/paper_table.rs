@@ -53,10 +53,11 @@ impl PaperTable {
         let comments = vec![format!(
             "hoid {}: {}, {}",
             text("hoid"),
-            [text("kind"), text("group")].concat(),
+            [text("kind"), text("group")].join(" ").trim(),
             level.unwrap_or_default()
         )];
         let columns = match (object.get("people"), object.get("lines")) {
+            _ if text("kind") == "comparison" => of_differences(object.get("differences")?.as_array()?),
             (Some(people), _) => of_people(people.as_array()?),
             (None, Some(lines)) if text("kind") == "description" => of_lines(lines.as_array()?),
             _ => of_estimates(object),
@@ -305,6 +306,41 @@ fn of_people(people: &[Value]) -> Vec<Column> {
     };
     columns.push(column("verdict", text(&level)));
     columns
+}
+
+/// The differences of a comparison, one a row.
+fn of_differences(all: &[Value]) -> Vec<Column> {
+    let text = |of: &dyn Fn(&Value) -> String| Cells::Text(all.iter().map(of).collect());
+    let word = |d: &Value, key: &str| d[key].as_str().unwrap_or_default().to_owned();
+    let ends = |place: usize| {
+        Cells::End(
+            all.iter()
+                .map(|d| [number(&d["interval"][place]), number(&d["standard_error"])])
+                .collect(),
+        )
+    };
+    let numbers = |of: &dyn Fn(&Value) -> f64| Cells::Number(all.iter().map(of).collect());
+    let values = all.iter().map(|d| [number(&d["value"]), number(&d["standard_error"])]);
+    let people = |d: &Value| d["people"].as_array().map_or(0, Vec::len) as f64;
+    vec![
+        column("quantity", text(&|d| word(d, "quantity"))),
+        column("unit", text(&|d| word(d, "unit"))),
+        column("factor", text(&|d| word(d, "factor"))),
+        column("levels", text(&|d| format!("{} - {}", word(d, "to"), word(d, "from")))),
+        column(
+            "difference",
+            Cells::Estimate(values.collect(), "standard_error".to_owned()),
+        ),
+        column("low", ends(0)),
+        column("high", ends(1)),
+        column("n", numbers(&people)),
+        column("df", numbers(&|d| number(&d["degrees_of_freedom"]))),
+        column("t", numbers(&|d| number(&d["t"]))),
+        column("p", numbers(&|d| number(&d["p"]))),
+        column("p_adjusted", numbers(&|d| number(&d["p_adjusted"]))),
+        column("effect", text(&|d| word(&d["effect_size"], "name"))),
+        column("size", numbers(&|d| number(&d["effect_size"]["value"]))),
+    ]
 }
 
 /// How a table is written as a text.

@@ -64,6 +64,8 @@
 #[cfg(feature = "io")]
 pub use hoid_analysis as analysis;
 pub use hoid_core as core;
+#[cfg(feature = "study")]
+pub use hoid_design as design;
 pub use hoid_ident as ident;
 #[cfg(feature = "io")]
 pub use hoid_io as io;

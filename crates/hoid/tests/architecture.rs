@@ -94,10 +94,15 @@ const ALLOWED: [(&str, &[&str]); 22] = [
         ],
     ),
     (
+        "hoid-design",
+        &["hoid-numerics", "hoid-model", "hoid-io", "hoid-analysis", "hoid-study"],
+    ),
+    (
         "hoid-report",
         &[
             "hoid-numerics",
             "hoid-analysis",
+            "hoid-design",
             "hoid-model",
             "hoid-ident",
             "hoid-io",
@@ -125,6 +130,7 @@ const ALLOWED: [(&str, &[&str]); 22] = [
             "hoid-numerics",
             "hoid-analysis",
             "hoid-core",
+            "hoid-design",
             "hoid-model",
             "hoid-ident",
             "hoid-lanes",
@@ -142,6 +148,7 @@ const ALLOWED: [(&str, &[&str]); 22] = [
         "hoid-python",
         &[
             "hoid-analysis",
+            "hoid-design",
             "hoid-model",
             "hoid-ident",
             "hoid-sim",

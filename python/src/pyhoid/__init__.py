@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 from . import errors
 from ._pyhoid import __version__
+from .comparison import Comparison, compare
 from .control_models import from_control
 from .conversion import Conversion, DiscreteTransferFunction, convert, discretise
 from .description import DescribingFunction, Description, describe, describing_function
@@ -55,6 +56,7 @@ if TYPE_CHECKING:
     from . import plots as plots
 
 __all__ = [
+    "Comparison",
     "Conversion",
     "DataError",
     "DescribingFunction",
@@ -87,6 +89,7 @@ __all__ = [
     "Validation",
     "Verdict",
     "__version__",
+    "compare",
     "convert",
     "describe",
     "describing_function",

@@ -43,6 +43,8 @@ __all__ = [
     "__version__",
     "batch_estimators",
     "check_record",
+    "compare",
+    "comparison_figure_of",
     "convert_discrete",
     "convert_operator",
     "decimated",
@@ -474,6 +476,17 @@ def group(
     csv: bool,
     progress: _Progress,
 ) -> tuple[bool, int]: ...
+def compare(
+    results: _Path,
+    *,
+    factors: list[str],
+    variation: str | None,
+    of: list[str],
+    covariate: str | None,
+    adjust: str,
+    weights: str,
+) -> str: ...
+def comparison_figure_of(text: str) -> str: ...
 def from_json(text: str) -> OperatorFit | Fit | TimeVaryingFit: ...
 def from_state(text: str) -> Fit: ...
 def group_manifest(directory: _Path, pattern: str) -> tuple[str, list[str]]: ...

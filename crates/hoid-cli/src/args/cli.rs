@@ -3,6 +3,7 @@
 use clap::{Parser, Subcommand};
 
 use super::{
+    compare::CompareArgs,
     convert::{ConvertArgs, InfoArgs},
     describe::DescribeArgs,
     fmu::FmuArgs,
@@ -79,6 +80,11 @@ pub enum Command {
     /// `hoid group init DIR` looks at the files and writes a manifest; `hoid group DIR --out OUT` fits
     /// each run, and each person in each condition, and writes tables and pages.
     Group(GroupArgs),
+    /// Whether conditions differ, and people
+    ///
+    /// Differences between the conditions or people of a group, with intervals, tests, effect sizes and a sentence each: what
+    /// `hoid group` found of each person, over people.
+    Compare(CompareArgs),
     /// A virtual experiment for `hoid group`
     ///
     /// Simulates subjects, conditions and runs, with the truth beside them.

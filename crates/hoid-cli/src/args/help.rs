@@ -20,7 +20,9 @@ struct Help {
 const GROUPS: [(&str, &[&str]); 5] = [
     (
         "Recordings",
-        &["info", "identify", "describe", "track", "stream", "lab", "group", "fmu"],
+        &[
+            "info", "identify", "describe", "track", "stream", "lab", "group", "compare", "fmu",
+        ],
     ),
     ("Simulation", &["demo", "simulate", "simulate-group"]),
     ("Models", &["convert", "margins"]),
@@ -28,7 +30,7 @@ const GROUPS: [(&str, &[&str]); 5] = [
     ("This program", &["completions", "man", "help"]),
 ];
 
-const HELP: [Help; 17] = [
+const HELP: [Help; 18] = [
     Help {
         command: "lab",
         examples: &["hoid lab --open", "hoid lab --config lab.toml --out study"],
@@ -154,6 +156,14 @@ const HELP: [Help; 17] = [
     Help {
         command: "group",
         examples: &["hoid group init runs", "hoid group runs --out results"],
+        shown: &[],
+    },
+    Help {
+        command: "compare",
+        examples: &[
+            "hoid compare results",
+            "hoid compare results --factor 'plant:H1=C1r,C1p;H2=C2r,C2p' --of crossover,tau_e --out comparison",
+        ],
         shown: &[],
     },
     Help {

@@ -16,10 +16,12 @@
 //! | `lab` | `hoid lab` |
 //! | `shell` | `hoid completions`, `hoid man` |
 //! | `help` | all commands: what `-h` shows, headings, examples |
+//! | `compare` | `hoid compare` |
 //! | `group`, `study` | `hoid group`, `hoid simulate-group`; `hoid study`, `hoid reproduce` |
 
 mod choices;
 mod cli;
+mod compare;
 mod convert;
 mod describe;
 mod figure;
@@ -40,6 +42,7 @@ mod study;
 mod udp;
 
 pub use cli::{Cli, Command};
+pub use compare::CompareArgs;
 pub use convert::{ConvertArgs, InfoArgs};
 pub use describe::DescribeArgs;
 pub use fmu::{FmuArgs, OperatorChoice};

@@ -1,5 +1,6 @@
 //! One command a file. A command resolves what was typed once, calls the library, and prints.
 
+pub mod compare;
 pub mod convert;
 pub mod demo;
 pub mod describe;

@@ -37,6 +37,8 @@ use crate::statistics::median;
 
 /// Label of a run that could not be read.
 pub(super) const READ: &str = "read";
+/// Label of what is of the recording itself.
+pub(super) const RECORD: &str = "record";
 /// Name of the table of people.
 pub(super) const PEOPLE: &str = "people";
 
@@ -164,7 +166,7 @@ impl<'a> RunAnalysis<'a> {
             ("rms_u", root_mean_square(record.output())),
         ];
         for (name, value) in of_record.into_iter().chain(change) {
-            self.rows.row(Some(windows[2]), "record", name, Estimate::fixed(value));
+            self.rows.row(Some(windows[2]), RECORD, name, Estimate::fixed(value));
         }
         // Names of structures and recursions were checked with the manifest.
         for structure in self.settings.polynomials().unwrap_or_default() {

@@ -10,6 +10,7 @@
 //! | `reading` | runs from files, and what was done to them |
 //! | `analysis` | what is done with the runs of a person in a condition (`block`) and with one run, in which `windows`, with which orders (`run_orders`), and the rows of it (`run_rows`) |
 //! | `family_fits`, [`Person`] | the operator of a person in a condition, and its row in the table of people |
+//! | [`RunEstimates`] | what was found in each run, read back from the tables |
 //! | [`GroupSummary`] | what failed, the people, and the verdict on the whole group |
 //! | `traces` | its recursive estimates as rows |
 //! | `responses` | frequency responses of the fits |
@@ -42,6 +43,7 @@ mod read_settings;
 mod reading;
 mod responses;
 mod run;
+mod run_estimates;
 mod run_orders;
 mod run_rows;
 mod sampling_defects;
@@ -63,6 +65,7 @@ pub use person::{Person, PersonStatus};
 pub use preparation_settings::{NumberOrText, PreparationSettings};
 pub use read_settings::{Detrending, FaultTreatment, ReadSettings};
 pub use run::run_group;
+pub use run_estimates::RunEstimates;
 pub use sampling_defects::SamplingDefect;
 pub use summary::{GroupSummary, RunFailure};
 pub use virtual_people::{PeopleExperiment, simulate_people};

@@ -132,6 +132,11 @@ impl Person {
         }
     }
 
+    /// Whether it is of all runs together; where some parameters are individual there is a row for each run.
+    pub fn is_of_all_runs(&self) -> bool {
+        self.run == ALL
+    }
+
     /// A parameter by its name.
     pub fn parameter(&self, name: &str) -> Option<&Parameter> {
         self.parameters.iter().find(|p| p.name == name)
@@ -139,7 +144,7 @@ impl Person {
 
     /// Who and where: `P03 in fo`.
     pub fn name(&self) -> String {
-        let of_run = if self.run == ALL {
+        let of_run = if self.is_of_all_runs() {
             String::new()
         } else {
             format!(", run {}", self.run)

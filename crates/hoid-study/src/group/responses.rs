@@ -57,6 +57,7 @@ pub(super) fn followed_phases_deg(response: &[Complex64]) -> Vec<f64> {
 pub(super) struct ResponseAverages(BTreeMap<Key, BTreeMap<u64, [Vec<f64>; 2]>>);
 
 /// Median response of an estimator over the runs of a subject and condition.
+#[derive(Debug, Clone, PartialEq, Default)]
 pub(super) struct MedianResponse {
     pub omega_rad_s: Vec<f64>,
     pub magnitude_db: Vec<f64>,
@@ -66,13 +67,18 @@ pub(super) struct MedianResponse {
 impl MedianResponse {
     /// The response at a frequency, by straight lines over log omega; none beyond the grid.
     pub fn at(&self, omega_rad_s: f64) -> Option<Complex64> {
+        let [decibel, degrees] = self.decibel_and_degrees(omega_rad_s)?;
+        Some(Complex64::from_polar(10f64.powf(decibel / 20.0), degrees.to_radians()))
+    }
+
+    /// The same as gain and phase.
+    pub fn decibel_and_degrees(&self, omega_rad_s: f64) -> Option<[f64; 2]> {
         let k = self.omega_rad_s.partition_point(|omega| *omega <= omega_rad_s);
         let (low, high) = (k.checked_sub(1)?, k);
         let (from, to) = (*self.omega_rad_s.get(low)?, *self.omega_rad_s.get(high)?);
         let part = (omega_rad_s / from).ln() / (to / from).ln();
         let between = |values: &[f64]| values[low] + part * (values[high] - values[low]);
-        let modulus = 10f64.powf(between(&self.magnitude_db) / 20.0);
-        Some(Complex64::from_polar(modulus, between(&self.phase_deg).to_radians()))
+        Some([between(&self.magnitude_db), between(&self.phase_deg)])
     }
 }
 

@@ -1,0 +1,225 @@
+//! `hoid compare`: differences between conditions and people, from the results of a group.
+
+use std::path::Path;
+
+use hoid::design::compare::{Comparing, Comparison, Difference, GroupEstimates, Variation};
+use hoid::model::numbers::{self, with_uncertainty};
+use hoid::report::{PaperTable, comparison_figure};
+
+use super::{figure, paper_table, places};
+use crate::{args::CompareArgs, error::CliError, json, output, table::Rows, text};
+
+/// The files of `--out`: tables, the figure, the sentences.
+const TABLES: [&str; 3] = ["differences.csv", "differences.md", "differences.tex"];
+const FIGURE: &str = "people.svg";
+const SENTENCES: &str = "sentences.txt";
+const OBJECT: &str = "comparison.json";
+
+pub fn run(args: &CompareArgs) -> Result<(), CliError> {
+    if let Some(figure) = &args.picture.figure {
+        figure::check(figure)?;
+    }
+    paper_table::check(&args.show)?;
+    let files = [args.picture.figure.as_deref(), args.show.table.as_deref()];
+    places::check(&[&args.results], &files, &[])?;
+    if let Some(out) = &args.out {
+        hoid::io::check_output_directory(out, &[&args.results])?;
+    }
+    let variation = match (args.within, args.between) {
+        (true, _) => Some(Variation::Within),
+        (_, true) => Some(Variation::Between),
+        _ => None,
+    };
+    let comparing = Comparing {
+        factors: args.factor.clone(),
+        variation,
+        of: args.of.clone(),
+        covariate: args.covariate,
+        adjustment: args.adjust,
+        weights: args.weights,
+    };
+    let found = comparing.run(&GroupEstimates::read(&args.results)?)?;
+    if let Some(path) = &args.picture.figure {
+        figure::write(path, &comparison_figure(&found), args.picture.width)?;
+    }
+    paper_table::write(&args.show, || Ok(found.json()))?;
+    if let Some(out) = &args.out {
+        write_all(&found, out)?;
+    }
+    if args.show.json {
+        json::print(&serde_json::Value::Object(found.json()))?;
+    } else {
+        output::show(&page(&found, args.show.verbose))?;
+    }
+    CliError::of_verdict(&found.verdict)
+}
+
+fn write_all(found: &Comparison, out: &Path) -> Result<(), CliError> {
+    hoid::io::make_directory(out)?;
+    let write =
+        |name: &str, text: &str| hoid::io::write_atomically(&out.join(name), |file| file.write_all(text.as_bytes()));
+    write(OBJECT, &found.to_json())?;
+    write(SENTENCES, &sentences(found))?;
+    write(FIGURE, &comparison_figure(found))?;
+    if let Some(table) = PaperTable::of(&found.json()) {
+        for name in TABLES {
+            table.write(&out.join(name))?;
+        }
+    }
+    output::notice("", format!("all of it: {}", out.display()));
+    Ok(())
+}
+
+fn sentences(found: &Comparison) -> String {
+    found.differences.iter().map(|d| format!("{}\n", d.sentence)).collect()
+}
+
+fn page(found: &Comparison, verbose: bool) -> String {
+    let mut page = format!(
+        "{}\n\n{}\n",
+        text::verdict(&found.verdict).trim_end(),
+        differences(found)
+    );
+    page.push_str(
+        "Mean over people ± standard error; people are weighted by their errors and the variance between them; intervals of 95 % \
+         by Hartung and Knapp.\n",
+    );
+    if !found.learning.is_empty() {
+        page.push_str(&format!("\nChange a run\n{}\n", learning(found)));
+    }
+    if verbose {
+        page.push_str(&format!(
+            "\nMeans over people\n{}\n\nPeople\n{}\n",
+            means(found),
+            people(found)
+        ));
+    }
+    page.push_str(&format!("\n{}", sentences(found)));
+    if verbose {
+        page.push_str(&text::settings(&found.settings));
+    }
+    page
+}
+
+fn differences(found: &Comparison) -> Rows {
+    let all = &found.differences;
+    let several = all.iter().any(|d| d.factor != all[0].factor);
+    let adjusted = all.iter().any(|d| d.p_adjusted != d.estimate.p);
+    let sizes: Vec<&str> = all
+        .iter()
+        .filter_map(|d| Some(d.effect_size.as_ref()?.name.as_str()))
+        .collect();
+    // One size for all stands in the head.
+    let size = sizes.first().filter(|name| sizes.iter().all(|other| other == *name));
+    let mut header = vec!["quantity"];
+    header.extend(several.then_some("factor"));
+    header.extend(["levels", "difference", "95 % from", "to", "t (df)", "p"]);
+    header.extend(adjusted.then_some("adjusted"));
+    header.extend([size.copied().unwrap_or("size"), "n"]);
+    let mut rows = text::table(&header);
+    for d in all {
+        let error = Some(d.estimate.standard_error);
+        let digits = |v: f64| with_uncertainty(v, error).0;
+        let (value, error) = with_uncertainty(d.estimate.value, error);
+        let of_size = d
+            .effect_size
+            .as_ref()
+            .map(|s| (s.name.as_str(), numbers::significant(s.value, 2)));
+        let of_size = match (of_size, size) {
+            (None, _) => String::new(),
+            (Some((_, value)), Some(_)) => value,
+            (Some((name, value)), None) => format!("{name} = {value}"),
+        };
+        let mut cells = vec![with_unit(d)];
+        cells.extend(several.then(|| d.factor.clone()));
+        cells.extend([
+            format!("{} - {}", d.to, d.from),
+            format!("{value} ± {error}"),
+            digits(d.estimate.interval.0),
+            digits(d.estimate.interval.1),
+            format!("{} ({})", numbers::significant(d.estimate.t, 2), d.degrees_of_freedom),
+            numbers::significant(d.estimate.p, 2),
+        ]);
+        cells.extend(adjusted.then(|| numbers::significant(d.p_adjusted, 2)));
+        cells.extend([of_size, d.people.len().to_string()]);
+        rows.add_row(cells);
+    }
+    rows
+}
+
+fn with_unit(d: &Difference) -> String {
+    match d.quantity.unit() {
+        "" => d.quantity.to_string(),
+        unit => format!("{} ({unit})", d.quantity),
+    }
+}
+
+fn learning(found: &Comparison) -> Rows {
+    let mut rows = text::table(&["quantity", "condition", "a run", "95 % from", "to", "p", "n"]);
+    for l in &found.learning {
+        let error = Some(l.estimate.standard_error);
+        let digits = |v: f64| with_uncertainty(v, error).0;
+        let (value, error) = with_uncertainty(l.estimate.value, error);
+        rows.add_row([
+            l.quantity.to_string(),
+            l.condition.clone(),
+            format!("{value} ± {error}"),
+            digits(l.estimate.interval.0),
+            digits(l.estimate.interval.1),
+            text::significant(l.estimate.p),
+            l.people.to_string(),
+        ]);
+    }
+    rows
+}
+
+fn means(found: &Comparison) -> Rows {
+    let mut rows = text::table(&[
+        "quantity",
+        "condition",
+        "group",
+        "mean",
+        "95 % from",
+        "to",
+        "SD of people",
+        "n",
+    ]);
+    for m in &found.means {
+        let error = Some(m.estimate.standard_error);
+        let digits = |v: f64| with_uncertainty(v, error).0;
+        let (value, error) = with_uncertainty(m.estimate.value, error);
+        rows.add_row([
+            m.quantity.to_string(),
+            m.condition.clone(),
+            m.group.clone(),
+            format!("{value} ± {error}"),
+            digits(m.estimate.interval.0),
+            digits(m.estimate.interval.1),
+            text::significant(m.tau),
+            m.people.to_string(),
+        ]);
+    }
+    rows
+}
+
+fn people(found: &Comparison) -> Rows {
+    let mut rows = text::table(&["quantity", "person", "condition", "value", "runs"]);
+    for e in &found.estimates {
+        let value = match e.standard_error {
+            Some(error) => {
+                let (value, error) = with_uncertainty(e.value, Some(error));
+                format!("{value} ± {error}")
+            }
+            None => text::significant(e.value),
+        };
+        let cells = [
+            e.quantity.to_string(),
+            e.subject.clone(),
+            e.condition.clone(),
+            value,
+            e.runs.to_string(),
+        ];
+        rows.add_row(cells);
+    }
+    rows
+}

@@ -1,0 +1,109 @@
+//! Conditions compared, from what `hoid group --json` printed.
+#![allow(clippy::unwrap_used)]
+
+mod common;
+
+use std::fs;
+
+use common::{bad, good, hoid};
+use tempfile::TempDir;
+
+/// Three people in two conditions, one of them without a crossover in the second.
+fn results() -> TempDir {
+    let directory = TempDir::new().unwrap();
+    let mut people = Vec::new();
+    for (subject, fo, so) in [
+        ("P03", 2.0, 1.2),
+        ("P05", 4.0, 3.3),
+        ("P09", 3.0, 2.6),
+        ("P11", 3.5, f64::NAN),
+    ] {
+        for (condition, crossover) in [("fo", fo), ("so", so)] {
+            people.push(serde_json::json!({
+                "subject": subject, "condition": condition, "run": "all", "runs": 10, "status": "ok", "form": "lead",
+                "parameters": {"tau_e": {"value": 0.6 / fo, "standard_error": 0.01, "determined": true, "prior_share": 0.0}},
+                "open_loop": {"crossover_rad_s": {"value": crossover, "standard_error": 0.1}},
+                "verdict": {"level": "trustworthy", "reasons": [], "notes": []},
+            }));
+        }
+    }
+    let object = serde_json::json!({"group": "pilots", "people": people});
+    fs::write(directory.path().join("results.json"), object.to_string()).unwrap();
+    directory
+}
+
+#[test]
+fn conditions_are_compared() {
+    let directory = results();
+    let at = directory.path();
+    let said = good(at, &["compare", "results.json", "--of", "crossover", "-v"]);
+    assert!(said.starts_with("Verdict: doubtful"), "{said}");
+    assert!(said.contains("without P11 in so: it has no crossover"), "{said}");
+    let sentence =
+        "crossover fell by 0.63 rad/s from fo to so (95 % 0.12 to 1.15, t(2) = -5.3, p = 0.034, d_z = -3, n = 3)";
+    assert!(said.contains(sentence), "{said}");
+    assert!(
+        said.contains("Means over people") && said.contains("Settings given: of: crossover"),
+        "{said}"
+    );
+
+    let arguments = [
+        "compare",
+        "results.json",
+        "--of",
+        "crossover",
+        "--out",
+        "all",
+        "--table",
+        "t.tex",
+        "--figure",
+        "f.svg",
+        "--json",
+    ];
+    let printed = good(at, &arguments);
+    let object: serde_json::Value = serde_json::from_str(&printed).unwrap();
+    assert_eq!(object["kind"], "comparison");
+    assert_eq!(object["left_out"][0]["subject"], "P11");
+    assert_eq!(
+        fs::read_to_string(at.join("all/comparison.json")).unwrap().trim(),
+        printed.trim()
+    );
+    assert_eq!(
+        fs::read_to_string(at.join("all/sentences.txt")).unwrap().trim(),
+        sentence
+    );
+    assert_eq!(
+        fs::read(at.join("all/differences.tex")).unwrap(),
+        fs::read(at.join("t.tex")).unwrap()
+    );
+    let table = fs::read_to_string(at.join("t.tex")).unwrap();
+    assert!(
+        table.starts_with("% hoid") && table.contains("comparison pilots, doubtful"),
+        "{table}"
+    );
+    assert!(table.contains("so - fo & $-0.63 \\pm 0.12$"), "{table}");
+    assert!(fs::read_to_string(at.join("f.svg")).unwrap().contains(">P09</text>"));
+}
+
+#[test]
+fn mistakes_have_remedies() {
+    let directory = results();
+    let at = directory.path();
+    for (arguments, code, word) in [
+        (&["--of", "speed"][..], 2, "expected crossover"),
+        (&["--of", "rms_e"], 2, "name the directory"),
+        (&["--factor", "display"], 2, "the conditions are fo, so"),
+        (&["--between"], 2, "varies within people"),
+        (&["--within", "--between"], 2, "cannot be used with"),
+    ] {
+        let all = [&["compare", "results.json"], arguments].concat();
+        let (found, said) = bad(at, &all);
+        assert!(found == code && said.contains(word), "{arguments:?}: {found}, {said}");
+    }
+    let (code, said) = bad(at, &["compare", "."]);
+    assert!(code == 1 && said.contains("there is no group.toml"), "{said}");
+    // Nobody has a margin: that is told, and nothing is determined.
+    let output = hoid(at, &["compare", "results.json", "--of", "phase_margin"]);
+    assert_eq!(output.status.code(), Some(1));
+    assert!(String::from_utf8(output.stdout).unwrap().contains("without P03 in fo"));
+}

@@ -1,0 +1,535 @@
+//! From a group to a comparison.
+
+use hoid_analysis::Setting;
+use hoid_model::{Finding, Verdict, named_choice};
+
+use super::{
+    Coefficient, CompareError, Comparison, Difference, GroupEstimates, Learning, LeftOut, Mean, MetaRegression,
+    Observation, PersonEstimate, Quantity, Variation, Weights,
+    adjust::holm,
+    contrast::{Contrast, Resolved, conditions_of, contrasts},
+    d_z,
+    factor::Factor,
+    group_estimates::Known,
+    hedges_g,
+    learning::Practice,
+    meta_mean, meta_regression,
+    sentence::sentence,
+};
+
+/// What is done about many tests.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Adjustment {
+    /// Holm's, over all differences of the comparison.
+    #[default]
+    Holm,
+    /// Nothing.
+    None,
+}
+
+named_choice!(Adjustment, "adjustment", 2, {
+    Holm => "holm",
+    None => "none",
+});
+
+/// What differs from run to run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Covariate {
+    /// The number of the run.
+    Run,
+}
+
+named_choice!(Covariate, "covariate", 1, {
+    Run => "run",
+});
+
+/// How people and conditions are compared.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Comparing {
+    /// The factors; the conditions where there is none.
+    pub factors: Vec<Factor>,
+    /// Where they vary; found from the group where it is not said.
+    pub variation: Option<Variation>,
+    /// What is compared; [`Quantity::usual`], as far as it is there, where there is nothing.
+    pub of: Vec<Quantity>,
+    /// What is taken out of the estimates.
+    pub covariate: Option<Covariate>,
+    /// What is done about many tests.
+    pub adjustment: Adjustment,
+    /// How people are weighted.
+    pub weights: Weights,
+}
+
+/// Part of a parameter that is prior, beyond which differences are drawn together.
+const PRIOR_WEIGHS: f64 = 0.5;
+
+impl Comparing {
+    /// Compares.
+    ///
+    /// # Errors
+    /// Those of factors without meaning, and [`CompareError::NotInJson`]. What cannot be estimated of somebody is part of the result.
+    pub fn run(&self, group: &GroupEstimates) -> Result<Comparison, CompareError> {
+        let asked = match self.factors.is_empty() {
+            true => vec![Factor::conditions()],
+            false => self.factors.clone(),
+        };
+        let resolve = |factor: &Factor| Resolved::of(factor, self.variation.filter(|_| asked.len() == 1), group);
+        let factors: Vec<Resolved> = asked.iter().map(resolve).collect::<Result<_, _>>()?;
+        let contrasts = contrasts(&factors, group)?;
+        let quantities = match self.of.is_empty() {
+            true => Quantity::usual(),
+            false => self.of.clone(),
+        };
+        if !group.has_runs() {
+            let from_runs = |q: &&Quantity| matches!(q.column(), None | Some("rms_e" | "rms_u"));
+            let what = self.covariate.map(|_| "what each run says".to_owned());
+            if let Some(what) = what.or(quantities.iter().find(from_runs).map(Quantity::words)) {
+                return Err(CompareError::NotInJson { what });
+            }
+        }
+        let mut at_work = Work {
+            group,
+            factors: &factors,
+            covariate: self.covariate,
+            weights: self.weights,
+            findings: Vec::new(),
+            apart: Vec::new(),
+            result: Comparison {
+                group: group.name.clone(),
+                estimates: Vec::new(),
+                means: Vec::new(),
+                differences: Vec::new(),
+                learning: Vec::new(),
+                left_out: Vec::new(),
+                settings: self.settings(&factors, &quantities),
+                verdict: Verdict::of(Vec::new()),
+            },
+        };
+        for quantity in &quantities {
+            at_work.compare(quantity, &contrasts);
+        }
+        let Work {
+            mut result,
+            mut findings,
+            apart,
+            ..
+        } = at_work;
+        let not_compared = |(why, names): (String, Vec<String>)| {
+            let are = if names.len() == 1 { "is" } else { "are" };
+            Finding::doubt(
+                "forms-differ",
+                format!("{} {are} not compared: {why}", names.join(", ")),
+            )
+        };
+        findings.extend(apart.into_iter().map(not_compared));
+        let p: Vec<f64> = result.differences.iter().map(|d| d.estimate.p).collect();
+        let adjusted = match self.adjustment {
+            Adjustment::Holm => holm(&p),
+            Adjustment::None => p,
+        };
+        for (difference, p) in result.differences.iter_mut().zip(adjusted) {
+            difference.p_adjusted = p;
+            difference.sentence = sentence(difference, self.adjustment == Adjustment::Holm);
+        }
+        if result.differences.is_empty() {
+            findings.push(Finding::undetermined(
+                "nothing-compared",
+                "there is no difference: too few people have what was asked for in all of its levels",
+            ));
+        }
+        findings.extend(missing(&result));
+        findings.extend(doubtful(group, &result));
+        result.verdict = Verdict::of(findings);
+        Ok(result)
+    }
+
+    fn settings(&self, factors: &[Resolved], quantities: &[Quantity]) -> Vec<Setting> {
+        let joined = |all: Vec<String>| all.join("; ");
+        let level = |l: &super::contrast::Members| match l.members.as_slice() {
+            [one] if *one == l.name => l.name.clone(),
+            all => format!("{} ({})", l.name, all.join(", ")),
+        };
+        let factor = |f: &Resolved| {
+            let levels: Vec<String> = f.levels.iter().map(level).collect();
+            format!("{}, {} people: {}", f.name, f.variation.name(), levels.join(", "))
+        };
+        let names: Vec<String> = quantities.iter().map(Quantity::to_string).collect();
+        vec![
+            Setting::new("factor", joined(factors.iter().map(factor).collect())).given(!self.factors.is_empty()),
+            Setting::new("of", names.join(", ")).given(!self.of.is_empty()),
+            Setting::new("covariate", self.covariate.map_or("none", Covariate::name)).given(self.covariate.is_some()),
+            Setting::new("adjust", self.adjustment.name()).given(self.adjustment != Adjustment::default()),
+            Setting::new("weights", self.weights.name()).given(self.weights != Weights::default()),
+        ]
+    }
+}
+
+/// A comparison in the making.
+struct Work<'a> {
+    group: &'a GroupEstimates,
+    factors: &'a [Resolved],
+    covariate: Option<Covariate>,
+    weights: Weights,
+    findings: Vec<Finding>,
+    /// Parameters that are of several forms, by the reason.
+    apart: Vec<(String, Vec<String>)>,
+    result: Comparison,
+}
+
+/// The estimate of a cell, or why there is none, and its change a run.
+type OfCell = (String, String, Result<(Known, Option<Coefficient>), String>);
+
+impl Work<'_> {
+    fn compare(&mut self, quantity: &Quantity, contrasts: &[Contrast]) {
+        let cells = self.cells(quantity);
+        if !self.is_comparable(quantity, &cells) {
+            return;
+        }
+        self.keep(quantity, &cells);
+        for contrast in contrasts {
+            self.difference(quantity, contrast, &cells);
+        }
+    }
+
+    /// The estimates of all people and conditions that are compared.
+    fn cells(&self, quantity: &Quantity) -> Vec<OfCell> {
+        let conditions = conditions_of(self.factors, self.group);
+        let practice = self.covariate.map(|Covariate::Run| Practice::of(self.group, quantity));
+        let is_in = |subject: &str| {
+            let mut between = self.factors.iter().filter(|f| f.of_people);
+            between.all(|factor| !factor.levels_of(subject, self.group).is_empty())
+        };
+        let cells = self.group.cells.iter();
+        let cells = cells.filter(|cell| conditions.contains(&cell.condition) && is_in(&cell.subject));
+        cells
+            .map(|cell| {
+                let found = self.group.estimate(cell, quantity).and_then(|known| match &practice {
+                    None => Ok((known, None)),
+                    Some(practice) => {
+                        let [at_middle, slope] = practice.of_cell(self.group, cell, quantity)?;
+                        let known = Known {
+                            value: at_middle.value,
+                            standard_error: Some(at_middle.standard_error),
+                            ..known
+                        };
+                        Ok((known, Some(slope)))
+                    }
+                });
+                (cell.subject.clone(), cell.condition.clone(), found)
+            })
+            .collect()
+    }
+
+    /// Parameters are those of one form alone.
+    fn is_comparable(&mut self, quantity: &Quantity, cells: &[OfCell]) -> bool {
+        let mut forms: Vec<(&str, Vec<String>)> = Vec::new();
+        for (subject, condition, _) in cells {
+            let form = self
+                .group
+                .cell(subject, condition)
+                .map_or("", |cell| cell.form.as_str());
+            let name = format!("{subject} in {condition}");
+            match forms.iter_mut().find(|(known, _)| *known == form) {
+                _ if form.is_empty() => {}
+                Some((_, names)) => names.push(name),
+                None => forms.push((form, vec![name])),
+            }
+        }
+        if forms.len() < 2 || !matches!(quantity, Quantity::Parameter(_)) {
+            return true;
+        }
+        let all: Vec<String> = forms
+            .iter()
+            .map(|(form, names)| format!("{form}: {}", names.join(", ")))
+            .collect();
+        let all = all.join("; ");
+        if quantity.is_of_any_form() {
+            self.findings.push(Finding::note(
+                "forms-differ",
+                format!("{} is that of different forms ({all})", quantity.words()),
+            ));
+            return true;
+        }
+        let most = forms.iter().max_by_key(|(_, names)| names.len()).map_or("", |f| f.0);
+        let why = format!(
+            "a parameter means the same in one form alone ({all}); say form = \"{most}\" under [analysis] in group.toml and run the group again"
+        );
+        match self.apart.iter_mut().find(|(known, _)| *known == why) {
+            Some((_, names)) => names.push(quantity.to_string()),
+            None => self.apart.push((why, vec![quantity.to_string()])),
+        }
+        false
+    }
+
+    /// The estimates, their means by condition, and the changes from run to run.
+    fn keep(&mut self, quantity: &Quantity, cells: &[OfCell]) {
+        let group_of = |subject: &str| {
+            let between = self.factors.iter().find(|f| f.of_people);
+            let level =
+                between.and_then(|factor| factor.levels_of(subject, self.group).first().map(|l| (*l).to_owned()));
+            level.unwrap_or_default()
+        };
+        let mut prior = Vec::new();
+        for (subject, condition, found) in cells {
+            match found {
+                Ok((known, _)) => {
+                    if known.prior_share > PRIOR_WEIGHS {
+                        prior.push(format!("{subject} in {condition} {:.0} %", 100.0 * known.prior_share));
+                    }
+                    self.result.estimates.push(PersonEstimate {
+                        quantity: quantity.clone(),
+                        subject: subject.clone(),
+                        condition: condition.clone(),
+                        group: group_of(subject),
+                        value: known.value,
+                        standard_error: known.standard_error,
+                        runs: known.runs,
+                    });
+                }
+                Err(reason) => self.result.left_out.push(LeftOut {
+                    quantity: quantity.clone(),
+                    subject: subject.clone(),
+                    condition: condition.clone(),
+                    reason: reason.clone(),
+                }),
+            }
+        }
+        if !prior.is_empty() {
+            self.findings.push(Finding::doubt(
+                "prior-weighs",
+                format!(
+                    "{quantity} is mostly prior ({}): one prior for all draws people together and differences towards zero; prior = \"none\" under [analysis] in group.toml leaves it out",
+                    prior.join(", ")
+                ),
+            ));
+        }
+        let own = self.result.estimates.iter().filter(|e| e.quantity == *quantity);
+        let mut places: Vec<(String, String, Vec<Known>)> = Vec::new();
+        for e in own {
+            let known = known_of(e);
+            match places.iter_mut().find(|(c, g, _)| (c, g) == (&e.condition, &e.group)) {
+                Some((_, _, of)) => of.push(known),
+                None => places.push((e.condition.clone(), e.group.clone(), vec![known])),
+            }
+        }
+        for (condition, group, of) in places {
+            if let Ok(found) = meta_mean(&observations(&of), self.weights) {
+                self.result.means.push(Mean {
+                    quantity: quantity.clone(),
+                    condition,
+                    group,
+                    people: of.len(),
+                    tau: found.tau_squared.sqrt(),
+                    estimate: found.coefficients[0],
+                });
+            }
+        }
+        self.learning(quantity, cells);
+    }
+
+    fn learning(&mut self, quantity: &Quantity, cells: &[OfCell]) {
+        let slopes = |condition: Option<&String>| -> Vec<Known> {
+            let of = cells
+                .iter()
+                .filter(|(_, c, _)| condition.is_none_or(|condition| condition == c));
+            let slope = |c: &Coefficient| Known {
+                value: c.value,
+                standard_error: Some(c.standard_error),
+                determined: true,
+                prior_share: 0.0,
+                runs: 0,
+            };
+            of.filter_map(|(_, _, found)| found.as_ref().ok()?.1.as_ref().map(slope))
+                .collect()
+        };
+        for condition in conditions_of(self.factors, self.group) {
+            let of = slopes(Some(&condition));
+            if let Ok(found) = meta_mean(&observations(&of), self.weights) {
+                self.result.learning.push(Learning {
+                    quantity: quantity.clone(),
+                    condition,
+                    people: of.len(),
+                    estimate: found.coefficients[0],
+                });
+            }
+        }
+    }
+
+    /// One difference, of the people who have all that it takes.
+    fn difference(&mut self, quantity: &Quantity, contrast: &Contrast, cells: &[OfCell]) {
+        let mut people: Vec<(String, usize)> = Vec::new();
+        let mut of: Vec<Known> = Vec::new();
+        for (subject, weights, group) in &contrast.people {
+            let mut sum = known(0.0, Some(0.0));
+            let mut whole = true;
+            for (condition, weight) in weights {
+                let cell = cells.iter().find(|(s, c, _)| s == subject && c == condition);
+                match cell {
+                    Some((_, _, Ok((known, _)))) => {
+                        sum.value += weight * known.value;
+                        let both = sum.standard_error.zip(known.standard_error);
+                        sum.standard_error = both.map(|(a, b)| a.hypot(weight * b));
+                    }
+                    Some(_) => whole = false,
+                    None => {
+                        whole = false;
+                        let out = LeftOut {
+                            quantity: quantity.clone(),
+                            subject: subject.clone(),
+                            condition: condition.clone(),
+                            reason: "they have no run there".to_owned(),
+                        };
+                        if !self.result.left_out.contains(&out) {
+                            self.result.left_out.push(out);
+                        }
+                    }
+                }
+            }
+            if whole {
+                people.push((subject.clone(), *group));
+                of.push(sum);
+            }
+        }
+        let name = format!(
+            "{} of {}, {} - {}",
+            quantity.words(),
+            contrast.factor,
+            contrast.to,
+            contrast.from
+        );
+        let weighted = observations(&of);
+        let flat: Vec<Observation> = weighted.iter().map(|o| Observation { variance: 0.0, ..*o }).collect();
+        let fitted = |all: &[Observation]| fitted(contrast, &people, all, self.weights);
+        let found = fitted(&weighted).and_then(|found| Ok((found, fitted(&flat)?)));
+        let (found, unweighted) = match found {
+            Ok(both) => both,
+            Err(error) => {
+                self.findings
+                    .push(Finding::doubt("no-difference", format!("{name}: {error}")));
+                return;
+            }
+        };
+        if weighted.iter().all(|o| o.variance == 0.0) {
+            self.findings.push(Finding::note(
+                "no-errors",
+                format!("{name}: some people have no standard error, and each counts the same"),
+            ));
+        }
+        if found.degrees_of_freedom < 2 {
+            self.findings.push(Finding::doubt(
+                "few-people",
+                format!(
+                    "{name}: {} people leave one degree of freedom, and an interval of so few says little",
+                    people.len()
+                ),
+            ));
+        }
+        let values = |of_group: Option<usize>| -> Vec<f64> {
+            let both = people.iter().zip(&of);
+            let is = |group: usize| of_group.is_none_or(|wanted| wanted == group);
+            both.filter(|((_, group), _)| is(*group))
+                .map(|(_, k)| k.value)
+                .collect()
+        };
+        let (last, plain) = (found.coefficients.len() - 1, unweighted.coefficients.len() - 1);
+        self.result.differences.push(Difference {
+            quantity: quantity.clone(),
+            factor: contrast.factor.clone(),
+            variation: contrast.variation,
+            from: contrast.from.clone(),
+            to: contrast.to.clone(),
+            effect: contrast.effect.clone(),
+            estimate: found.coefficients[last],
+            degrees_of_freedom: found.degrees_of_freedom,
+            p_adjusted: found.coefficients[last].p,
+            effect_size: match contrast.variation {
+                Variation::Within => d_z(&values(None)),
+                Variation::Between => hedges_g(&values(Some(0)), &values(Some(1))),
+            },
+            tau: found.tau_squared.sqrt(),
+            i_squared: found.i_squared,
+            heterogeneity: found.heterogeneity,
+            unweighted: unweighted.coefficients[plain],
+            sentence: String::new(),
+            people,
+        });
+    }
+}
+
+/// The mean, or the difference of the groups.
+fn fitted(
+    contrast: &Contrast,
+    people: &[(String, usize)],
+    all: &[Observation],
+    weights: Weights,
+) -> Result<MetaRegression, CompareError> {
+    match contrast.variation {
+        Variation::Within => meta_mean(all, weights),
+        Variation::Between => {
+            let x: Vec<Vec<f64>> = people.iter().map(|(_, group)| vec![1.0, *group as f64]).collect();
+            meta_regression(all, &x, weights)
+        }
+    }
+}
+
+/// With the squares of the errors; where somebody has none each counts the same.
+fn observations(all: &[Known]) -> Vec<Observation> {
+    let known = all
+        .iter()
+        .all(|k| k.standard_error.is_some_and(|e| e > 0.0 && e.is_finite()));
+    let one = |k: &Known| Observation {
+        value: k.value,
+        variance: k.standard_error.filter(|_| known).map_or(0.0, |e| e * e),
+    };
+    all.iter().map(one).collect()
+}
+
+fn known(value: f64, standard_error: Option<f64>) -> Known {
+    Known {
+        value,
+        standard_error,
+        determined: true,
+        prior_share: 0.0,
+        runs: 0,
+    }
+}
+
+fn known_of(e: &PersonEstimate) -> Known {
+    known(e.value, e.standard_error)
+}
+
+/// Who is missing, by their reason.
+fn missing(result: &Comparison) -> Vec<Finding> {
+    let mut all: Vec<(String, Vec<String>)> = Vec::new();
+    for out in &result.left_out {
+        let name = format!("{} in {}: {}", out.subject, out.condition, out.reason);
+        match all.iter_mut().find(|(known, _)| *known == name) {
+            Some((_, of)) => of.push(out.quantity.to_string()),
+            None => all.push((name, vec![out.quantity.to_string()])),
+        }
+    }
+    let one =
+        |(name, of): (String, Vec<String>)| Finding::doubt("left-out", format!("without {name} ({})", of.join(", ")));
+    all.into_iter().map(one).collect()
+}
+
+/// People whose own verdict is doubtful, and who count.
+fn doubtful(group: &GroupEstimates, result: &Comparison) -> Option<Finding> {
+    let counts = |subject: &str, condition: &str| {
+        let mut all = result.estimates.iter();
+        all.any(|e| e.subject == subject && e.condition == condition)
+    };
+    let cells = group
+        .cells
+        .iter()
+        .filter(|cell| cell.doubtful && counts(&cell.subject, &cell.condition));
+    let names: Vec<String> = cells
+        .map(|cell| format!("{} in {}", cell.subject, cell.condition))
+        .collect();
+    (!names.is_empty()).then(|| {
+        Finding::note(
+            "person-doubtful",
+            format!("the operator of {} is doubtful by itself, and counts", names.join(", ")),
+        )
+    })
+}

@@ -1,0 +1,359 @@
+//! What is compared of each person: a sum of their conditions with weights.
+//!
+//! - A factor **within** people: the mean over the conditions of the one level less that over those of the other, so
+//!   that a second factor is averaged out. One contrast a person, and its mean over people: no assumption on how the conditions of
+//!   a person scatter together (sphericity) is left, and a mixed model of the balanced experiment says the same.
+//! - A factor **between** people: the mean over the conditions that they have, and the difference of two groups of people.
+//! - **Two factors within**: beside each of them their interaction, by how much the effect of the first differs between the
+//!   levels of the second. **One within, one between**: the effect of the first, compared between the groups.
+
+use std::collections::BTreeMap;
+
+use super::{
+    CompareError, GroupEstimates,
+    factor::{CONDITION, Factor, Variation},
+};
+
+/// A level with what belongs to it.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Members {
+    pub name: String,
+    pub members: Vec<String>,
+}
+
+/// A factor whose levels are known, and where it varies.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Resolved {
+    pub name: String,
+    pub variation: Variation,
+    pub levels: Vec<Members>,
+    /// Whether the members are people, not conditions.
+    pub of_people: bool,
+}
+
+/// One comparison: weights of conditions, and the two groups of people where it is between them.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Contrast {
+    pub factor: String,
+    pub variation: Variation,
+    pub from: String,
+    pub to: String,
+    /// Of an interaction the effect that differs, and its levels.
+    pub effect: Option<[String; 3]>,
+    /// People with the weights of their conditions, of group 0 or 1.
+    pub people: Vec<(String, BTreeMap<String, f64>, usize)>,
+}
+
+impl Resolved {
+    pub fn of(factor: &Factor, wanted: Option<Variation>, group: &GroupEstimates) -> Result<Self, CompareError> {
+        let bad = |reason: String| CompareError::Factor {
+            name: factor.name.clone(),
+            reason,
+        };
+        let (conditions, subjects) = (group.conditions(), group.subjects());
+        let levels: Vec<Members> = if !factor.levels.is_empty() {
+            let of = factor.levels.iter().map(|level| Members {
+                name: level.name.clone(),
+                members: level.members.clone(),
+            });
+            of.collect()
+        } else if factor.name == CONDITION {
+            let own = |name: &String| Members {
+                name: name.clone(),
+                members: vec![name.clone()],
+            };
+            conditions.iter().map(own).collect()
+        } else {
+            return Err(bad(format!(
+                "its levels are not known; the conditions are {}, the people {}",
+                conditions.join(", "),
+                subjects.join(", ")
+            )));
+        };
+        if levels.len() < 2 {
+            return Err(bad(format!(
+                "there is one level, {}",
+                levels.first().map_or("", |l| &l.name)
+            )));
+        }
+        let all: Vec<&String> = levels.iter().flat_map(|level| &level.members).collect();
+        let of_people =
+            all.iter().all(|member| subjects.contains(member)) && !all.iter().all(|m| conditions.contains(m));
+        let pool = if of_people { &subjects } else { &conditions };
+        if let Some(other) = all.iter().find(|member| !pool.contains(member)) {
+            return Err(bad(format!(
+                "{other} is no condition and nobody in this group: the conditions are {}, the people {}",
+                conditions.join(", "),
+                subjects.join(", ")
+            )));
+        }
+        let mut resolved = Self {
+            name: factor.name.clone(),
+            variation: Variation::Between,
+            levels,
+            of_people,
+        };
+        let in_two = subjects
+            .iter()
+            .find(|subject| resolved.levels_of(subject, group).len() > 1);
+        resolved.variation = match (wanted, in_two) {
+            (Some(Variation::Between), Some(subject)) => {
+                let both = resolved.levels_of(subject, group);
+                return Err(bad(format!(
+                    "{subject} is in {}: it varies within people",
+                    both.join(" and ")
+                )));
+            }
+            (Some(Variation::Within), None) => {
+                return Err(bad(
+                    "nobody is in two of its levels: it varies between people".to_owned()
+                ));
+            }
+            (_, Some(_)) => Variation::Within,
+            (_, None) => Variation::Between,
+        };
+        Ok(resolved)
+    }
+
+    /// The levels that a person is in.
+    pub fn levels_of(&self, subject: &str, group: &GroupEstimates) -> Vec<&str> {
+        let is_in = |level: &&Members| {
+            if self.of_people {
+                level.members.iter().any(|member| member == subject)
+            } else {
+                level
+                    .members
+                    .iter()
+                    .any(|condition| group.cell(subject, condition).is_some())
+            }
+        };
+        self.levels
+            .iter()
+            .filter(is_in)
+            .map(|level| level.name.as_str())
+            .collect()
+    }
+
+    fn pairs(&self) -> impl Iterator<Item = (&Members, &Members)> {
+        let levels = &self.levels;
+        (0..levels.len()).flat_map(move |a| (a + 1..levels.len()).map(move |b| (&levels[a], &levels[b])))
+    }
+}
+
+/// The conditions that count: those of all factors over conditions.
+pub(super) fn conditions_of(factors: &[Resolved], group: &GroupEstimates) -> Vec<String> {
+    let counts = |condition: &String| {
+        let mut over = factors.iter().filter(|factor| !factor.of_people);
+        over.all(|factor| factor.levels.iter().any(|level| level.members.contains(condition)))
+    };
+    group.conditions().into_iter().filter(counts).collect()
+}
+
+/// All comparisons of these factors.
+pub(super) fn contrasts(factors: &[Resolved], group: &GroupEstimates) -> Result<Vec<Contrast>, CompareError> {
+    let conditions = conditions_of(factors, group);
+    let between: Vec<&Resolved> = factors.iter().filter(|f| f.variation == Variation::Between).collect();
+    if let [_, second, ..] = between[..] {
+        return Err(CompareError::Factor {
+            name: second.name.clone(),
+            reason: "a second factor between people: compare one of them at a time".to_owned(),
+        });
+    }
+    let within: Vec<&Resolved> = factors.iter().filter(|f| f.variation == Variation::Within).collect();
+    let mut all = Vec::new();
+    let everybody = |weights: &BTreeMap<String, f64>| -> Vec<_> {
+        let of = |subject: &String| weights.keys().any(|c| group.cell(subject, c).is_some());
+        let subjects = group.subjects().into_iter().filter(of);
+        subjects.map(|subject| (subject, weights.clone(), 0)).collect()
+    };
+    for factor in &within {
+        for (a, b) in factor.pairs() {
+            let weights = difference(&conditions, a, b);
+            all.push(Contrast {
+                factor: factor.name.clone(),
+                variation: Variation::Within,
+                from: a.name.clone(),
+                to: b.name.clone(),
+                effect: None,
+                people: everybody(&weights),
+            });
+        }
+    }
+    for (k, first) in within.iter().enumerate() {
+        for second in &within[k + 1..] {
+            for (a, b) in first.pairs() {
+                for (c, d) in second.pairs() {
+                    let inside = |level: &Members| -> Vec<String> {
+                        conditions
+                            .iter()
+                            .filter(|name| level.members.contains(name))
+                            .cloned()
+                            .collect()
+                    };
+                    let mut weights = difference(&inside(d), a, b);
+                    for (condition, weight) in difference(&inside(c), a, b) {
+                        *weights.entry(condition).or_insert(0.0) -= weight;
+                    }
+                    all.push(Contrast {
+                        factor: format!("{} × {}", first.name, second.name),
+                        variation: Variation::Within,
+                        from: c.name.clone(),
+                        to: d.name.clone(),
+                        effect: Some([first.name.clone(), a.name.clone(), b.name.clone()]),
+                        people: everybody(&weights),
+                    });
+                }
+            }
+        }
+    }
+    for factor in between {
+        for (a, b) in factor.pairs() {
+            let side = |level: &Members, place: usize, weights: &dyn Fn(&str) -> BTreeMap<String, f64>| -> Vec<_> {
+                let is = |subject: &String| factor.levels_of(subject, group).contains(&level.name.as_str());
+                let subjects = group.subjects().into_iter().filter(is);
+                subjects
+                    .map(|subject| (subject.clone(), weights(&subject), place))
+                    .collect()
+            };
+            let mean = |level: &Members| {
+                let of_level: Vec<String> = match factor.of_people {
+                    true => conditions.clone(),
+                    false => conditions
+                        .iter()
+                        .filter(|c| level.members.contains(c))
+                        .cloned()
+                        .collect(),
+                };
+                move |_: &str| {
+                    of_level
+                        .iter()
+                        .map(|c| (c.clone(), 1.0 / of_level.len() as f64))
+                        .collect()
+                }
+            };
+            let contrast = |factor: String, effect, people| Contrast {
+                factor,
+                variation: Variation::Between,
+                from: a.name.clone(),
+                to: b.name.clone(),
+                effect,
+                people,
+            };
+            let people = [side(a, 0, &mean(a)), side(b, 1, &mean(b))].concat();
+            all.push(contrast(factor.name.clone(), None, people));
+            if !factor.of_people {
+                continue;
+            }
+            for other in &within {
+                for (c, d) in other.pairs() {
+                    let weights = difference(&conditions, c, d);
+                    let of = |_: &str| weights.clone();
+                    let people = [side(a, 0, &of), side(b, 1, &of)].concat();
+                    let name = format!("{} × {}", other.name, factor.name);
+                    let effect = Some([other.name.clone(), c.name.clone(), d.name.clone()]);
+                    all.push(contrast(name, effect, people));
+                }
+            }
+        }
+    }
+    Ok(all)
+}
+
+/// The mean over the conditions of b less that over those of a.
+fn difference(conditions: &[String], a: &Members, b: &Members) -> BTreeMap<String, f64> {
+    let mut weights = BTreeMap::new();
+    for (level, sign) in [(a, -1.0), (b, 1.0)] {
+        let of: Vec<&String> = conditions.iter().filter(|c| level.members.contains(c)).collect();
+        for condition in &of {
+            weights.insert((*condition).clone(), sign / of.len() as f64);
+        }
+    }
+    weights
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::{super::group_estimates::tests::group, *};
+
+    fn of(people: &[(&str, &str)], factors: &[&str]) -> Result<Vec<Contrast>, CompareError> {
+        let people: Vec<_> = people.iter().map(|(s, c)| (*s, *c, 1.0, 0.1)).collect();
+        let group = group(&people);
+        let resolved = factors.iter().map(|f| Resolved::of(&f.parse()?, None, &group));
+        contrasts(&resolved.collect::<Result<Vec<_>, _>>()?, &group)
+    }
+
+    fn weights(contrast: &Contrast) -> Vec<(&str, f64)> {
+        let (_, weights, _) = &contrast.people[0];
+        weights.iter().map(|(c, w)| (c.as_str(), *w)).collect()
+    }
+
+    const TWO_BY_TWO: [(&str, &str); 8] = [
+        ("P", "1r"),
+        ("P", "1p"),
+        ("P", "2r"),
+        ("P", "2p"),
+        ("Q", "1r"),
+        ("Q", "1p"),
+        ("Q", "2r"),
+        ("Q", "2p"),
+    ];
+
+    #[test]
+    fn two_factors_within_people_and_their_interaction() {
+        let all = of(&TWO_BY_TWO, &["plant:H1=1r,1p;H2=2r,2p", "axis:roll=1r,2r;pitch=1p,2p"]).unwrap();
+        assert_eq!(all.len(), 3);
+        assert_eq!(weights(&all[0]), [("1p", -0.5), ("1r", -0.5), ("2p", 0.5), ("2r", 0.5)]);
+        assert_eq!((all[1].from.as_str(), all[1].to.as_str()), ("roll", "pitch"));
+        assert_eq!(all[2].factor, "plant × axis");
+        // (2p - 1p) - (2r - 1r)
+        assert_eq!(weights(&all[2]), [("1p", -1.0), ("1r", 1.0), ("2p", 1.0), ("2r", -1.0)]);
+    }
+
+    #[test]
+    fn conditions_in_pairs_and_groups_of_people() {
+        let three = [("P", "a"), ("P", "b"), ("P", "c"), ("Q", "a"), ("Q", "b")];
+        let all = of(&three, &["condition"]).unwrap();
+        let pairs: Vec<(&str, &str, usize)> = all
+            .iter()
+            .map(|c| (c.from.as_str(), c.to.as_str(), c.people.len()))
+            .collect();
+        // Q lacks c: that is found when its estimates are looked for, and named.
+        assert_eq!(pairs, [("a", "b", 2), ("a", "c", 2), ("b", "c", 2)]);
+        let all = of(&three[..4], &["who:one=P;two=Q"]).unwrap();
+        assert_eq!((all.len(), all[0].variation), (1, Variation::Between));
+        assert_eq!(all[0].people.iter().map(|p| p.2).collect::<Vec<_>>(), [0, 1]);
+        // Each person in one condition.
+        let all = of(&[("P", "a"), ("Q", "b"), ("R", "a")], &["condition"]).unwrap();
+        assert_eq!((all[0].variation, all[0].people.len()), (Variation::Between, 3));
+        assert_eq!(weights(&all[0]), [("a", 1.0)]);
+        let all = of(&TWO_BY_TWO, &["plant:H1=1r,1p;H2=2r,2p", "who:one=P;two=Q"]).unwrap();
+        assert_eq!(
+            all.iter().map(|c| c.factor.as_str()).collect::<Vec<_>>(),
+            ["plant", "who", "plant × who"]
+        );
+    }
+
+    #[test]
+    fn factors_without_meaning_are_refused() {
+        let people = [("P", "a"), ("P", "b"), ("Q", "a"), ("Q", "b")];
+        for (factors, word) in [
+            (&["display"][..], "levels are not known"),
+            (&["x:a;z"], "z is no condition"),
+            (&["who:one=P;two=Q", "else:1=P;2=Q"], "one of them at a time"),
+        ] {
+            let error = of(&people, factors).unwrap_err().to_string();
+            assert!(error.contains(word), "{error}");
+        }
+        assert!(
+            of(&[("P", "a"), ("Q", "a")], &["condition"])
+                .unwrap_err()
+                .to_string()
+                .contains("one level")
+        );
+        let group = group(&[("P", "a", 1.0, 0.1), ("P", "b", 1.0, 0.1)]);
+        let factor = Factor::conditions();
+        let error = Resolved::of(&factor, Some(Variation::Between), &group).unwrap_err();
+        assert!(error.to_string().contains("P is in a and b"), "{error}");
+    }
+}

@@ -1,0 +1,138 @@
+//! Factors: what conditions, or people, differ in.
+//!
+//! A factor has levels, and a level members: conditions (`axis:roll=C1_roll,C2_roll;pitch=C1_pitch,C2_pitch`) or people
+//! (`training:yes=P1,P4;no=P2,P3`). It varies **within** people where each of them is in all of its levels, and **between** them
+//! where each is in one. Without more, conditions are the levels of the factor `condition`.
+
+use std::str::FromStr;
+
+use hoid_model::named_choice;
+use serde::{Deserialize, Serialize};
+
+use super::CompareError;
+
+/// The factor whose levels are the conditions.
+pub const CONDITION: &str = "condition";
+
+/// Where a factor varies.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Variation {
+    /// Each person is in all of its levels.
+    Within,
+    /// Each person is in one.
+    Between,
+}
+
+named_choice!(Variation, "variation", 2, {
+    Within => "within",
+    Between => "between",
+});
+
+/// A level of a factor.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Level {
+    /// What it is called.
+    pub name: String,
+    /// Its conditions or people.
+    pub members: Vec<String>,
+}
+
+/// A factor as it is asked for.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Factor {
+    /// What it is called.
+    pub name: String,
+    /// Its levels; none where they are those of the manifest, or the conditions.
+    pub levels: Vec<Level>,
+}
+
+impl Factor {
+    /// The conditions as levels.
+    pub fn conditions() -> Self {
+        Self {
+            name: CONDITION.to_owned(),
+            levels: Vec::new(),
+        }
+    }
+}
+
+impl FromStr for Factor {
+    type Err = CompareError;
+
+    fn from_str(text: &str) -> Result<Self, CompareError> {
+        let bad = |reason: String| CompareError::Factor {
+            name: text.to_owned(),
+            reason,
+        };
+        let (name, levels) = match text.split_once(':') {
+            None => (text, ""),
+            Some((_, levels)) if levels.trim().is_empty() => return Err(bad("no level is named".to_owned())),
+            Some(both) => both,
+        };
+        let mut factor = Self {
+            name: name.trim().to_owned(),
+            levels: Vec::new(),
+        };
+        if factor.name.is_empty() {
+            return Err(bad("it has no name".to_owned()));
+        }
+        for level in levels.split(';').filter(|level| !level.trim().is_empty()) {
+            let (name, members) = level.split_once('=').unwrap_or((level, level));
+            let members: Vec<String> = members
+                .split(',')
+                .map(|member| member.trim().to_owned())
+                .filter(|member| !member.is_empty())
+                .collect();
+            if members.is_empty() || name.trim().is_empty() {
+                return Err(bad(format!("the level {level:?} has no name or no members")));
+            }
+            factor.levels.push(Level {
+                name: name.trim().to_owned(),
+                members,
+            });
+        }
+        if factor.levels.len() == 1 {
+            return Err(bad("it has one level, expected two or more".to_owned()));
+        }
+        let mut known = Vec::new();
+        for member in factor.levels.iter().flat_map(|level| &level.members) {
+            if known.contains(&member) {
+                return Err(bad(format!("{member} is in two levels, or twice in one")));
+            }
+            known.push(member);
+        }
+        Ok(factor)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    #[test]
+    fn a_factor_is_read() {
+        let axis: Factor = "axis:roll=C1r, C2r;pitch=C1p,C2p".parse().unwrap();
+        assert_eq!((axis.name.as_str(), axis.levels.len()), ("axis", 2));
+        assert_eq!(axis.levels[0].members, ["C1r", "C2r"]);
+        // A level that is one condition needs no other name.
+        let plant: Factor = "plant:fo;so".parse().unwrap();
+        assert_eq!(
+            (plant.levels[1].name.as_str(), plant.levels[1].members.len()),
+            ("so", 1)
+        );
+        assert!("display".parse::<Factor>().unwrap().levels.is_empty());
+        for bad in [
+            "",
+            ":a;b",
+            "axis:",
+            "axis:a=x",
+            "axis:a=x;b=x",
+            "axis:a=;b=x",
+            "axis:=x;b=y",
+        ] {
+            assert!(bad.parse::<Factor>().is_err(), "{bad}");
+        }
+    }
+}

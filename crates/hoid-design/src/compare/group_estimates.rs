@@ -1,0 +1,393 @@
+//! What a group says of each person in each condition: from the directory of its results, or from the JSON that
+//! `hoid group` printed.
+//!
+//! A person in a condition is a cell. Crossover, margin and parameters are those of all runs together with
+//! the errors of the person; root mean squares are means over the runs, responses those of all runs, and the errors of both
+//! are the scatter between runs over the root of their number. Where some parameters are individual to each run, a
+//! cell is the mean of its runs.
+
+use std::{collections::BTreeMap, path::Path};
+
+use hoid_model::{VerdictLevel, uncertainty::Estimate};
+use hoid_numerics::statistics::{mean, sample_variance};
+use hoid_study::group::{GroupSummary, MANIFEST, Manifest, Person, PersonStatus, RunEstimates};
+use serde_json::Value;
+
+use super::{CompareError, Observation, Quantity};
+
+/// What is known of a number.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Known {
+    pub value: f64,
+    pub standard_error: Option<f64>,
+    pub determined: bool,
+    pub prior_share: f64,
+    pub runs: usize,
+}
+
+/// A person in a condition.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Cell {
+    pub subject: String,
+    pub condition: String,
+    pub form: String,
+    /// Why there is no operator of theirs.
+    pub missing: Option<String>,
+    pub doubtful: bool,
+    runs: usize,
+    known: BTreeMap<String, Known>,
+}
+
+/// The estimates of a group.
+#[derive(Debug, Clone, PartialEq)]
+pub struct GroupEstimates {
+    pub(super) name: String,
+    pub(super) cells: Vec<Cell>,
+    runs: Option<RunEstimates>,
+}
+
+impl GroupEstimates {
+    /// Reads a directory with the results of a group, or the JSON of one.
+    ///
+    /// # Errors
+    /// [`CompareError::NoGroup`] with what was found; those of tables that cannot be read.
+    pub fn read(place: &Path) -> Result<Self, CompareError> {
+        let none = |reason: String| CompareError::NoGroup {
+            place: place.display().to_string(),
+            reason,
+        };
+        if !place.is_dir() {
+            let bytes = hoid_io::read_bytes(place).map_err(hoid_study::StudyError::Io)?;
+            let object = serde_json::from_slice(&bytes).map_err(|error| none(format!("it is no JSON: {error}")))?;
+            return Self::of_json(&object).map_err(none);
+        }
+        let path = place.join(MANIFEST);
+        if !path.exists() {
+            return Err(none(format!("there is no {MANIFEST} in it")));
+        }
+        let manifest = Manifest::read(&path)?;
+        if !place.join("people.parquet").exists() {
+            return Err(none(
+                "there is no table people: it is not finished, or holds recordings".to_owned(),
+            ));
+        }
+        let summary = GroupSummary::read(&manifest, place)?;
+        Ok(Self {
+            name: manifest.name.clone(),
+            cells: merged(summary.people.iter().map(Cell::of_person).collect()),
+            runs: Some(RunEstimates::read(place)?),
+        })
+    }
+
+    /// From the object that `hoid group --json` prints.
+    fn of_json(object: &Value) -> Result<Self, String> {
+        let people = object["people"].as_array().ok_or("it has no people")?;
+        let cells: Vec<Cell> = people.iter().map(Cell::of_json).collect();
+        if cells.iter().any(|cell| cell.subject.is_empty()) {
+            return Err("a person of it has no subject".to_owned());
+        }
+        Ok(Self {
+            name: object["group"].as_str().unwrap_or("group").to_owned(),
+            cells: merged(cells),
+            runs: None,
+        })
+    }
+
+    /// The conditions, in the order of the manifest.
+    pub fn conditions(&self) -> Vec<String> {
+        distinct(self.cells.iter().map(|cell| &cell.condition))
+    }
+
+    /// The people, in the order of the manifest.
+    pub fn subjects(&self) -> Vec<String> {
+        distinct(self.cells.iter().map(|cell| &cell.subject))
+    }
+
+    pub(super) fn cell(&self, subject: &str, condition: &str) -> Option<&Cell> {
+        let is = |cell: &&Cell| cell.subject == subject && cell.condition == condition;
+        self.cells.iter().find(is)
+    }
+
+    /// A quantity of a cell, or why it has none.
+    pub(super) fn estimate(&self, cell: &Cell, quantity: &Quantity) -> Result<Known, String> {
+        let of_runs = || {
+            let all: Vec<f64> = self.of_runs(cell, quantity).into_iter().map(|(_, o)| o.value).collect();
+            if all.is_empty() {
+                return Err(format!("no run has its {}", quantity.words()));
+            }
+            Ok(over_runs(&all))
+        };
+        if matches!(quantity, Quantity::RmsE | Quantity::RmsU) {
+            return of_runs();
+        }
+        if let Some(why) = &cell.missing {
+            return Err(why.clone());
+        }
+        let Some(name) = quantity.column() else {
+            let response = self.response(cell, None, quantity);
+            let value = response.ok_or_else(|| format!("its operator has no {}", quantity.words()))?;
+            let scatter = of_runs().ok().filter(|runs| runs.runs > 1);
+            return Ok(Known {
+                value,
+                standard_error: scatter.and_then(|runs| runs.standard_error),
+                ..over_runs(&vec![value; cell.runs.max(1)])
+            });
+        };
+        let known = cell.known.get(name).copied();
+        let known = known
+            .filter(|k| k.value.is_finite() || !k.determined)
+            .ok_or_else(|| match quantity {
+                Quantity::Crossover | Quantity::PhaseMargin => format!(
+                    "it has no {}: its condition names no controlled element, or the loop does not cross",
+                    quantity.words()
+                ),
+                _ => format!("its form {} has no {name}", cell.form),
+            })?;
+        if known.determined {
+            Ok(known)
+        } else {
+            Err(format!("the data do not determine its {name}"))
+        }
+    }
+
+    /// A quantity in each run of a cell, with the names of the runs; empty where the runs are not known.
+    pub(super) fn of_runs(&self, cell: &Cell, quantity: &Quantity) -> Vec<(&str, Observation)> {
+        let Some(runs) = &self.runs else { return Vec::new() };
+        let one = |run: &str| match quantity.column() {
+            Some(name) => runs.parameter([&cell.subject, &cell.condition, run], name),
+            None => self.response(cell, Some(run), quantity).map(Estimate::fixed),
+        };
+        let observation = |e: Estimate| Observation {
+            value: e.value,
+            variance: e.standard_error.map_or(0.0, |s| s * s),
+        };
+        let all = runs.runs(&cell.subject, &cell.condition).iter();
+        all.filter_map(|run| Some((run.as_str(), observation(one(run)?))))
+            .filter(|(_, o)| o.value.is_finite() && o.variance.is_finite())
+            .collect()
+    }
+
+    fn response(&self, cell: &Cell, run: Option<&str>, quantity: &Quantity) -> Option<f64> {
+        let at = |omega| {
+            self.runs
+                .as_ref()?
+                .response([&cell.subject, &cell.condition], run, omega)
+        };
+        match quantity {
+            Quantity::Gain(omega) => at(*omega).map(|[decibel, _]| decibel),
+            Quantity::Phase(omega) => at(*omega).map(|[_, degrees]| degrees),
+            _ => None,
+        }
+    }
+
+    /// Whether single runs are known: not from the JSON of a group.
+    pub(super) fn has_runs(&self) -> bool {
+        self.runs.is_some()
+    }
+}
+
+impl Cell {
+    fn without(subject: &str, condition: &str, runs: usize) -> Self {
+        Self {
+            subject: subject.to_owned(),
+            condition: condition.to_owned(),
+            form: String::new(),
+            missing: None,
+            doubtful: false,
+            runs,
+            known: BTreeMap::new(),
+        }
+    }
+
+    fn judged(&mut self, level: Option<VerdictLevel>, reason: &str) {
+        self.doubtful = level == Some(VerdictLevel::Doubtful);
+        self.missing = match level {
+            Some(VerdictLevel::NotDetermined) => Some(format!("the data do not determine its operator: {reason}")),
+            Some(_) => None,
+            None => Some(format!("it has no operator: {reason}")),
+        };
+    }
+
+    fn of_person(person: &Person) -> Self {
+        let mut cell = Self::without(&person.subject, &person.condition, person.runs);
+        let fitted = person.status == PersonStatus::Fitted;
+        let reasons = person.reasons.join("; ");
+        cell.judged(
+            person.verdict.filter(|_| fitted),
+            if fitted { &reasons } else { &person.reason },
+        );
+        cell.form.clone_from(&person.form);
+        let runs = if person.is_of_all_runs() { person.runs } else { 1 };
+        for p in &person.parameters {
+            let known = Known {
+                value: p.value,
+                standard_error: p.standard_error_person.or(p.standard_error),
+                determined: p.determined,
+                prior_share: p.prior_share,
+                runs,
+            };
+            cell.known.insert(p.name.clone(), known);
+        }
+        for (quantity, estimate) in [
+            (Quantity::Crossover, person.crossover_rad_s),
+            (Quantity::PhaseMargin, person.phase_margin_deg),
+        ] {
+            if let (Some(e), Some(name)) = (estimate, quantity.column()) {
+                cell.known
+                    .insert(name.to_owned(), known(e.value, e.standard_error, runs));
+            }
+        }
+        cell
+    }
+
+    fn of_json(person: &Value) -> Self {
+        let text = |key: &str| person[key].as_str().unwrap_or_default();
+        let runs = person["runs"].as_u64().unwrap_or(1) as usize;
+        let mut cell = Self::without(text("subject"), text("condition"), runs);
+        let verdict = &person["verdict"];
+        let reasons: Vec<&str> = verdict["reasons"]
+            .as_array()
+            .into_iter()
+            .flatten()
+            .filter_map(Value::as_str)
+            .collect();
+        let level = verdict["level"].as_str().and_then(|level| level.parse().ok());
+        let reason = match level {
+            Some(_) => reasons.join("; "),
+            None => text("reason").to_owned(),
+        };
+        cell.judged(level, &reason);
+        cell.form = text("form").to_owned();
+        let runs = if text("run") == "all" { runs } else { 1 };
+        let parts = [&person["parameters"], &person["open_loop"]];
+        for (name, found) in parts.into_iter().filter_map(Value::as_object).flatten() {
+            let one = Known {
+                determined: found["determined"] != false,
+                prior_share: found["prior_share"].as_f64().unwrap_or(0.0),
+                ..known(
+                    found["value"].as_f64().unwrap_or(f64::NAN),
+                    found["standard_error"].as_f64(),
+                    runs,
+                )
+            };
+            cell.known.insert(name.clone(), one);
+        }
+        cell
+    }
+}
+
+fn known(value: f64, standard_error: Option<f64>, runs: usize) -> Known {
+    Known {
+        value,
+        standard_error,
+        determined: true,
+        prior_share: 0.0,
+        runs,
+    }
+}
+
+/// The mean over runs, with the error of their scatter.
+fn over_runs(values: &[f64]) -> Known {
+    let error = (sample_variance(values) / values.len() as f64).sqrt();
+    known(mean(values), Some(error).filter(|e| e.is_finite()), values.len())
+}
+
+/// One cell of those of single runs.
+fn merged(cells: Vec<Cell>) -> Vec<Cell> {
+    let mut all: Vec<Vec<Cell>> = Vec::new();
+    for cell in cells {
+        let same = |of: &&mut Vec<Cell>| of[0].subject == cell.subject && of[0].condition == cell.condition;
+        match all.iter_mut().find(same) {
+            Some(of) => of.push(cell),
+            None => all.push(vec![cell]),
+        }
+    }
+    let one = |mut of: Vec<Cell>| {
+        if of.len() > 1 {
+            let names: Vec<String> = of[0].known.keys().cloned().collect();
+            let means = names.into_iter().map(|name| {
+                let each: Vec<Known> = of.iter().filter_map(|cell| cell.known.get(&name).copied()).collect();
+                let values: Vec<f64> = each.iter().map(|k| k.value).collect();
+                let merged = Known {
+                    determined: each.iter().all(|k| k.determined),
+                    prior_share: each.iter().map(|k| k.prior_share).fold(0.0, f64::max),
+                    ..over_runs(&values)
+                };
+                (name, merged)
+            });
+            of[0].known = means.collect();
+            of[0].doubtful = of.iter().any(|cell| cell.doubtful);
+        }
+        of.swap_remove(0)
+    };
+    all.into_iter().map(one).collect()
+}
+
+fn distinct<'a>(names: impl Iterator<Item = &'a String>) -> Vec<String> {
+    let mut all: Vec<String> = Vec::new();
+    for name in names {
+        if !all.contains(name) {
+            all.push(name.clone());
+        }
+    }
+    all
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    #![allow(clippy::unwrap_used)]
+    use serde_json::json;
+
+    use super::*;
+
+    /// A group of people with crossover and its error by condition, through the JSON of a group.
+    pub fn group(people: &[(&str, &str, f64, f64)]) -> GroupEstimates {
+        let person = |(subject, condition, value, error): &(&str, &str, f64, f64)| {
+            json!({
+                "subject": subject, "condition": condition, "run": "all", "runs": 5, "form": "lead-lag",
+                "parameters": {"tau_e": {"value": 0.1 * value, "standard_error": 0.1 * error, "determined": true}},
+                "open_loop": {"crossover_rad_s": {"value": value, "standard_error": error}},
+                "verdict": {"level": "trustworthy", "reasons": []},
+            })
+        };
+        let people: Vec<Value> = people.iter().map(person).collect();
+        GroupEstimates::of_json(&json!({"group": "test", "people": people})).unwrap()
+    }
+
+    #[test]
+    fn a_person_without_a_result_has_a_reason() {
+        let object = json!({"group": "g", "people": [
+            {"subject": "P", "condition": "c", "run": "all", "runs": 0, "status": "failed", "reason": "no run could be read"},
+            {"subject": "Q", "condition": "c", "run": "all", "runs": 2, "form": "lead",
+             "parameters": {"T_L": {"value": null, "determined": false}, "K_e": {"value": 2.0, "standard_error": 0.1}},
+             "verdict": {"level": "doubtful", "reasons": ["it drifts"]}},
+            {"subject": "R", "condition": "c", "run": "all", "verdict": {"level": "not determined", "reasons": ["too short"]}},
+        ]});
+        let group = GroupEstimates::of_json(&object).unwrap();
+        let of = |subject: &str, name: &str| {
+            let cell = group.cell(subject, "c").unwrap();
+            group.estimate(cell, &name.parse().unwrap())
+        };
+        assert_eq!(of("P", "K_e").unwrap_err(), "it has no operator: no run could be read");
+        assert_eq!(of("Q", "T_L").unwrap_err(), "the data do not determine its T_L");
+        assert_eq!(of("Q", "T_I").unwrap_err(), "its form lead has no T_I");
+        assert!(of("Q", "crossover").unwrap_err().contains("controlled element"));
+        assert_eq!((of("Q", "K_e").unwrap().value, of("Q", "K_e").unwrap().runs), (2.0, 2));
+        assert!(of("R", "K_e").unwrap_err().ends_with("too short"));
+        assert!(of("Q", "rms_e").is_err() && of("Q", "gain_db@1").is_err() && !group.has_runs());
+        assert!(GroupEstimates::of_json(&json!({"kind": "operator"})).is_err());
+    }
+
+    #[test]
+    fn runs_of_their_own_are_averaged() {
+        let row = |run: &str, k: f64| {
+            json!({"subject": "P", "condition": "c", "run": run, "runs": 2, "form": "gain",
+                   "parameters": {"K": {"value": k, "standard_error": 0.01}},
+                   "verdict": {"level": "trustworthy", "reasons": []}})
+        };
+        let group = GroupEstimates::of_json(&json!({"people": [row("1", 1.0), row("2", 3.0)]})).unwrap();
+        let found = group.estimate(&group.cells[0], &"K".parse().unwrap()).unwrap();
+        assert_eq!((group.cells.len(), found.value, found.runs), (1, 2.0, 2));
+        assert!((found.standard_error.unwrap() - 1.0).abs() < 1e-15);
+    }
+}

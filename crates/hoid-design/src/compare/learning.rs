@@ -1,0 +1,84 @@
+//! Learning: a quantity over the runs of a person in a condition.
+//!
+//! `y_r = a + b (r - r0) + u_r + e_r`, r the number of a run, r0 the middle of all runs of the group: a regression of the runs
+//! with their errors, and a variance between runs beside them ([`meta_regression`]). a is what is compared, so that conditions are compared
+//! at the same practice; b is the change a run, of which the mean over people is told.
+
+use hoid_numerics::statistics::mean;
+
+use super::{
+    Coefficient, CompareError, GroupEstimates, Observation, Quantity, Weights, group_estimates::Cell, meta_regression,
+};
+
+/// Numbers of the runs: those of their names where all of them are numbers, else their places.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Practice {
+    by_name: bool,
+    /// The middle of all runs.
+    pub middle: f64,
+}
+
+impl Practice {
+    pub fn of(group: &GroupEstimates, quantity: &Quantity) -> Self {
+        let runs: Vec<Vec<&str>> = group
+            .cells
+            .iter()
+            .map(|cell| group.of_runs(cell, quantity).into_iter().map(|(run, _)| run).collect())
+            .collect();
+        let by_name = runs.iter().flatten().all(|run| number(run).is_some());
+        let mut practice = Self { by_name, middle: 0.0 };
+        let numbers: Vec<f64> = runs
+            .iter()
+            .flat_map(|of_cell| {
+                of_cell
+                    .iter()
+                    .enumerate()
+                    .map(|(place, run)| practice.number(run, place))
+            })
+            .collect();
+        practice.middle = if numbers.is_empty() { 0.0 } else { mean(&numbers) };
+        practice
+    }
+
+    fn number(&self, run: &str, place: usize) -> f64 {
+        match number(run) {
+            Some(number) if self.by_name => number,
+            _ => place as f64 + 1.0,
+        }
+    }
+
+    /// The quantity of a cell at the middle of the runs, and its change a run with its error; or why not.
+    pub fn of_cell(
+        &self,
+        group: &GroupEstimates,
+        cell: &Cell,
+        quantity: &Quantity,
+    ) -> Result<[Coefficient; 2], String> {
+        let runs = group.of_runs(cell, quantity);
+        let x: Vec<Vec<f64>> = runs
+            .iter()
+            .enumerate()
+            .map(|(place, (run, _))| vec![1.0, self.number(run, place) - self.middle])
+            .collect();
+        // Errors that some runs lack are taken from none.
+        let all_known = runs.iter().all(|(_, o)| o.variance > 0.0);
+        let observations: Vec<Observation> = runs
+            .iter()
+            .map(|(_, o)| Observation {
+                variance: if all_known { o.variance } else { 0.0 },
+                ..*o
+            })
+            .collect();
+        match meta_regression(&observations, &x, Weights::default()) {
+            Ok(found) => Ok([found.coefficients[0], found.coefficients[1]]),
+            Err(CompareError::TooFew { found, .. }) => {
+                Err(format!("{found} of its runs have an estimate, learning takes 3"))
+            }
+            Err(error) => Err(format!("its runs: {error}")),
+        }
+    }
+}
+
+fn number(run: &str) -> Option<f64> {
+    run.trim().parse().ok().filter(|n: &f64| n.is_finite())
+}

@@ -1,0 +1,445 @@
+//! Estimates with standard errors, one a person, over what differs between people.
+//!
+//! `y_i = x_i' beta + u_i + e_i`, `u_i ~ N(0, tau^2)` between people, `e_i ~ N(0, v_i)` within them, `v_i` the
+//! square of the standard error. With `w_i = 1/(v_i + tau^2)`, `W = diag(w)` and
+//! `P = W - W X (X'W X)^-1 X'W`:
+//!
+//! - **tau^2** maximises the restricted likelihood (D. A. Harville, *J. Am. Stat. Assoc.* 72 (1977) 320-338)
+//!   `l = -1/2 sum log(v_i + tau^2) - 1/2 log |X'W X| - 1/2 y'P y`, whose slope is `1/2 (y'P P y - tr P)`: the best
+//!   place of a grid, then the zero of the slope beside it. l may have two maxima where errors differ much.
+//! - **The weights** are those of the tau^2 that maximises `l + log tau^2`, which is never zero (the idea of Y. Chung,
+//!   S. Rabe-Hesketh and I.-H. Choi, *Stat. Med.* 32 (2013) 4071-4089, who add `log tau`): with few people l is at its greatest at zero
+//!   by chance, and the one with the smallest error decides alone. Three people whose errors are .1, .3 and .5 and who
+//!   differ by .4 have their difference in 87 % of the intervals with the weights of l, and in 95 % with these
+//!   (`tests/coverage.rs`, where other numbers of people and other tau are). With one or two degrees of freedom all weights are
+//!   equal: two and three people are a t test.
+//! - **beta** is `(X'W X)^-1 X'W y`, its covariance `s^2 (X'W X)^-1` with `s^2 = y'P y/(n - p)`, and its interval
+//!   Student's with n - p degrees of freedom (J. Hartung and G. Knapp, *Stat. Med.* 20 (2001) 3875-3889; of
+//!   regression G. Knapp and J. Hartung, *Stat. Med.* 22 (2003) 2693-2710). With equal errors and X of ones alone this is the
+//!   t test of one sample, whatever tau^2 is; s^2 is not held at one or above, which would make few people say less than they do.
+//! - **Q** is `y'P y` at tau^2 = 0, chi-squared with n - p degrees of freedom where all people are the same, and
+//!   `I^2 = tau^2/(tau^2 + v)` with the typical `v = (n - p)/tr P` at zero (J. P. T. Higgins and S. G. Thompson,
+//!   *Stat. Med.* 21 (2002) 1539-1558).
+//!
+//! Where no error is known all `v_i` are zero: tau^2 is the sample variance, and Q is not there.
+
+use hoid_model::named_choice;
+use nalgebra::{DMatrix, DVector};
+use serde::{Deserialize, Serialize};
+use statrs::distribution::{ChiSquared, ContinuousCDF, StudentsT};
+
+use super::CompareError;
+
+/// An estimate of one person.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Observation {
+    /// The value.
+    pub value: f64,
+    /// Square of its standard error; zero where it is not known.
+    pub variance: f64,
+}
+
+/// Whose tau^2 the weights of people have.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub enum Weights {
+    /// Kept away from zero.
+    #[default]
+    Penalised,
+    /// That of the restricted likelihood.
+    Restricted,
+}
+
+named_choice!(Weights, "choice of weights", 2, {
+    Penalised => "penalised",
+    Restricted => "reml",
+});
+
+/// A coefficient with its inference.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Coefficient {
+    /// The value.
+    pub value: f64,
+    /// Its standard error.
+    pub standard_error: f64,
+    /// `value/standard_error`.
+    pub t: f64,
+    /// Two-sided, Student's.
+    pub p: f64,
+    /// The interval of 95 %.
+    pub interval: (f64, f64),
+}
+
+/// What is found.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MetaRegression {
+    /// By the columns of X.
+    pub coefficients: Vec<Coefficient>,
+    /// Variance between people, by the restricted likelihood.
+    pub tau_squared: f64,
+    /// That of the weights.
+    pub tau_squared_of_weights: f64,
+    /// Degrees of freedom n - p.
+    pub degrees_of_freedom: usize,
+    /// Share of tau^2 in the variance of a typical estimate.
+    pub i_squared: Option<f64>,
+    /// Heterogeneity Q and its probability where all people are the same.
+    pub heterogeneity: Option<(f64, f64)>,
+    /// `(X'W X)^-1` times s^2.
+    pub covariance: DMatrix<f64>,
+}
+
+/// Mean over people: X of ones.
+///
+/// # Errors
+/// As [`meta_regression`].
+pub fn meta_mean(observations: &[Observation], weights: Weights) -> Result<MetaRegression, CompareError> {
+    meta_regression(observations, &vec![vec![1.0]; observations.len()], weights)
+}
+
+/// The regression on the rows x of X.
+///
+/// # Errors
+/// [`CompareError::TooFew`] for no more observations than columns, [`CompareError::NotFinite`],
+/// [`CompareError::Collinear`], [`CompareError::NoScatter`] of values that are all equal.
+pub fn meta_regression(
+    observations: &[Observation],
+    x: &[Vec<f64>],
+    weights: Weights,
+) -> Result<MetaRegression, CompareError> {
+    let (n, p) = (observations.len(), x.first().map_or(0, Vec::len));
+    if n <= p {
+        return Err(CompareError::TooFew {
+            found: n,
+            expected: p + 1,
+        });
+    }
+    let finite = |o: &Observation| o.value.is_finite() && o.variance.is_finite() && o.variance >= 0.0;
+    if !observations.iter().all(finite) || !x.iter().flatten().all(|v| v.is_finite()) {
+        return Err(CompareError::NotFinite);
+    }
+    let model = Model {
+        x: DMatrix::from_fn(n, p, |i, j| x[i][j]),
+        y: DVector::from_iterator(n, observations.iter().map(|o| o.value)),
+        v: observations.iter().map(|o| o.variance).collect(),
+    };
+    let known = model.v.iter().all(|v| *v > 0.0);
+    let scatter = model.scatter().ok_or(CompareError::Collinear)?;
+    let size = model.y.iter().fold(0.0_f64, |most, y| most.max(y.abs()));
+    if scatter <= (8.0 * f64::EPSILON * size).powi(2) {
+        return Err(CompareError::NoScatter);
+    }
+    let search = |penalty: f64| match known {
+        true => model.tau_squared(scatter, penalty).ok_or(CompareError::Collinear),
+        false => Ok(scatter),
+    };
+    let tau_squared = search(0.0)?;
+    let tau_squared_of_weights = match weights {
+        Weights::Penalised => search(1.0)?,
+        Weights::Restricted => tau_squared,
+    };
+    let at = model.at(tau_squared_of_weights).ok_or(CompareError::Collinear)?;
+    let dof = n - p;
+    let covariance = &at.inverse * (at.q / dof as f64);
+    let coefficients = (0..p)
+        .map(|j| Coefficient::of(at.beta[j], covariance[(j, j)].sqrt(), dof))
+        .collect();
+    let fixed = if known { model.at(0.0) } else { None };
+    Ok(MetaRegression {
+        coefficients,
+        tau_squared,
+        tau_squared_of_weights,
+        degrees_of_freedom: dof,
+        i_squared: fixed.as_ref().map(|at| {
+            let typical = dof as f64 / at.trace;
+            tau_squared / (tau_squared + typical)
+        }),
+        heterogeneity: fixed.map(|at| (at.q, chi_squared_beyond(at.q, dof))),
+        covariance,
+    })
+}
+
+impl Coefficient {
+    /// With Student's interval.
+    pub(super) fn of(value: f64, standard_error: f64, dof: usize) -> Self {
+        let t = value / standard_error;
+        let reach = student_quantile(0.975, dof as f64) * standard_error;
+        Self {
+            value,
+            standard_error,
+            t,
+            p: student_two_sided(t, dof as f64),
+            interval: (value - reach, value + reach),
+        }
+    }
+}
+
+/// The quantile of Student's distribution; infinite for no degree of freedom.
+pub(super) fn student_quantile(share: f64, dof: f64) -> f64 {
+    StudentsT::new(0.0, 1.0, dof).map_or(f64::INFINITY, |d| d.inverse_cdf(share))
+}
+
+fn student_two_sided(t: f64, dof: f64) -> f64 {
+    StudentsT::new(0.0, 1.0, dof).map_or(f64::NAN, |d| 2.0 * d.cdf(-t.abs()))
+}
+
+fn chi_squared_beyond(q: f64, dof: usize) -> f64 {
+    ChiSquared::new(dof as f64).map_or(f64::NAN, |d| d.sf(q))
+}
+
+struct Model {
+    x: DMatrix<f64>,
+    y: DVector<f64>,
+    v: Vec<f64>,
+}
+
+/// The model at a tau^2.
+struct At {
+    beta: DVector<f64>,
+    /// `(X'W X)^-1`.
+    inverse: DMatrix<f64>,
+    /// y'P y.
+    q: f64,
+    /// tr P.
+    trace: f64,
+    /// The restricted log-likelihood but for constants.
+    likelihood: f64,
+    /// Its slope by tau^2.
+    slope: f64,
+}
+
+/// The grid of tau^2, in powers of ten of the scatter, and steps of one of them.
+const DECADES: (i32, i32) = (-8, 6);
+const STEPS: i32 = 3;
+
+impl Model {
+    fn at(&self, tau_squared: f64) -> Option<At> {
+        let (n, p) = self.x.shape();
+        let w: Vec<f64> = self.v.iter().map(|v| 1.0 / (v + tau_squared)).collect();
+        let weighted = |power: i32| {
+            DMatrix::from_fn(p, p, |a, b| {
+                (0..n).map(|i| self.x[(i, a)] * w[i].powi(power) * self.x[(i, b)]).sum()
+            })
+        };
+        let information: DMatrix<f64> = weighted(1);
+        let factor = information.cholesky()?;
+        let right = DVector::from_fn(p, |a, _| (0..n).map(|i| self.x[(i, a)] * w[i] * self.y[i]).sum());
+        let beta = factor.solve(&right);
+        let inverse = factor.inverse();
+        let residuals = &self.y - &self.x * &beta;
+        let q = (0..n).map(|i| w[i] * residuals[i] * residuals[i]).sum();
+        let trace = w.iter().sum::<f64>() - (&inverse * weighted(2)).trace();
+        let log_determinant: f64 = 2.0 * factor.l_dirty().diagonal().iter().map(|d| d.ln()).sum::<f64>();
+        let squares: f64 = (0..n).map(|i| (w[i] * residuals[i]).powi(2)).sum();
+        Some(At {
+            beta,
+            q,
+            trace,
+            likelihood: 0.5 * (w.iter().map(|w| w.ln()).sum::<f64>() - log_determinant - q),
+            slope: 0.5 * (squares - trace),
+            inverse,
+        })
+    }
+
+    /// Variance of y about its regression, all weights equal; none where X is singular.
+    fn scatter(&self) -> Option<f64> {
+        let (n, p) = self.x.shape();
+        let information = self.x.transpose() * &self.x;
+        // Columns that are multiples of each other pass a factorisation by rounding alone.
+        let scale = DVector::from_fn(p, |j, _| information[(j, j)].sqrt());
+        if scale.iter().any(|s| *s == 0.0) {
+            return None;
+        }
+        let correlation = DMatrix::from_fn(p, p, |a, b| information[(a, b)] / (scale[a] * scale[b]));
+        let least = correlation.symmetric_eigenvalues().min();
+        if least < 1e-10 {
+            return None;
+        }
+        let beta = information.cholesky()?.solve(&(self.x.transpose() * &self.y));
+        Some((&self.y - &self.x * beta).norm_squared() / (n - p) as f64)
+    }
+
+    /// The tau^2 at which `l + penalty log tau^2` is at its greatest; errors are known.
+    fn tau_squared(&self, scatter: f64, penalty: f64) -> Option<f64> {
+        let unit = scatter.max(self.v.iter().sum::<f64>() / self.v.len() as f64);
+        let steps = (DECADES.0 * STEPS..=DECADES.1 * STEPS).map(|k| unit * 10f64.powf(f64::from(k) / f64::from(STEPS)));
+        let zero = (penalty == 0.0).then_some(0.0);
+        let grid: Vec<f64> = zero.into_iter().chain(steps).collect();
+        let height = |tau: f64| Some(self.at(tau)?.likelihood + if penalty > 0.0 { penalty * tau.ln() } else { 0.0 });
+        let slope = |tau: f64| Some(self.at(tau)?.slope + if penalty > 0.0 { penalty / tau } else { 0.0 });
+        let heights: Vec<f64> = grid.iter().map(|tau| height(*tau)).collect::<Option<_>>()?;
+        let best = (0..grid.len()).max_by(|a, b| heights[*a].total_cmp(&heights[*b]))?;
+        let rises = slope(grid[best])? > 0.0;
+        // At the edges nothing is beside it.
+        if (best == 0 && !rises) || (best + 1 == grid.len() && rises) {
+            return Some(grid[best]);
+        }
+        let (mut low, mut high) = if rises {
+            (grid[best], grid[best + 1])
+        } else {
+            (grid[best - 1], grid[best])
+        };
+        for _ in 0..200 {
+            let middle = 0.5 * (low + high);
+            if middle <= low || middle >= high {
+                break;
+            }
+            if slope(middle)? > 0.0 {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        Some(0.5 * (low + high))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use std::collections::BTreeMap;
+
+    use super::*;
+
+    /// y, v and x of each case of fixtures/compare.
+    fn cases() -> BTreeMap<&'static str, Vec<[f64; 3]>> {
+        let mut all: BTreeMap<&str, Vec<[f64; 3]>> = BTreeMap::new();
+        for line in include_str!("../../../../fixtures/compare/cases.csv").lines().skip(1) {
+            let cells: Vec<&str> = line.split(',').collect();
+            let number = |k: usize| cells[k].parse().unwrap();
+            all.entry(cells[0]).or_default().push([number(1), number(2), number(3)]);
+        }
+        all
+    }
+
+    fn observations(case: &[[f64; 3]]) -> Vec<Observation> {
+        let one = |[value, variance, _]: &[f64; 3]| Observation {
+            value: *value,
+            variance: *variance,
+        };
+        case.iter().map(one).collect()
+    }
+
+    #[test]
+    fn the_numbers_of_metafor() {
+        let cases = cases();
+        let mut seen = 0;
+        for line in include_str!("../../../../fixtures/compare/expected.csv")
+            .lines()
+            .skip(1)
+        {
+            let cells: Vec<&str> = line.split(',').collect();
+            let (case, model, name) = (&cases[cells[0]], cells[1], cells[2]);
+            let expected: f64 = cells[3].parse().unwrap();
+            let row = |c: &[f64; 3]| if model == "x" { vec![1.0, c[2]] } else { vec![1.0] };
+            let x: Vec<Vec<f64>> = case.iter().map(row).collect();
+            let found = meta_regression(&observations(case), &x, Weights::Restricted).unwrap();
+            let (word, k) = name.split_at(name.len() - 1);
+            let of = |k: &str| found.coefficients[k.parse::<usize>().unwrap()];
+            let value = match (name, word) {
+                ("tau2", _) => found.tau_squared,
+                ("I2", _) => 100.0 * found.i_squared.unwrap(),
+                ("QE", _) => found.heterogeneity.unwrap().0,
+                ("QEp", _) => found.heterogeneity.unwrap().1,
+                (_, "b") => of(k).value,
+                (_, "se") => of(k).standard_error,
+                (_, "zval") => of(k).t,
+                (_, "pval") => of(k).p,
+                (_, "ci.lb") => of(k).interval.0,
+                (_, "ci.ub") => of(k).interval.1,
+                _ => panic!("{name}"),
+            };
+            // metafor stops its search at a step of 1e-12; the likelihood is flat to 1e-8 of tau there.
+            let tolerance = 1e-7 * expected.abs().max(1e-2);
+            assert!(
+                (value - expected).abs() < tolerance,
+                "{} {model} {name}: {value} for {expected}",
+                cells[0]
+            );
+            seen += 1;
+        }
+        assert_eq!(seen, 156);
+    }
+
+    #[test]
+    fn equal_errors_are_the_t_test() {
+        // R: t.test(c(.9, 1.4, .2, .7)): t = 3.2215, df = 3.
+        let values = [0.9, 1.4, 0.2, 0.7];
+        for variance in [0.0, 0.01, 4.0] {
+            let all = values.map(|value| Observation { value, variance });
+            let found = meta_mean(&all, Weights::default()).unwrap();
+            let c = found.coefficients[0];
+            assert!(
+                (c.value - 0.8).abs() < 1e-12 && (c.t - 0.8 / (0.74_f64 / 12.0).sqrt()).abs() < 1e-9,
+                "{c:?}"
+            );
+            assert_eq!(found.degrees_of_freedom, 3);
+            let scatter = 0.74 / 3.0;
+            assert!((found.tau_squared - (scatter - variance).max(0.0)).abs() < 1e-9);
+            assert_eq!(found.heterogeneity.is_some(), variance > 0.0);
+        }
+    }
+
+    #[test]
+    fn the_slope_is_that_of_the_likelihood() {
+        let cases = cases();
+        let case = &cases["six"];
+        let model = Model {
+            x: DMatrix::from_fn(6, 2, |i, j| if j == 0 { 1.0 } else { case[i][2] }),
+            y: DVector::from_fn(6, |i, _| case[i][0]),
+            v: case.iter().map(|c| c[1]).collect(),
+        };
+        for tau in [0.05, 0.3, 2.0] {
+            let step = 1e-5 * tau;
+            let difference =
+                (model.at(tau + step).unwrap().likelihood - model.at(tau - step).unwrap().likelihood) / (2.0 * step);
+            assert!((difference / model.at(tau).unwrap().slope - 1.0).abs() < 1e-6);
+        }
+    }
+
+    #[test]
+    fn the_weights_are_kept_away_from_those_of_one_person() {
+        // l is at its greatest at zero, where the second person has 25 times the weight of the others.
+        let all = [(0.3, 0.25), (-0.2, 0.01), (-0.4, 0.25), (0.1, 0.2)];
+        let all = all.map(|(value, variance)| Observation { value, variance });
+        let [penalised, restricted] = [Weights::Penalised, Weights::Restricted].map(|w| meta_mean(&all, w).unwrap());
+        assert_eq!((restricted.tau_squared_of_weights, penalised.tau_squared), (0.0, 0.0));
+        assert!(penalised.tau_squared_of_weights > 0.01);
+        assert!(penalised.coefficients[0].standard_error > restricted.coefficients[0].standard_error);
+        // One or two degrees of freedom: equal weights.
+        for n in [2, 3] {
+            let few = meta_mean(&all[..n], Weights::Penalised).unwrap();
+            let mean = all[..n].iter().map(|o| o.value).sum::<f64>() / n as f64;
+            assert!((few.coefficients[0].value - mean).abs() < 1e-5, "{n}");
+        }
+    }
+
+    #[test]
+    fn what_cannot_be_compared_is_refused() {
+        let of = |values: &[f64], variance| -> Vec<Observation> {
+            values
+                .iter()
+                .map(|value| Observation {
+                    value: *value,
+                    variance,
+                })
+                .collect()
+        };
+        let mean = |values: &[f64], variance| meta_mean(&of(values, variance), Weights::default());
+        assert!(matches!(
+            mean(&[1.0], 0.1),
+            Err(CompareError::TooFew { found: 1, expected: 2 })
+        ));
+        assert!(matches!(mean(&[], 0.1), Err(CompareError::TooFew { .. })));
+        assert!(matches!(mean(&[1.0, f64::NAN], 0.1), Err(CompareError::NotFinite)));
+        assert!(matches!(mean(&[1.0, 2.0], -0.1), Err(CompareError::NotFinite)));
+        assert!(matches!(mean(&[2.0, 2.0, 2.0], 0.0), Err(CompareError::NoScatter)));
+        assert!(matches!(mean(&[2.0, 2.0, 2.0], 0.1), Err(CompareError::NoScatter)));
+        let x = vec![vec![1.0, 2.0]; 4];
+        assert!(matches!(
+            meta_regression(&of(&[1.0, 2.0, 3.0, 5.0], 0.1), &x, Weights::default()),
+            Err(CompareError::Collinear)
+        ));
+        let huge = mean(&[1e150, -1e150, 2e150], 1.0).unwrap();
+        assert!(huge.coefficients[0].t.is_finite());
+    }
+}

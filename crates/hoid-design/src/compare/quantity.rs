@@ -1,0 +1,166 @@
+//! What is compared: quantities that mean the same for every person, and parameters of one form.
+
+use std::{fmt, str::FromStr};
+
+use hoid_model::operator_family::PARAMETERS;
+use serde::{Deserialize, Serialize};
+
+use super::CompareError;
+
+/// The delay, a parameter of every form.
+const DELAY: &str = "tau_e";
+
+/// A quantity.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(into = "String", try_from = "String")]
+pub enum Quantity {
+    /// Crossover frequency, rad/s.
+    Crossover,
+    /// Phase margin, deg.
+    PhaseMargin,
+    /// Gain of the person at a frequency in rad/s, dB.
+    Gain(f64),
+    /// Phase of the person at a frequency in rad/s, deg.
+    Phase(f64),
+    /// Root mean square of the error.
+    RmsE,
+    /// Root mean square of the control.
+    RmsU,
+    /// A parameter of the operator, by its name.
+    Parameter(String),
+}
+
+impl Quantity {
+    /// What is compared where nothing is asked for.
+    pub fn usual() -> Vec<Self> {
+        vec![Self::Crossover, Self::PhaseMargin, Self::Parameter(DELAY.to_owned())]
+    }
+
+    /// Its unit; empty where there is none, or it is that of the recording.
+    pub fn unit(&self) -> &str {
+        match self {
+            Self::Crossover => "rad/s",
+            Self::PhaseMargin | Self::Phase(_) => "deg",
+            Self::Gain(_) => "dB",
+            Self::RmsE | Self::RmsU => "",
+            Self::Parameter(name) => PARAMETERS.iter().find(|(n, _)| n == name).map_or("", |(_, unit)| unit),
+        }
+    }
+
+    /// Its name in a sentence.
+    pub fn words(&self) -> String {
+        match self {
+            Self::Crossover => "crossover".to_owned(),
+            Self::PhaseMargin => "phase margin".to_owned(),
+            Self::Gain(omega) => format!("gain at {omega} rad/s"),
+            Self::Phase(omega) => format!("phase at {omega} rad/s"),
+            Self::RmsE => "RMS of e".to_owned(),
+            Self::RmsU => "RMS of u".to_owned(),
+            Self::Parameter(name) if name == DELAY => "delay tau_e".to_owned(),
+            Self::Parameter(name) => name.clone(),
+        }
+    }
+
+    /// Whether it means the same whatever the form: all but the parameters, of which the delay is in every form.
+    pub fn is_of_any_form(&self) -> bool {
+        !matches!(self, Self::Parameter(name) if name != DELAY)
+    }
+
+    /// Its name in the tables of a group, where it is there as one number.
+    pub(super) fn column(&self) -> Option<&str> {
+        match self {
+            Self::Crossover => Some("crossover_rad_s"),
+            Self::PhaseMargin => Some("phase_margin_deg"),
+            Self::RmsE => Some("rms_e"),
+            Self::RmsU => Some("rms_u"),
+            Self::Parameter(name) => Some(name),
+            Self::Gain(_) | Self::Phase(_) => None,
+        }
+    }
+}
+
+impl fmt::Display for Quantity {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Crossover => f.write_str("crossover"),
+            Self::PhaseMargin => f.write_str("phase_margin"),
+            Self::Gain(omega) => write!(f, "gain_db@{omega}"),
+            Self::Phase(omega) => write!(f, "phase_deg@{omega}"),
+            Self::RmsE => f.write_str("rms_e"),
+            Self::RmsU => f.write_str("rms_u"),
+            Self::Parameter(name) => f.write_str(name),
+        }
+    }
+}
+
+impl FromStr for Quantity {
+    type Err = CompareError;
+
+    fn from_str(text: &str) -> Result<Self, CompareError> {
+        let text = text.trim();
+        let unknown = || CompareError::Quantity { found: text.to_owned() };
+        if let Some((name, omega)) = text.split_once('@') {
+            let omega: f64 = omega.parse().map_err(|_| unknown())?;
+            return match name {
+                _ if !(omega.is_finite() && omega > 0.0) => Err(unknown()),
+                "gain_db" | "gain" => Ok(Self::Gain(omega)),
+                "phase_deg" | "phase" => Ok(Self::Phase(omega)),
+                _ => Err(unknown()),
+            };
+        }
+        match text {
+            "crossover" | "crossover_rad_s" => Ok(Self::Crossover),
+            "phase_margin" | "margin" | "phase_margin_deg" => Ok(Self::PhaseMargin),
+            "rms_e" => Ok(Self::RmsE),
+            "rms_u" => Ok(Self::RmsU),
+            "delay" => Ok(Self::Parameter(DELAY.to_owned())),
+            name if PARAMETERS.iter().any(|(n, _)| *n == name) => Ok(Self::Parameter(name.to_owned())),
+            _ => Err(unknown()),
+        }
+    }
+}
+
+impl From<Quantity> for String {
+    fn from(quantity: Quantity) -> Self {
+        quantity.to_string()
+    }
+}
+
+impl TryFrom<String> for Quantity {
+    type Error = CompareError;
+
+    fn try_from(text: String) -> Result<Self, CompareError> {
+        text.parse()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use super::*;
+
+    #[test]
+    fn names_are_read_as_they_are_written() {
+        for name in [
+            "crossover",
+            "phase_margin",
+            "tau_e",
+            "gain_db@2.5",
+            "phase_deg@1",
+            "rms_e",
+            "omega_nm",
+        ] {
+            assert_eq!(name.parse::<Quantity>().unwrap().to_string(), name);
+        }
+        assert_eq!(
+            "delay".parse::<Quantity>().unwrap(),
+            Quantity::Parameter(DELAY.to_owned())
+        );
+        assert_eq!("margin".parse::<Quantity>().unwrap().unit(), "deg");
+        for bad in ["", "speed", "gain_db@", "gain_db@-1", "gain_db@nan", "tau_e@2"] {
+            let error = bad.parse::<Quantity>().unwrap_err().to_string();
+            assert!(error.contains("crossover") && error.contains("gain_db@W"), "{error}");
+        }
+        assert!(Quantity::Crossover.is_of_any_form() && !Quantity::Parameter("K".to_owned()).is_of_any_form());
+    }
+}

@@ -1,0 +1,91 @@
+//! A difference as a sentence for a paper.
+
+use hoid_model::numbers::{significant, with_uncertainty};
+
+use super::{Difference, Variation};
+
+/// The level at which a difference is found.
+pub(super) const LEVEL: f64 = 0.05;
+
+/// `crossover fell by 0.63 rad/s from fo to so (95 % 0.14 to 1.12, t(2) = -5.5, p = 0.032, d_z = -3.2, n = 3)`; where p
+/// beside the other tests is not below .05 that no difference was found. An interaction says whose effect differs.
+pub(super) fn sentence(difference: &Difference, adjusted: bool) -> String {
+    let Difference {
+        quantity,
+        estimate,
+        from,
+        to,
+        ..
+    } = difference;
+    let what = quantity.words();
+    let unit = match quantity.unit() {
+        "" => String::new(),
+        unit => format!(" {unit}"),
+    };
+    let error = Some(estimate.standard_error);
+    // Ends of the interval have the digits of the value.
+    let digits = |v: f64| with_uncertainty(v, error).0;
+    let test = test(difference, adjusted);
+    let (low, high) = estimate.interval;
+    let is_found = difference.p_adjusted < LEVEL;
+    let falls = estimate.value < 0.0;
+    let (size, ends) = match falls {
+        true => (
+            digits(-estimate.value),
+            format!("{} to {}", digits(-high), digits(-low)),
+        ),
+        false => (digits(estimate.value), format!("{} to {}", digits(low), digits(high))),
+    };
+    let signed = format!("{}{unit}", digits(estimate.value));
+    let signed_ends = format!("{} to {}", digits(low), digits(high));
+    match (&difference.effect, is_found) {
+        (Some([factor, a, b]), found) => {
+            let not = if found { "differed" } else { "was not found to differ" };
+            format!(
+                "the effect of {factor} on {what} ({b} - {a}) {not} between {from} and {to}: {signed} (95 % {signed_ends}, {test})"
+            )
+        }
+        (None, false) => {
+            format!("no difference in {what} was found, {to} - {from} {signed} (95 % {signed_ends}, {test})")
+        }
+        (None, true) if difference.variation == Variation::Within => {
+            let verb = if falls { "fell" } else { "rose" };
+            format!("{what} {verb} by {size}{unit} from {from} to {to} (95 % {ends}, {test})")
+        }
+        (None, true) => {
+            let word = if falls { "lower" } else { "higher" };
+            format!("{what} was {size}{unit} {word} in {to} than in {from} (95 % {ends}, {test})")
+        }
+    }
+}
+
+fn test(difference: &Difference, adjusted: bool) -> String {
+    let Difference { estimate, people, .. } = difference;
+    let mut parts = vec![format!(
+        "t({}) = {}",
+        difference.degrees_of_freedom,
+        significant(estimate.t, 2)
+    )];
+    parts.push(format!("p {}", probability(estimate.p)));
+    if adjusted && difference.p_adjusted != estimate.p {
+        parts.push(format!("Holm p {}", probability(difference.p_adjusted)));
+    }
+    if let Some(effect) = &difference.effect_size {
+        parts.push(format!("{} = {}", effect.name, significant(effect.value, 2)));
+    }
+    let of = |group: usize| people.iter().filter(|(_, g)| *g == group).count();
+    parts.push(match difference.variation {
+        Variation::Within => format!("n = {}", people.len()),
+        Variation::Between => format!("n = {} and {}", of(0), of(1)),
+    });
+    parts.join(", ")
+}
+
+/// `= 0.032`, or `< 0.0001`.
+pub(super) fn probability(p: f64) -> String {
+    if p < 1e-4 {
+        "< 0.0001".to_owned()
+    } else {
+        format!("= {}", significant(p, 2))
+    }
+}

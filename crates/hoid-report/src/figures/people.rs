@@ -1,0 +1,230 @@
+//! People by condition: each person a thin line through their estimates with their standard errors, and beside them
+//! the mean over people with its interval of 95 %.
+
+use kuva::{prelude::Plot, render::render::Scene};
+
+use super::{
+    Shade,
+    axes::with_ordinate,
+    draw::{self, INK},
+    frame::{self, Area, Frame, Ordinates},
+    labels::{marked, panel_label},
+    legend::{Entry, Sample, add_legend},
+    palette::Mark,
+    style::{self, BLACK, GREY, TEXT},
+    svg,
+};
+
+const HEIGHT: f64 = 150.0;
+/// The names of the places below the axis, and a second row of them.
+const NAMES_BELOW: f64 = 17.0;
+const SECOND: f64 = 12.0;
+/// Parts of a place: people from and to, and the mean.
+const PEOPLE: (f64, f64) = (0.18, 0.6);
+const MEAN: f64 = 0.78;
+/// More people than this are grey, without a legend.
+const COLOURED: usize = 6;
+
+/// An estimate of a person at a place, with its standard error.
+pub type PersonAt = Option<(f64, Option<f64>)>;
+
+/// One quantity.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct PeoplePanel {
+    /// Name of the quantity, such as `omega_c`.
+    pub name: String,
+    /// Its unit; empty for none.
+    pub unit: String,
+    /// The people, and of each the places.
+    pub people: Vec<Vec<PersonAt>>,
+    /// The means over people at the places, with the ends of their intervals.
+    pub means: Vec<Option<(f64, (f64, f64))>>,
+}
+
+/// Panels of people with common places.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct PeopleGrid {
+    /// The panels.
+    pub panels: Vec<PeoplePanel>,
+    /// Names of the people.
+    pub people: Vec<String>,
+    /// Names of the places, such as conditions.
+    pub places: Vec<String>,
+    /// What the places differ in.
+    pub abscissa: String,
+}
+
+/// People by condition as one figure, two panels in a row where there are several. `title` is what a screen reader says.
+pub fn people_by_condition(id: &str, title: &str, grid: &PeopleGrid) -> String {
+    let n = grid.panels.len();
+    if n == 0 || grid.places.is_empty() {
+        return frame::empty(id, title);
+    }
+    let columns = if n == 1 { 1 } else { 2 };
+    let labels = grid.panels.iter().map(|p| (p.name.as_str(), p.unit.as_str()));
+    let ordinates = Ordinates::of(labels, columns, false);
+    let ranges: Vec<(f64, f64)> = grid.panels.iter().map(PeoplePanel::range).collect();
+    let frame = Frame::new(n, columns, HEIGHT, ordinates, 0);
+    let places = (0.5, grid.places.len() as f64 + 0.5);
+    let cell = |(i, panel): (usize, &PeoplePanel)| {
+        let layout = style::layout(places, ranges[i], HEIGHT);
+        let layout = with_ordinate(layout, ranges[i], &panel.unit, false, HEIGHT, frame.has_ticks(i));
+        let layout = frame
+            .fitted(i, layout)
+            .with_x_categories(vec![String::new(); grid.places.len()]);
+        (vec![Plot::from(style::line([], BLACK, 1.0))], layout)
+    };
+    let cells = grid.panels.iter().enumerate().map(cell).collect();
+    let label = |i: usize| panel_label(&grid.panels[i].name, &grid.panels[i].unit);
+    let mut scene = frame.drawn(cells, &grid.abscissa, label, &[], 0.0);
+    for (i, panel) in grid.panels.iter().enumerate() {
+        grid.draw(&mut scene, panel, frame.area(i), ranges[i]);
+        if frame.is_lowest(i) {
+            grid.add_names(&mut scene, frame.area(i));
+        }
+    }
+    let mut entries: Vec<Entry> = match grid.people.len() <= COLOURED {
+        true => (grid.people.iter().enumerate())
+            .map(|(i, name)| Entry::new(name, &colour(i, grid.people.len()), Sample::LineMark(Mark::Circle)))
+            .collect(),
+        false => vec![Entry::new("a person", GREY, Sample::LineMark(Mark::Circle))],
+    };
+    entries.push(Entry::new("mean, 95 %", BLACK, Sample::LineMark(Mark::Diamond)));
+    add_legend(&mut scene, &entries);
+    svg::finish(id, title, scene)
+}
+
+fn colour(person: usize, people: usize) -> String {
+    if people <= COLOURED {
+        Shade::of_method(person).colour()
+    } else {
+        GREY.to_owned()
+    }
+}
+
+impl PeoplePanel {
+    fn range(&self) -> (f64, f64) {
+        let people = self.people.iter().flatten().flatten();
+        let ends = people.flat_map(|(value, error)| {
+            let reach = error.filter(|e| e.is_finite()).unwrap_or(0.0);
+            [value - reach, value + reach]
+        });
+        let means = self
+            .means
+            .iter()
+            .flatten()
+            .flat_map(|(mean, (low, high))| [*mean, *low, *high]);
+        style::padded_range(ends.chain(means))
+    }
+}
+
+impl PeopleGrid {
+    fn add_names(&self, scene: &mut Scene, area: Area) {
+        let names: Vec<String> = self.places.iter().map(|name| marked(name)).collect();
+        let pitch = area.width / names.len() as f64;
+        let staggered = names.iter().any(|name| draw::text_room(name, TEXT) > pitch);
+        for (k, name) in names.into_iter().enumerate() {
+            let below = if staggered && k % 2 == 1 { SECOND } else { 0.0 };
+            let x = area.left + pitch * (k as f64 + 0.5);
+            scene.add(draw::centred(x, area.bottom() + NAMES_BELOW + below, name, None));
+        }
+    }
+
+    fn draw(&self, scene: &mut Scene, panel: &PeoplePanel, area: Area, (low, high): (f64, f64)) {
+        let y_of = |v: f64| area.bottom() - (v.clamp(low, high) - low) / (high - low) * area.height;
+        let pitch = area.width / self.places.len() as f64;
+        let x_of = |place: usize, part: f64| area.left + pitch * (place as f64 + part);
+        let n = self.people.len();
+        for (i, places) in panel.people.iter().enumerate() {
+            let share = if n > 1 { i as f64 / (n - 1) as f64 } else { 0.5 };
+            let part = PEOPLE.0 + share * (PEOPLE.1 - PEOPLE.0);
+            let colour = colour(i, n);
+            let drawable = |at: &PersonAt| at.filter(|(v, _)| style::is_drawable(*v));
+            let mut last: Option<(f64, f64)> = None;
+            for (place, at) in places.iter().enumerate() {
+                let Some((value, error)) = drawable(at) else {
+                    last = None;
+                    continue;
+                };
+                let point = (x_of(place, part), y_of(value));
+                if let Some(before) = last {
+                    scene.add(draw::line(before, point, &colour, 0.6, Some("3 2")));
+                }
+                if let Some(error) = error.filter(|e| e.is_finite()) {
+                    let ends = [value - error, value + error].map(|v| (point.0, y_of(v)));
+                    scene.add(draw::line(ends[0], ends[1], &colour, 1.0, None));
+                }
+                draw::mark(scene, point, 2.2, Mark::Circle, &colour);
+                last = Some(point);
+            }
+        }
+        for (place, mean) in panel.means.iter().enumerate() {
+            let Some((value, (from, to))) = mean.filter(|(v, _)| style::is_drawable(*v)) else {
+                continue;
+            };
+            let x = x_of(place, MEAN);
+            scene.add(draw::line((x, y_of(from)), (x, y_of(to)), BLACK, 1.4, None));
+            for end in [from, to] {
+                scene.add(draw::line((x - 4.0, y_of(end)), (x + 4.0, y_of(end)), BLACK, 1.4, None));
+            }
+            draw::mark(scene, (x, y_of(value)), 3.4, Mark::Diamond, INK);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{super::draw::tests::has, *};
+
+    fn grid() -> PeopleGrid {
+        PeopleGrid {
+            panels: vec![PeoplePanel {
+                name: "omega_c".to_owned(),
+                unit: "rad/s".to_owned(),
+                people: vec![
+                    vec![Some((0.0, None)), Some((10.0, Some(1.0)))],
+                    vec![Some((4.0, Some(f64::NAN))), None],
+                ],
+                means: vec![Some((2.0, (0.0, 4.0))), None],
+            }],
+            people: vec!["P".to_owned(), "Q".to_owned()],
+            places: vec!["fo".to_owned(), "so".to_owned()],
+            abscissa: "condition".to_owned(),
+        }
+    }
+
+    #[test]
+    fn marks_stand_at_the_places_of_their_numbers() {
+        let svg = people_by_condition("p", "t", &grid());
+        // Ordinate from 0 to 11 with 5 % of room.
+        let y = |v: f64| 8.0 + HEIGHT * (11.55 - v) / 12.1;
+        let width = style::WIDTH - style::LEFT - style::RIGHT;
+        let x = |place: f64, part: f64| style::LEFT + 0.5 * width * (place + part);
+        for (at, v) in [
+            (x(0.0, PEOPLE.0), 0.0),
+            (x(1.0, PEOPLE.0), 10.0),
+            (x(0.0, PEOPLE.1), 4.0),
+        ] {
+            assert!(has(&svg, "circle", &[("cx", at), ("cy", y(v))]), "{svg}");
+        }
+        let m = x(0.0, MEAN);
+        assert!(has(
+            &svg,
+            "line",
+            &[("x1", m), ("y1", y(0.0)), ("x2", m), ("y2", y(4.0))]
+        ));
+        assert!(svg.contains(">fo</text>") && svg.contains("mean, 95 %") && !svg.contains("NaN"));
+        assert_eq!(svg, people_by_condition("p", "t", &grid()));
+    }
+
+    #[test]
+    fn nobody_is_a_small_figure_and_many_are_grey() {
+        let none = people_by_condition("p", "t", &PeopleGrid::default());
+        assert!(none.starts_with("<svg ") && !none.contains("NaN"));
+        let mut many = grid();
+        many.people = (0..9).map(|i| format!("P{i}")).collect();
+        many.panels[0].people = vec![vec![Some((1.0, Some(0.1))); 2]; 9];
+        let svg = people_by_condition("p", "t", &many);
+        assert!(svg.contains("a person") && !svg.contains(">P3<"));
+    }
+}

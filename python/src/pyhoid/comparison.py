@@ -1,0 +1,186 @@
+"""Whether conditions differ, and people: from the results of a group."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from . import _pyhoid
+from .verdict import Verdict
+
+if TYPE_CHECKING:
+    from typing import Literal
+
+    import pandas as pd
+
+__all__ = ["Comparison", "compare"]
+
+#: A factor: its name, ``"name:level=a,b;level=c"``, or levels with their members by name.
+Factor = str | Mapping[str, Mapping[str, Sequence[str]]]
+
+
+class Comparison:
+    """Differences between conditions and people. `compare` makes it.
+
+    Examples
+    --------
+    >>> found = pyhoid.compare("results")
+    >>> found.to_dataframe()[["quantity", "value", "low", "high", "p_adjusted"]]
+    """
+
+    def __init__(self, text: str) -> None:
+        self._text = text
+        found = json.loads(text)
+        #: Level, reasons and notes.
+        self.verdict = Verdict(*(found["verdict"][key] for key in ("level", "reasons", "notes")))
+        #: Each difference: quantity, unit, factor, from, to, value, standard_error, interval, t, p, p_adjusted ...
+        self.differences: list[dict[str, Any]] = found["differences"]
+        #: The mean over people of each quantity in each condition.
+        self.means: list[dict[str, Any]] = found["means"]
+        #: The estimates of people that all of it is made of.
+        self.estimates: list[dict[str, Any]] = found["estimates"]
+        #: Changes from run to run, with ``covariate="run"``.
+        self.learning: list[dict[str, Any]] = found["learning"]
+        #: Who is missing where, and why.
+        self.left_out: list[dict[str, Any]] = found["left_out"]
+        #: The settings that were used.
+        self.settings: dict[str, str] = {s["name"]: s["value"] for s in found["settings"]}
+
+    @property
+    def sentences(self) -> list[str]:
+        """Each difference as a sentence for a paper."""
+        return [difference["sentence"] for difference in self.differences]
+
+    def to_dataframe(
+        self, table: Literal["differences", "means", "estimates", "learning", "left_out"] = "differences"
+    ) -> pd.DataFrame:
+        """A table of the result, a row for each entry; ends of intervals are ``low`` and ``high``.
+
+        >>> found.to_dataframe("estimates")
+        """
+        import pandas as pd
+
+        return pd.DataFrame([_flat(row) for row in getattr(self, table)])
+
+    def to_svg(self) -> str:
+        """People by condition with the mean and its interval, as the text of an SVG file.
+
+        >>> from pathlib import Path
+        >>> Path("people.svg").write_text(found.to_svg())
+        """
+        return _pyhoid.comparison_figure_of(self._text)
+
+    def to_json(self) -> str:
+        """The object of ``hoid compare --json``; `from_json` reads it again.
+
+        >>> text = found.to_json()
+        """
+        return self._text
+
+    @classmethod
+    def from_json(cls, text: str) -> Comparison:
+        """A comparison that `to_json` wrote, or ``hoid compare --json`` printed.
+
+        Raises
+        ------
+        DataError
+            For a text that is none, was changed, or is of another version.
+        """
+        _pyhoid.comparison_figure_of(text)
+        return cls(text)
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Comparison):
+            return NotImplemented
+        return bool(json.loads(self._text) == json.loads(other._text))
+
+    def __hash__(self) -> int:
+        return hash(json.dumps(json.loads(self._text)))
+
+    def __repr__(self) -> str:
+        return "\n".join([repr(self.verdict), *self.sentences])
+
+
+def _flat(row: Mapping[str, Any]) -> dict[str, Any]:
+    flat = dict(row)
+    if "interval" in flat:
+        flat["low"], flat["high"] = flat.pop("interval")
+    size = flat.pop("effect_size", None)
+    if "sentence" in flat:
+        flat["effect_size"], flat["size"] = (size["name"], size["value"]) if size else (None, None)
+        flat["people"] = len(flat["people"])
+        flat["unweighted"] = flat["unweighted"]["value"]
+    return flat
+
+
+def compare(
+    results: str | PathLike[str],
+    *,
+    factor: Factor | Sequence[str] | None = None,
+    variation: Literal["within", "between"] | None = None,
+    of: str | Sequence[str] = (),
+    covariate: Literal["run"] | None = None,
+    adjust: Literal["holm", "none"] = "holm",
+    weights: Literal["penalised", "reml"] = "penalised",
+) -> Comparison:
+    """Whether conditions differ, and people.
+
+    Parameters
+    ----------
+    results : path
+        The directory that `group` wrote, or a file with what ``hoid group --json`` printed.
+    factor : str, mapping, or sequence of str
+        What conditions or people differ in: ``"axis:roll=C1r,C2r;pitch=C1p,C2p"``, or
+        ``{"axis": {"roll": ["C1r", "C2r"], "pitch": ["C1p", "C2p"]}}``; several for their interactions.
+        Without it each condition is a level.
+    variation : {"within", "between"}
+        Whether each person is in all levels or in one; found from the results.
+    of : str or sequence of str
+        ``"crossover"``, ``"phase_margin"``, ``"tau_e"`` (these three by default), ``"gain_db@2.5"``,
+        ``"phase_deg@2.5"``, ``"rms_e"``, ``"rms_u"``, or parameters of one form.
+    covariate : {"run"}
+        Takes learning over the runs out, and tells it.
+    adjust : {"holm", "none"}
+        What is done about many tests.
+    weights : {"penalised", "reml"}
+        The variance between people in their weights: kept away from zero, or that of the restricted
+        likelihood, whose intervals are too short for few people.
+
+    Returns
+    -------
+    Comparison
+
+    Raises
+    ------
+    OptionError, FileError, DataError
+
+    Examples
+    --------
+    >>> found = pyhoid.compare("results", of=["crossover", "tau_e"])
+    >>> print(found)
+    """
+    if factor is None:
+        factors = []
+    elif isinstance(factor, str):
+        factors = [factor]
+    elif isinstance(factor, Mapping):
+        factors = [_typed(name, levels) for name, levels in factor.items()]
+    else:
+        factors = list(factor)
+    text = _pyhoid.compare(
+        Path(results),
+        factors=factors,
+        variation=variation,
+        of=of.split(",") if isinstance(of, str) else list(of),
+        covariate=covariate,
+        adjust=adjust,
+        weights=weights,
+    )
+    return Comparison(text)
+
+
+def _typed(name: str, levels: Mapping[str, Sequence[str]]) -> str:
+    return f"{name}:" + ";".join(f"{level}={','.join(members)}" for level, members in levels.items())
