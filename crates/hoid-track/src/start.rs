@@ -186,7 +186,7 @@ impl StartState {
 /// The bounds of a recursion with room for N parameters.
 ///
 /// # Errors
-/// As [`bounds`].
+/// [`IdentError::UnknownParameter`], [`IdentError::BadOption`].
 pub fn physical_bounds<const N: usize>(setup: &Setup, sample_time: SampleTime) -> Result<[[f64; 2]; N], IdentError> {
     let limits = bounds(setup, sample_time)?;
     let free = [f64::NEG_INFINITY, f64::INFINITY];

@@ -177,9 +177,9 @@ fn a_delay_that_changes_is_followed_and_named() {
 
 #[test]
 fn what_has_a_model_of_the_change_takes_no_memory() {
-    for method in [hoid::survey::ekf(), hoid::survey::ukf(), hoid::survey::multiple_model()] {
+    for mut method in [hoid::survey::ekf(), hoid::survey::ukf(), hoid::survey::multiple_model()] {
         for (name, text) in [("memory", "256"), ("covariance", "0.1")] {
-            let refused = options(method.clone()).with(&[(name, text)]).unwrap_err().to_string();
+            let refused = hoid::survey::set(&mut method, name, text).unwrap_err().to_string();
             assert!(refused.contains(name) && refused.contains("rpem"), "{refused}");
         }
     }

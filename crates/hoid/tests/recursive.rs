@@ -324,6 +324,11 @@ fn hostile_samples_are_skipped_counted_and_forgotten() {
         // Two per cent of the samples are missing: the estimate is another one, but none that its
         // error bars exclude.
         for (a, b) in clean.parameters().iter().zip(tracker.parameters()) {
+            // The rule of this one has no covariance.
+            if method.name() == "linear-network" {
+                assert_eq!(a.standard_error, None);
+                continue;
+            }
             // What a method holds is the same.
             let distance = (a.value - b.value).abs() / a.standard_error.unwrap();
             assert!(distance < 3.0 || a.value == b.value, "{method:?}: {distance}");
