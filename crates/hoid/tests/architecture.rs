@@ -75,7 +75,14 @@ const ALLOWED: [(&str, &[&str]); 22] = [
     ),
     (
         "hoid-design",
-        &["hoid-numerics", "hoid-model", "hoid-io", "hoid-analysis", "hoid-study"],
+        &[
+            "hoid-numerics",
+            "hoid-model",
+            "hoid-ident",
+            "hoid-io",
+            "hoid-analysis",
+            "hoid-study",
+        ],
     ),
     (
         "hoid-report",
