@@ -1,7 +1,7 @@
 //! What ends a command early, and with which exit code.
 
 use hoid::analysis::{AnalysisError, registry::estimator_setting};
-use hoid::design::compare::CompareError;
+use hoid::design::{compare::CompareError, experiment::DesignError};
 use hoid::ident::IdentError;
 use hoid::io::{IoError, ScenarioFileError};
 use hoid::model::{ModelError, Verdict, VerdictLevel};
@@ -41,6 +41,8 @@ pub enum CliError {
     Study(#[from] StudyError),
     #[error(transparent)]
     Compare(#[from] CompareError),
+    #[error(transparent)]
+    Design(#[from] DesignError),
     #[error(transparent)]
     Model(#[from] ModelError),
     #[error(transparent)]
@@ -142,6 +144,7 @@ impl CliError {
             | Self::Compare(
                 CompareError::Factor { .. } | CompareError::Quantity { .. } | CompareError::NotInJson { .. },
             )
+            | Self::Design(DesignError::OutOfRange { .. } | DesignError::NotThere { .. })
             | Self::Io(IoError::OutputIsInput { .. } | IoError::OutputAmongInputs { .. })
             | Self::Study(StudyError::Io(IoError::OutputIsInput { .. } | IoError::OutputAmongInputs { .. }))
             | Self::Study(StudyError::Plan { .. } | StudyError::BadShard { .. } | StudyError::Pattern { .. }) => 2,

@@ -55,6 +55,7 @@ fn main() -> ExitCode {
         Command::Margins(args) => commands::margins::run(&args),
         Command::Group(args) => commands::group::run(&args),
         Command::Compare(args) => commands::compare::run(&args),
+        Command::Design(args) => commands::design::run(&args),
         Command::SimulateGroup(args) => commands::group::simulate(&args),
         Command::Reproduce(args) => commands::reproduce::run(&args),
         Command::Study(command) => commands::study::run_command(&command),

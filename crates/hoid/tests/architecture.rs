@@ -6,7 +6,7 @@ use std::{collections::BTreeMap, process::Command};
 use serde_json::Value;
 
 /// What each crate may depend on within the workspace.
-const ALLOWED: [(&str, &[&str]); 22] = [
+const ALLOWED: [(&str, &[&str]); 23] = [
     ("hoid-numerics", &[]),
     ("hoid-core", &["hoid-numerics"]),
     ("hoid-embedded", &["hoid-core"]),
@@ -95,7 +95,14 @@ const ALLOWED: [(&str, &[&str]); 22] = [
     ),
     (
         "hoid-design",
-        &["hoid-numerics", "hoid-model", "hoid-io", "hoid-analysis", "hoid-study"],
+        &[
+            "hoid-numerics",
+            "hoid-model",
+            "hoid-ident",
+            "hoid-io",
+            "hoid-analysis",
+            "hoid-study",
+        ],
     ),
     (
         "hoid-report",

@@ -6,6 +6,7 @@ use super::{
     compare::CompareArgs,
     convert::{ConvertArgs, InfoArgs},
     describe::DescribeArgs,
+    design::DesignArgs,
     fmu::FmuArgs,
     group::{GroupArgs, SimulateGroupArgs},
     identify::IdentifyArgs,
@@ -85,6 +86,11 @@ pub enum Command {
     /// Differences between the conditions or people of a group, with intervals, tests, effect sizes and a sentence each: what
     /// `hoid group` found of each person, over people.
     Compare(CompareArgs),
+    /// The forcing function that tells most of a person
+    ///
+    /// Lines, amplitudes and phases of a forcing function, and the standard errors to be expected of so many runs, for a person
+    /// and a controlled element that are about known.
+    Design(DesignArgs),
     /// A virtual experiment for `hoid group`
     ///
     /// Simulates subjects, conditions and runs, with the truth beside them.

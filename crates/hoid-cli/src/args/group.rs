@@ -41,6 +41,10 @@ pub struct GroupRunArgs {
     /// Write CSV beside Parquet
     #[arg(long)]
     pub csv: bool,
+    /// Estimate each person from all of them too: pooled.csv, and population.json (of several conditions
+    /// population-NAME.json), which --prior reads
+    #[arg(long)]
+    pub pool: bool,
     #[command(flatten)]
     pub picture: FigureArgs,
     #[command(flatten)]

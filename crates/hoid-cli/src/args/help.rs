@@ -17,20 +17,22 @@ struct Help {
 }
 
 /// The commands by what they are for, in the order of the first page.
-const GROUPS: [(&str, &[&str]); 5] = [
+const GROUPS: [(&str, &[&str]); 4] = [
     (
         "Recordings",
         &[
             "info", "identify", "describe", "track", "stream", "lab", "group", "compare", "fmu",
         ],
     ),
-    ("Simulation", &["demo", "simulate", "simulate-group"]),
-    ("Models", &["convert", "margins"]),
+    (
+        "Simulation, models",
+        &["demo", "design", "simulate", "simulate-group", "convert", "margins"],
+    ),
     ("Studies", &["study", "reproduce"]),
     ("This program", &["completions", "man", "help"]),
 ];
 
-const HELP: [Help; 18] = [
+const HELP: [Help; 19] = [
     Help {
         command: "lab",
         examples: &["hoid lab --open", "hoid lab --config lab.toml --out study"],
@@ -164,7 +166,39 @@ const HELP: [Help; 18] = [
             "hoid compare results",
             "hoid compare results --factor 'plant:H1=C1r,C1p;H2=C2r,C2p' --of crossover,tau_e --out comparison",
         ],
-        shown: &[],
+        shown: &[
+            "factor",
+            "within",
+            "between",
+            "of",
+            "covariate",
+            "adjust",
+            "out",
+            "figure",
+            "table",
+            "verbose",
+            "json",
+        ],
+    },
+    Help {
+        command: "design",
+        examples: &[
+            "hoid design --people person.toml --for tau_e=5%,crossover=3%",
+            "hoid design --people fit.json --controlled-element '1/(s(s+1))' --against reference --out design",
+        ],
+        shown: &[
+            "people",
+            "controlled_element",
+            "wanted",
+            "disturbance",
+            "length",
+            "runs",
+            "max_rms_e",
+            "max_u",
+            "against",
+            "out",
+            "json",
+        ],
     },
     Help {
         command: "demo",

@@ -16,7 +16,7 @@
 //! | `lab` | `hoid lab` |
 //! | `shell` | `hoid completions`, `hoid man` |
 //! | `help` | all commands: what `-h` shows, headings, examples |
-//! | `compare` | `hoid compare` |
+//! | `compare`, `design` | `hoid compare`, `hoid design` |
 //! | `group`, `study` | `hoid group`, `hoid simulate-group`; `hoid study`, `hoid reproduce` |
 
 mod choices;
@@ -24,6 +24,7 @@ mod cli;
 mod compare;
 mod convert;
 mod describe;
+mod design;
 mod figure;
 mod fmu;
 mod group;
@@ -45,6 +46,7 @@ pub use cli::{Cli, Command};
 pub use compare::CompareArgs;
 pub use convert::{ConvertArgs, InfoArgs};
 pub use describe::DescribeArgs;
+pub use design::DesignArgs;
 pub use fmu::{FmuArgs, OperatorChoice};
 pub use group::{GroupArgs, GroupCommand, GroupInitArgs, GroupRunArgs, SimulateGroupArgs};
 pub use help::command;

@@ -4,6 +4,7 @@ pub mod compare;
 pub mod convert;
 pub mod demo;
 pub mod describe;
+pub mod design;
 pub mod figure;
 pub mod fmu;
 pub mod group;

@@ -9,7 +9,7 @@ use thiserror::Error;
 #[non_exhaustive]
 pub enum CompareError {
     /// No more people than coefficients.
-    #[error("{found} with an estimate, expected at least {expected}: record more of them, or compare fewer levels")]
+    #[error("{found} with an estimate, expected at least {expected}: record more, or compare fewer levels")]
     TooFew {
         /// People, or runs.
         found: usize,

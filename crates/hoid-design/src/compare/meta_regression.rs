@@ -106,28 +106,8 @@ pub fn meta_regression(
     x: &[Vec<f64>],
     weights: Weights,
 ) -> Result<MetaRegression, CompareError> {
-    let (n, p) = (observations.len(), x.first().map_or(0, Vec::len));
-    if n <= p {
-        return Err(CompareError::TooFew {
-            found: n,
-            expected: p + 1,
-        });
-    }
-    let finite = |o: &Observation| o.value.is_finite() && o.variance.is_finite() && o.variance >= 0.0;
-    if !observations.iter().all(finite) || !x.iter().flatten().all(|v| v.is_finite()) {
-        return Err(CompareError::NotFinite);
-    }
-    let model = Model {
-        x: DMatrix::from_fn(n, p, |i, j| x[i][j]),
-        y: DVector::from_iterator(n, observations.iter().map(|o| o.value)),
-        v: observations.iter().map(|o| o.variance).collect(),
-    };
-    let known = model.v.iter().all(|v| *v > 0.0);
-    let scatter = model.scatter().ok_or(CompareError::Collinear)?;
-    let size = model.y.iter().fold(0.0_f64, |most, y| most.max(y.abs()));
-    if scatter <= (8.0 * f64::EPSILON * size).powi(2) {
-        return Err(CompareError::NoScatter);
-    }
+    let (model, scatter, known) = checked(observations, x)?;
+    let (n, p) = model.x.shape();
     let search = |penalty: f64| match known {
         true => model.tau_squared(scatter, penalty).ok_or(CompareError::Collinear),
         false => Ok(scatter),
@@ -156,6 +136,45 @@ pub fn meta_regression(
         heterogeneity: fixed.map(|at| (at.q, chi_squared_beyond(at.q, dof))),
         covariance,
     })
+}
+
+/// The variance between people at the greatest of `l + log tau`: never zero, and less often too large than that of the weights.
+///
+/// # Errors
+/// As [`meta_regression`].
+pub fn variance_between(observations: &[Observation]) -> Result<f64, CompareError> {
+    let (model, scatter, known) = checked(observations, &vec![vec![1.0]; observations.len()])?;
+    match known {
+        true => model.tau_squared(scatter, 0.5).ok_or(CompareError::Collinear),
+        false => Ok(scatter),
+    }
+}
+
+/// The model, the variance of y about its regression, and whether errors are known.
+fn checked(observations: &[Observation], x: &[Vec<f64>]) -> Result<(Model, f64, bool), CompareError> {
+    let (n, p) = (observations.len(), x.first().map_or(0, Vec::len));
+    if n <= p {
+        return Err(CompareError::TooFew {
+            found: n,
+            expected: p + 1,
+        });
+    }
+    let finite = |o: &Observation| o.value.is_finite() && o.variance.is_finite() && o.variance >= 0.0;
+    if !observations.iter().all(finite) || !x.iter().flatten().all(|v| v.is_finite()) {
+        return Err(CompareError::NotFinite);
+    }
+    let model = Model {
+        x: DMatrix::from_fn(n, p, |i, j| x[i][j]),
+        y: DVector::from_iterator(n, observations.iter().map(|o| o.value)),
+        v: observations.iter().map(|o| o.variance).collect(),
+    };
+    let known = model.v.iter().all(|v| *v > 0.0);
+    let scatter = model.scatter().ok_or(CompareError::Collinear)?;
+    let size = model.y.iter().fold(0.0_f64, |most, y| most.max(y.abs()));
+    if scatter <= (8.0 * f64::EPSILON * size).powi(2) {
+        return Err(CompareError::NoScatter);
+    }
+    Ok((model, scatter, known))
 }
 
 impl Coefficient {

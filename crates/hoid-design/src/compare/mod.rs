@@ -35,5 +35,7 @@ pub use effect_size::{EffectSize, d_z, hedges_g};
 pub use error::CompareError;
 pub use factor::{Factor, Level, Variation};
 pub use group_estimates::GroupEstimates;
-pub use meta_regression::{Coefficient, MetaRegression, Observation, Weights, meta_mean, meta_regression};
+pub use meta_regression::{
+    Coefficient, MetaRegression, Observation, Weights, meta_mean, meta_regression, variance_between,
+};
 pub use quantity::Quantity;

@@ -78,7 +78,7 @@ impl Trace {
     /// Where e and u stand still and the estimate goes on, which was asked for: nothing arrives there, and its error
     /// bars go to zero with the innovations ([`crate::standing`]).
     pub(super) fn learnt_at_rest(&self, record: &Record) -> Option<Finding> {
-        if self.options().method.inner().guard() != Some(GuardChoice::No) {
+        if self.options().method.guard() != Some(GuardChoice::No) {
             return None;
         }
         let (e, u) = (record.input(), record.output());

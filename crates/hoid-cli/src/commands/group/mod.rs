@@ -1,7 +1,8 @@
 //! `hoid group`: recorded runs by subject and condition. `form` shows what came out, to people and
-//! to programs.
+//! to programs, `pooled` what is found of each person from all of them.
 
 mod form;
+mod pooled;
 
 use std::path::{Path, PathBuf};
 
@@ -190,6 +191,10 @@ fn analyse(path: &Path, out: &Path, args: &GroupRunArgs) -> Result<(), CliError>
     if let Some(place) = &args.picture.figure {
         draw(&group_figures(&manifest, out)?, place, args.picture.width)?;
     }
+    let pooled = match args.pool {
+        true => Some(pooled::pooled(&manifest, &summary, out)?),
+        false => None,
+    };
     let finished = Finished {
         name: &manifest.name,
         summary: &summary,
@@ -201,9 +206,14 @@ fn analyse(path: &Path, out: &Path, args: &GroupRunArgs) -> Result<(), CliError>
         Ok(object.as_object().cloned().unwrap_or_default())
     })?;
     if args.show.json {
-        json::print(&finished.to_json())?;
+        let mut object = finished.to_json();
+        if let Some((populations, _)) = &pooled {
+            object["populations"] = pooled::objects(populations);
+        }
+        json::print(&object)?;
     } else {
-        output::show(&finished.page(args.show.verbose))?;
+        let of_all = pooled.map_or_else(String::new, |(populations, files)| pooled::page(&populations, &files));
+        output::show(&format!("{}{of_all}", finished.page(args.show.verbose)))?;
     }
     if summary.verdict.level == VerdictLevel::NotDetermined {
         let reasons: Vec<&str> = summary.verdict.reasons().take(REASONS_OF_EXIT).collect();
@@ -225,7 +235,7 @@ fn draw(figures: &[(String, String)], place: &Path, width_mm: Option<f64>) -> Re
     for (condition, svg) in figures {
         let stem = place.file_stem().unwrap_or_default().to_string_lossy();
         let ending = place.extension().unwrap_or_default().to_string_lossy();
-        let of_condition = condition.replace(|c: char| !c.is_ascii_alphanumeric() && c != '-' && c != '_', "-");
+        let of_condition = pooled::in_a_file_name(condition);
         let own = match figures.len() {
             1 => place.to_owned(),
             _ => place.with_file_name(format!("{stem}-{of_condition}.{ending}")),

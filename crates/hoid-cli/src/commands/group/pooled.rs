@@ -1,0 +1,93 @@
+//! `hoid group --pool`: people from all of them, and the populations of the conditions, as files and on the page.
+
+use std::path::{Path, PathBuf};
+
+use hoid::design::pool::{Population, pool, table};
+use hoid::ident::family::OperatorPrior;
+use hoid::model::numbers::{significant, with_uncertainty};
+use hoid::study::group::{GroupSummary, Manifest};
+
+use serde_json::Value;
+
+use crate::{error::CliError, text};
+
+const TABLE: &str = "pooled.csv";
+
+/// The populations, and the files that were written.
+pub fn pooled(
+    manifest: &Manifest,
+    summary: &GroupSummary,
+    out: &Path,
+) -> Result<(Vec<Population>, Vec<PathBuf>), CliError> {
+    let prior: OperatorPrior = manifest.analysis.prior.parse()?;
+    let populations = pool(&summary.people, &prior);
+    let mut files = vec![out.join(TABLE)];
+    hoid::io::write_table(&files[0], &table(&populations))?;
+    for population in &populations {
+        let name = match populations.len() {
+            1 => "population.json".to_owned(),
+            _ => format!("population-{}.json", in_a_file_name(&population.condition)),
+        };
+        let text = format!("{:#}\n", population.json());
+        let path = out.join(name);
+        hoid::io::write_atomically(&path, |file| file.write_all(text.as_bytes()))?;
+        files.push(path);
+    }
+    Ok((populations, files))
+}
+
+/// A condition as a part of the name of a file.
+pub fn in_a_file_name(condition: &str) -> String {
+    condition.replace(|c: char| !c.is_ascii_alphanumeric() && c != '-' && c != '_', "-")
+}
+
+/// The populations as objects.
+pub fn objects(populations: &[Population]) -> Value {
+    populations.iter().map(Population::json).collect()
+}
+
+/// What the page says of them.
+pub fn page(populations: &[Population], files: &[PathBuf]) -> String {
+    let mut rows = text::table(&[
+        "condition",
+        "parameter",
+        "population",
+        "spread",
+        "person",
+        "own data",
+        "from all",
+        "shrinkage",
+    ]);
+    let mut left_out = String::new();
+    for population in populations {
+        for parameter in &population.parameters {
+            for (k, person) in parameter.people.iter().enumerate() {
+                let once = |text: String| if k == 0 { text } else { String::new() };
+                let of = |value: f64, error: f64| {
+                    let (value, error) = with_uncertainty(value, Some(error));
+                    format!("{value} ± {error}")
+                };
+                rows.add_row([
+                    once(population.condition.clone()),
+                    once(parameter.name.clone()),
+                    once(significant(parameter.centre, 3)),
+                    once(format!("{:.0} %", 100.0 * parameter.spread)),
+                    person.subject.clone(),
+                    person
+                        .own
+                        .map_or_else(|| "nothing".to_owned(), |(value, error)| of(value, error)),
+                    of(person.value, person.standard_error),
+                    format!("{:.0} %", 100.0 * person.shrinkage),
+                ]);
+            }
+        }
+        for (name, why) in &population.left_out {
+            left_out.push_str(&format!("{name} in {} is not pooled: {why}.\n", population.condition));
+        }
+    }
+    let names: Vec<String> = files.iter().map(|file| file.display().to_string()).collect();
+    format!(
+        "\nEach person from all (without the prior of the fits)\n{rows}\n{left_out}Written: {}.\n",
+        names.join(", ")
+    )
+}

@@ -1,0 +1,176 @@
+//! Lines of a forcing function: whole multiples of `2 pi/T`, none of them a harmonic of another.
+//!
+//! **Places.** A person's response to a line has harmonics, and a nonlinearity puts power on multiples. The multiples that are taken are
+//! such that no ratio of two of them is a whole number: the same as primes have, with more to choose from (R. Pintelon and J. Schoukens,
+//! *System Identification*, 2012, section 5.2). The candidates are spread evenly over the logarithm of frequency.
+//!
+//! **Phases.** From several starts, that of M. R. Schroeder (*IEEE Trans. Inf. Theory* 16 (1970) 85-89), `phi_k = -2 pi sum_{j < k} (k - j) p_j` of
+//! the relative powers p, and others that are spread over the circle, the phases are moved one after the other, an eighth of a turn and
+//! less, as long as the largest value of the signal falls; the best is kept.
+
+use std::f64::consts::TAU;
+
+use hoid_model::forcing::Sinusoid;
+
+/// Multiples within these bounds that have no whole ratio, about evenly spread over the logarithm.
+pub(super) fn multiples(least: u32, largest: u32, count: usize) -> Vec<u32> {
+    let mut taken: Vec<u32> = Vec::new();
+    let fits = |taken: &[u32], m: u32| taken.iter().all(|t| !m.is_multiple_of(*t) && !t.is_multiple_of(m));
+    let (low, high) = (f64::from(least).ln(), f64::from(largest).ln());
+    for k in 0..count {
+        let part = if count > 1 { k as f64 / (count - 1) as f64 } else { 0.0 };
+        let wanted = (low + part * (high - low)).exp().round() as u32;
+        // The nearest that is free, of two the larger.
+        let near = (0..=largest)
+            .flat_map(|d| [wanted.checked_add(d), wanted.checked_sub(d)])
+            .flatten();
+        let near = near.filter(|m| (least..=largest).contains(m) && !taken.contains(m));
+        if let Some(m) = near.into_iter().find(|m| fits(&taken, *m)) {
+            taken.push(m);
+        }
+    }
+    taken.sort_unstable();
+    taken
+}
+
+/// Samples of a period, of the fastest line sixteen.
+fn samples(lines: &[Sinusoid], period_s: f64) -> Vec<Vec<(f64, f64)>> {
+    let fastest = lines.iter().map(|l| l.omega_rad_s).fold(0.0, f64::max);
+    let n = ((16.0 * fastest * period_s / TAU).ceil() as usize).clamp(64, 8192);
+    let of = |line: &Sinusoid| -> Vec<(f64, f64)> {
+        let angle = |k: usize| line.omega_rad_s * period_s * k as f64 / n as f64;
+        (0..n)
+            .map(|k| (line.amplitude_deg * angle(k).cos(), line.amplitude_deg * angle(k).sin()))
+            .collect()
+    };
+    lines.iter().map(of).collect()
+}
+
+/// Peak over rms of a sum of sines over its period.
+pub fn crest_factor(lines: &[Sinusoid], period_s: f64) -> f64 {
+    let table = samples(lines, period_s);
+    peak(&sum(&table, lines)) / rms(lines)
+}
+
+fn rms(lines: &[Sinusoid]) -> f64 {
+    lines.iter().map(|l| 0.5 * l.amplitude_deg.powi(2)).sum::<f64>().sqrt()
+}
+
+fn peak(values: &[f64]) -> f64 {
+    values.iter().fold(0.0, |most, v| most.max(v.abs()))
+}
+
+/// `A sin(omega t + phi) = sin phi A cos(omega t) + cos phi A sin(omega t)`.
+fn sum(table: &[Vec<(f64, f64)>], lines: &[Sinusoid]) -> Vec<f64> {
+    let mut values = vec![0.0; table.first().map_or(0, Vec::len)];
+    for (of, line) in table.iter().zip(lines) {
+        let (s, c) = line.phase_rad.sin_cos();
+        for (v, (cosine, sine)) in values.iter_mut().zip(of) {
+            *v += s * cosine + c * sine;
+        }
+    }
+    values
+}
+
+/// Steps of the phases, in turns.
+const STEPS: [f64; 6] = [1.0 / 8.0, 1.0 / 16.0, 1.0 / 32.0, 1.0 / 64.0, 1.0 / 128.0, 1.0 / 256.0];
+/// Rounds of a step at most.
+const ROUNDS: usize = 12;
+/// Starts.
+const STARTS: usize = 24;
+
+/// Gives lines the phases of a low crest factor.
+pub(super) fn set_phases(lines: &mut [Sinusoid], period_s: f64) {
+    let power: f64 = lines.iter().map(|l| l.amplitude_deg.powi(2)).sum();
+    let relative: Vec<f64> = lines.iter().map(|l| l.amplitude_deg.powi(2) / power).collect();
+    let table = samples(lines, period_s);
+    let mut best = f64::INFINITY;
+    let mut trial = lines.to_vec();
+    for start in 0..STARTS {
+        for k in 0..trial.len() {
+            let turns = match start {
+                0 => -(0..k).map(|j| (k - j) as f64 * relative[j]).sum::<f64>(),
+                // Multiples of irrational numbers do not repeat.
+                _ => ((start * (k + 1)) as f64 * 0.618_033_988_75) + ((k * k) as f64 * 0.414_213_562_37 * start as f64),
+            };
+            trial[k].phase_rad = (TAU * turns).rem_euclid(TAU);
+        }
+        let found = flattened(&mut trial, &table);
+        if found < best {
+            best = found;
+            lines.copy_from_slice(&trial);
+        }
+    }
+}
+
+/// Moves the phases until the largest value does not fall any more, which is returned.
+fn flattened(lines: &mut [Sinusoid], table: &[Vec<(f64, f64)>]) -> f64 {
+    let mut values = sum(table, lines);
+    let mut least = peak(&values);
+    for step in STEPS {
+        for _ in 0..ROUNDS {
+            let before = least;
+            for k in 0..lines.len() {
+                for sign in [1.0, -1.0] {
+                    let phase = (lines[k].phase_rad + sign * step * TAU).rem_euclid(TAU);
+                    let [was, is] = [lines[k].phase_rad, phase].map(f64::sin_cos);
+                    let turn = |(v, (c, s)): (&f64, &(f64, f64))| v + (is.0 - was.0) * c + (is.1 - was.1) * s;
+                    let moved: Vec<f64> = values.iter().zip(&table[k]).map(turn).collect();
+                    let found = peak(&moved);
+                    if found < least {
+                        (least, values) = (found, moved);
+                        lines[k].phase_rad = phase;
+                    }
+                }
+            }
+            if least >= before {
+                break;
+            }
+        }
+    }
+    least
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn equal(multiples: &[u32], period_s: f64) -> Vec<Sinusoid> {
+        let line = |m: &u32| Sinusoid {
+            amplitude_deg: 1.0,
+            omega_rad_s: f64::from(*m) * TAU / period_s,
+            phase_rad: 0.0,
+        };
+        multiples.iter().map(line).collect()
+    }
+
+    #[test]
+    fn no_line_is_a_harmonic_of_another() {
+        for (least, largest, count) in [(2, 200, 10), (3, 40, 12), (1, 30, 5), (2, 500, 60)] {
+            let all = multiples(least, largest, count);
+            assert!(all.len() >= count.min(8).min(all.len()) && !all.is_empty());
+            for (i, a) in all.iter().enumerate() {
+                assert!((least..=largest).contains(a));
+                assert!(all[i + 1..].iter().all(|b| !b.is_multiple_of(*a)), "{all:?}");
+            }
+        }
+        assert_eq!(multiples(2, 200, 10).len(), 10);
+    }
+
+    #[test]
+    fn phases_make_the_signal_flat() {
+        let all = multiples(2, 200, 10);
+        let mut lines = equal(&all, 80.0);
+        let before = crest_factor(&lines, 80.0);
+        set_phases(&mut lines, 80.0);
+        let crest = crest_factor(&lines, 80.0);
+        println!("crest factor {crest:.3}, of sines with equal phases {before:.3}");
+        assert!(crest < 2.3 && crest < 0.9 * before, "{crest} {before}");
+        let mut again = equal(&all, 80.0);
+        set_phases(&mut again, 80.0);
+        assert_eq!(lines, again);
+        // The table of one line has its amplitude.
+        let one = equal(&[3], 10.0);
+        assert!((crest_factor(&one, 10.0) - 2f64.sqrt()).abs() < 1e-2);
+    }
+}

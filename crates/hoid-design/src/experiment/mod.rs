@@ -1,0 +1,60 @@
+//! What an experiment will say, before it is done.
+//!
+//! | module | what it holds |
+//! |---|---|
+//! | [`expected`] | standard errors of a person by the information of the lines of a forcing function |
+//! | [`Designing`] | amplitudes and places of the lines that tell most, under limits |
+//! | [`crest_factor`] | lines without common harmonics (`lines`), and their phases |
+
+mod designing;
+mod information;
+mod lines;
+
+use hoid_model::ModelError;
+use thiserror::Error;
+
+pub use designing::{Designed, Designing, Wanted, periods};
+pub use information::{Enters, Expected, Remnant, Task, expected};
+pub use lines::crest_factor;
+
+/// Why there is nothing to be expected of an experiment.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum DesignError {
+    /// A number without meaning.
+    #[error("{quantity} is {found}, expected {expected}")]
+    OutOfRange {
+        /// What.
+        quantity: &'static str,
+        /// What it is.
+        found: f64,
+        /// What it may be.
+        expected: &'static str,
+    },
+    /// A loop of which there is no crossover.
+    #[error(
+        "the gain of the loop does not fall through one between 0.01 and 100 rad/s: give the person another gain, or other units of the element"
+    )]
+    NoCrossover,
+    /// Lines that leave the person open.
+    #[error(
+        "{lines} lines do not determine {coordinates} parameters: add lines, each of which tells two numbers, and spread them over the frequencies at which the person works"
+    )]
+    NotIdentifiable {
+        /// Lines of the forcing function.
+        lines: usize,
+        /// Parameters of the person.
+        coordinates: usize,
+    },
+    /// What is wanted and is no parameter of the person.
+    #[error("{name} is nothing that this person has; expected one of {expected}")]
+    NotThere {
+        /// What was wanted.
+        name: String,
+        /// What there is.
+        expected: String,
+    },
+    /// An operator or element without meaning, or a loop that is not stable.
+    #[error(transparent)]
+    Model(#[from] ModelError),
+}

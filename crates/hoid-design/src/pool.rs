@@ -1,0 +1,371 @@
+//! Hierarchical people: each person from all of them, and the population that they are drawn from.
+//!
+//! In a condition `y_i = ln theta_i` is known of person i with variance `v_i = (s_i/theta_i)^2`, and people are drawn from a
+//! population, `y_i ~ N(mu, tau^2)` plus their error. mu is the mean of [`crate::compare::meta_mean`], tau^2 is at the greatest of `l + log tau`
+//! (Y. Chung, S. Rabe-Hesketh and I.-H. Choi, *Stat. Med.* 32 (2013) 4071-4089), which is never zero. The estimate of a person from all
+//! (B. Efron and C. Morris, *J. Am. Stat. Assoc.* 70 (1975) 311-319) is
+//!
+//! `B_i mu + (1 - B_i) y_i`, `B_i = v_i/(v_i + tau^2)`, with the variance `(1 - B_i) v_i + B_i^2 var(mu)`:
+//!
+//! **B is the shrinkage**, 1 for a person of whom nothing is known. That tau^2 is estimated is not in the variance. A person of
+//! tomorrow has `mu` with the variance `tau^2 + var(mu)`: what a prior is.
+//!
+//! A prior that the estimates hold already is taken out first, or it would count once for each person: with its
+//! share w, centre m and an estimate y, the data say `y - w (m - y)/(1 - w)` with the variance `v/(1 - w)`
+//! ([`OperatorPrior::pull`]). A person of whom more than nine tenths are prior is one of whom nothing is known.
+
+use hoid_ident::family::{OperatorPrior, Parameter};
+use hoid_io::{ColumnValues, OutputColumn, OutputTable};
+use hoid_model::operator_family::PARAMETERS;
+use hoid_study::group::Person;
+use serde::Serialize;
+use serde_json::{Value, json};
+
+use crate::compare::{CompareError, Observation, Weights, meta_mean, variance_between};
+
+/// Parameters that mean the same in every form.
+const OF_ANY_FORM: [&str; 3] = ["omega_nm", "zeta_nm", "tau_e"];
+/// People of whom the data say something.
+const LEAST_PEOPLE: usize = 3;
+/// Share of the prior beyond which the data say nothing.
+const ALL_PRIOR: f64 = 0.9;
+
+/// A person, from all.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct PooledPerson {
+    /// Who.
+    pub subject: String,
+    /// What their own data say, with the standard error; none where that is nothing.
+    pub own: Option<(f64, f64)>,
+    /// The estimate from all.
+    pub value: f64,
+    /// Its standard error.
+    pub standard_error: f64,
+    /// How far it is drawn to the mean of all: 0 not at all, 1 all the way.
+    pub shrinkage: f64,
+}
+
+/// A parameter of the population in a condition.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct PooledParameter {
+    /// Its name.
+    pub name: String,
+    /// Its unit.
+    pub unit: String,
+    /// The value that as many people exceed as not.
+    pub centre: f64,
+    /// Standard deviation of its logarithm between people.
+    pub spread: f64,
+    /// The same of a person who was not there: with the error of the centre.
+    pub spread_of_another: f64,
+    /// The people.
+    pub people: Vec<PooledPerson>,
+}
+
+/// The population of a condition.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Population {
+    /// The condition.
+    pub condition: String,
+    /// The form of its people; none where they differ.
+    pub form: Option<String>,
+    /// Its parameters.
+    pub parameters: Vec<PooledParameter>,
+    /// Parameters that are not pooled, and why.
+    pub left_out: Vec<(String, String)>,
+}
+
+/// The populations of the conditions of a group. `prior` is what the estimates of the people hold already.
+pub fn pool(people: &[Person], prior: &OperatorPrior) -> Vec<Population> {
+    let mut conditions: Vec<&str> = Vec::new();
+    for person in people.iter().filter(|p| p.is_of_all_runs() && !p.parameters.is_empty()) {
+        if !conditions.contains(&person.condition.as_str()) {
+            conditions.push(&person.condition);
+        }
+    }
+    let of = |condition: &str| -> Vec<&Person> {
+        let is = |p: &&Person| p.condition == condition && p.is_of_all_runs() && !p.parameters.is_empty();
+        people.iter().filter(is).collect()
+    };
+    conditions
+        .into_iter()
+        .map(|condition| population(condition, &of(condition), prior))
+        .collect()
+}
+
+fn population(condition: &str, people: &[&Person], prior: &OperatorPrior) -> Population {
+    let form = people.first().map(|p| p.form.clone());
+    let form = form.filter(|form| people.iter().all(|p| p.form == *form));
+    let mut found = Population {
+        condition: condition.to_owned(),
+        form: form.clone(),
+        parameters: Vec::new(),
+        left_out: Vec::new(),
+    };
+    for (name, unit) in PARAMETERS {
+        if !people.iter().any(|p| p.parameter(name).is_some()) {
+            continue;
+        }
+        if form.is_none() && !OF_ANY_FORM.contains(&name) {
+            let why = "the forms of people differ; say one under [analysis] in group.toml".to_owned();
+            found.left_out.push((name.to_owned(), why));
+            continue;
+        }
+        let own: Vec<(&str, Option<Observation>)> = people
+            .iter()
+            .map(|p| {
+                (
+                    p.subject.as_str(),
+                    p.parameter(name).and_then(|parameter| data(parameter, prior)),
+                )
+            })
+            .collect();
+        match pooled((name, unit), &own) {
+            Ok(parameter) => found.parameters.push(parameter),
+            Err(error) => found.left_out.push((name.to_owned(), error.to_string())),
+        }
+    }
+    found
+}
+
+/// What the data of a person say of the logarithm of a parameter.
+fn data(parameter: &Parameter, prior: &OperatorPrior) -> Option<Observation> {
+    let error = parameter.standard_error_person.or(parameter.standard_error)?;
+    let counts = parameter.determined && parameter.value > 0.0 && parameter.value.is_finite() && error > 0.0;
+    let has_prior = prior.entries().iter().any(|entry| entry.parameter == parameter.name);
+    let share = if has_prior { parameter.prior_share } else { 0.0 };
+    if !counts || share > ALL_PRIOR {
+        return None;
+    }
+    let relative = error / parameter.value;
+    Some(Observation {
+        value: parameter.value.ln() - prior.pull(parameter).unwrap_or(0.0),
+        variance: relative * relative / (1.0 - share),
+    })
+}
+
+fn pooled((name, unit): (&str, &str), own: &[(&str, Option<Observation>)]) -> Result<PooledParameter, CompareError> {
+    let known: Vec<Observation> = own.iter().filter_map(|(_, o)| *o).collect();
+    // Of two people a variance between them is not known at all.
+    if known.len() < LEAST_PEOPLE {
+        return Err(CompareError::TooFew {
+            found: known.len(),
+            expected: LEAST_PEOPLE,
+        });
+    }
+    let mean = meta_mean(&known, Weights::default())?.coefficients[0];
+    let (mu, of_mu) = (mean.value, mean.standard_error.powi(2));
+    let tau = variance_between(&known)?;
+    let person = |(subject, own): &(&str, Option<Observation>)| {
+        let (y, v) = own.map_or((mu, f64::INFINITY), |o| (o.value, o.variance));
+        let shrinkage = if v.is_finite() { v / (v + tau) } else { 1.0 };
+        let variance = if v.is_finite() {
+            (1.0 - shrinkage) * v + shrinkage * shrinkage * of_mu
+        } else {
+            tau + of_mu
+        };
+        let value = (shrinkage * mu + (1.0 - shrinkage) * y).exp();
+        PooledPerson {
+            subject: (*subject).to_owned(),
+            own: own.map(|o| (o.value.exp(), o.value.exp() * o.variance.sqrt())),
+            value,
+            standard_error: value * variance.sqrt(),
+            shrinkage,
+        }
+    };
+    Ok(PooledParameter {
+        name: name.to_owned(),
+        unit: unit.to_owned(),
+        centre: mu.exp(),
+        spread: tau.sqrt(),
+        spread_of_another: (tau + of_mu).sqrt(),
+        people: own.iter().map(person).collect(),
+    })
+}
+
+impl Population {
+    /// The object that `--prior` reads: each parameter with the standard error of a person who was not there.
+    pub fn json(&self) -> Value {
+        let parameter = |p: &PooledParameter| {
+            json!({
+                "name": p.name,
+                "value": p.centre,
+                "standard_error": p.centre * p.spread_of_another,
+                "unit": p.unit,
+                "determined": true,
+                "spread": p.spread,
+                "people": p.people,
+            })
+        };
+        json!({
+            "hoid": env!("CARGO_PKG_VERSION"),
+            "kind": "population",
+            "condition": self.condition,
+            "form": self.form,
+            "parameters": self.parameters.iter().map(parameter).collect::<Vec<_>>(),
+            "left_out": self.left_out,
+        })
+    }
+}
+
+/// The people of all populations, a row for each parameter.
+pub fn table(populations: &[Population]) -> OutputTable {
+    let all = || {
+        let of = |p: &'_ Population| {
+            p.parameters
+                .iter()
+                .map(|q| (p.condition.clone(), q.clone()))
+                .collect::<Vec<_>>()
+        };
+        populations.iter().flat_map(of).flat_map(|(condition, parameter)| {
+            let people = parameter.people.clone();
+            people
+                .into_iter()
+                .map(move |person| (condition.clone(), parameter.clone(), person))
+        })
+    };
+    type Row = (String, PooledParameter, PooledPerson);
+    let text = |name: &str, of: &dyn Fn(&Row) -> String| OutputColumn {
+        name: name.to_owned(),
+        values: ColumnValues::Text(all().map(|row| of(&row)).collect()),
+    };
+    let real = |name: &str, of: &dyn Fn(&Row) -> f64| OutputColumn {
+        name: name.to_owned(),
+        values: ColumnValues::Real(all().map(|row| of(&row)).collect()),
+    };
+    OutputTable {
+        comments: Vec::new(),
+        columns: vec![
+            text("condition", &|(condition, _, _)| condition.clone()),
+            text("subject", &|(_, _, person)| person.subject.clone()),
+            text("parameter", &|(_, parameter, _)| parameter.name.clone()),
+            real("own", &|(_, _, person)| person.own.map_or(f64::NAN, |own| own.0)),
+            real("own_se", &|(_, _, person)| person.own.map_or(f64::NAN, |own| own.1)),
+            real("value", &|(_, _, person)| person.value),
+            real("standard_error", &|(_, _, person)| person.standard_error),
+            real("shrinkage", &|(_, _, person)| person.shrinkage),
+            real("population", &|(_, parameter, _)| parameter.centre),
+            real("population_spread", &|(_, parameter, _)| parameter.spread),
+        ],
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
+    use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
+    use rand_distr::{Distribution, StandardNormal};
+
+    use super::*;
+
+    fn of(all: &[(f64, f64)]) -> PooledParameter {
+        let own: Vec<(&str, Option<Observation>)> = all
+            .iter()
+            .map(|(value, variance)| {
+                (
+                    "P",
+                    Some(Observation {
+                        value: *value,
+                        variance: *variance,
+                    }),
+                )
+            })
+            .collect();
+        pooled(("tau_e", "s"), &own).unwrap()
+    }
+
+    #[test]
+    fn who_is_known_badly_is_drawn_to_all() {
+        let found = of(&[(0.0, 0.01), (0.2, 0.01), (0.4, 0.01), (1.5, 1.0)]);
+        let shrinkage: Vec<f64> = found.people.iter().map(|p| p.shrinkage).collect();
+        assert!(shrinkage[3] > 0.9 && shrinkage[0] < 0.4, "{shrinkage:?}");
+        let last = &found.people[3];
+        assert!(last.value < 2.0 && last.own.unwrap().0 > 4.4);
+        assert!(last.standard_error / last.value < 1.0 && found.spread_of_another > found.spread);
+    }
+
+    #[test]
+    fn pooled_people_are_nearer_to_the_truth_and_their_errors_hold() {
+        let (mut own, mut all, mut held, mut count) = (0.0, 0.0, 0, 0);
+        let mut rng = ChaCha8Rng::seed_from_u64(7);
+        let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
+        for _ in 0..1000 {
+            let truth: Vec<f64> = (0..8).map(|_| 0.2 * normal()).collect();
+            let errors = [0.1, 0.1, 0.2, 0.2, 0.3, 0.3, 0.4, 0.4];
+            let found: Vec<(f64, f64)> = truth
+                .iter()
+                .zip(errors)
+                .map(|(t, e)| (t + e * normal(), e * e))
+                .collect();
+            let pooled = of(&found);
+            for (i, p) in pooled.people.iter().enumerate() {
+                own += (found[i].0 - truth[i]).powi(2);
+                all += (p.value.ln() - truth[i]).powi(2);
+                held += usize::from((p.value.ln() - truth[i]).abs() < 1.96 * p.standard_error / p.value);
+                count += 1;
+            }
+        }
+        let held = f64::from(held as u32) / f64::from(count);
+        println!(
+            "mean square of the error {:.2} of that of people alone; intervals {held:.3}",
+            all / own
+        );
+        assert!(all < 0.5 * own, "{all} {own}");
+        // Of 8000; people of one experiment share mu and tau.
+        assert!((0.93..0.97).contains(&held), "{held}");
+    }
+
+    #[test]
+    fn the_prior_is_taken_out_before() {
+        let parameter = |value: f64, share: f64| Parameter {
+            name: "tau_e".to_owned(),
+            unit: "s",
+            value,
+            standard_error: Some(0.1 * value),
+            standard_error_person: None,
+            interval: None,
+            prior_share: share,
+            determined: true,
+            averaged_over: Vec::new(),
+        };
+        let prior: OperatorPrior = "tau_e=0.2:0.3".parse().unwrap();
+        // Half prior: the data are as far on the other side, with twice the variance.
+        let half = data(&parameter(0.3, 0.5), &prior).unwrap();
+        assert!((half.value - (0.3_f64.ln() + (0.3_f64 / 0.2).ln())).abs() < 1e-12);
+        assert!((half.variance - 0.02).abs() < 1e-12);
+        assert!(data(&parameter(0.3, 0.95), &prior).is_none());
+        let without = data(&parameter(0.3, 0.5), &OperatorPrior::none()).unwrap();
+        assert!((without.value - 0.3_f64.ln()).abs() < 1e-12 && (without.variance - 0.01).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_population_is_a_prior() {
+        let own: Vec<(&str, Option<Observation>)> = [("A", -1.6, 0.01), ("B", -1.4, 0.02), ("C", -1.5, 0.01)]
+            .iter()
+            .map(|(who, value, variance)| {
+                (
+                    *who,
+                    Some(Observation {
+                        value: *value,
+                        variance: *variance,
+                    }),
+                )
+            })
+            .chain([("D", None)])
+            .collect();
+        let parameter = pooled(("tau_e", "s"), &own).unwrap();
+        let nobody = &parameter.people[3];
+        assert!(nobody.shrinkage == 1.0 && nobody.own.is_none() && (nobody.value - parameter.centre).abs() < 1e-12);
+        let population = Population {
+            condition: "fo".to_owned(),
+            form: None,
+            parameters: vec![parameter.clone()],
+            left_out: Vec::new(),
+        };
+        let prior = hoid_analysis::prior_of_text(&population.json().to_string()).unwrap();
+        let entry = &prior.entries()[0];
+        assert_eq!(entry.parameter, "tau_e");
+        assert!((entry.centre - parameter.centre).abs() < 1e-12);
+        assert!((entry.spread - parameter.spread_of_another).abs() < 1e-9);
+    }
+}
