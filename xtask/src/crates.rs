@@ -79,7 +79,7 @@ const SEVERAL: [(&str, usize, &str); 9] = [
 
 /// The tree of `hoid-cli` on Linux, its own crates included: another crate needs a reason, and a
 /// line in the table of dependencies of ARCHITECTURE.md.
-const MOST_CRATES: usize = 153;
+const MOST_CRATES: usize = 154;
 
 /// Checks all of it.
 pub fn check() -> Result<(), String> {
