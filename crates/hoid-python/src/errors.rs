@@ -173,8 +173,7 @@ impl From<CompareError> for Failure {
     fn from(error: CompareError) -> Self {
         let text = in_python(&error.to_string());
         Self(match error {
-            CompareError::Study(error) => return error.into(),
-            CompareError::Analysis(error) => return error.into(),
+            CompareError::Study(error) => return (*error).into(),
             CompareError::Quantity { .. } | CompareError::Factor { .. } | CompareError::NotInJson { .. } => {
                 OptionError::new_err(text)
             }

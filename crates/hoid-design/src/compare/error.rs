@@ -1,6 +1,5 @@
 //! Why people or conditions cannot be compared.
 
-use hoid_analysis::AnalysisError;
 use hoid_study::StudyError;
 use thiserror::Error;
 
@@ -59,10 +58,13 @@ pub enum CompareError {
         /// What was asked for.
         what: String,
     },
-    /// A text that is no comparison.
-    #[error(transparent)]
-    Analysis(#[from] AnalysisError),
     /// Tables that cannot be read.
     #[error(transparent)]
-    Study(#[from] StudyError),
+    Study(Box<StudyError>),
+}
+
+impl From<StudyError> for CompareError {
+    fn from(error: StudyError) -> Self {
+        Self::Study(Box::new(error))
+    }
 }

@@ -10,7 +10,10 @@ use std::{collections::BTreeMap, path::Path};
 
 use hoid_model::{VerdictLevel, uncertainty::Estimate};
 use hoid_numerics::statistics::{mean, sample_variance};
-use hoid_study::group::{GroupSummary, MANIFEST, Manifest, Person, PersonStatus, RunEstimates};
+use hoid_study::{
+    StudyError,
+    group::{GroupSummary, MANIFEST, Manifest, Person, PersonStatus, RunEstimates},
+};
 use serde_json::Value;
 
 use super::{CompareError, Observation, Quantity};
@@ -57,7 +60,7 @@ impl GroupEstimates {
             reason,
         };
         if !place.is_dir() {
-            let bytes = hoid_io::read_bytes(place).map_err(hoid_study::StudyError::Io)?;
+            let bytes = hoid_io::read_bytes(place).map_err(StudyError::Io)?;
             let object = serde_json::from_slice(&bytes).map_err(|error| none(format!("it is no JSON: {error}")))?;
             return Self::of_json(&object).map_err(none);
         }
