@@ -264,15 +264,17 @@ fn saved(record: &Record) -> (Vec<(TrackOptions, Vec<f64>)>, Vec<f64>) {
         TrackOptions::new(Method::rls(), Structure::Arx, Structure::Arx.operator_orders(29)),
         of(Method::rpem()),
         of(Method::rpem()).with(&[("track_delay", "0.2..0.35")]).unwrap(),
-        of(Method::physical()).with(&[("track_delay", "0.2..0.35")]).unwrap(),
-        of(Method::multiple_model()),
+        of(hoid_survey::physical())
+            .with(&[("track_delay", "0.2..0.35")])
+            .unwrap(),
+        of(hoid_survey::multiple_model()),
         TrackOptions::usual(Method::adaptive(), 29)
             .with(&[("replay", "5")])
             .unwrap(),
-        of(Method::ekf()),
-        of(Method::ukf()),
-        of(Method::fused()),
-        of(Method::window()).with(&[("refit", "200")]).unwrap(),
+        of(hoid_survey::ekf()),
+        of(hoid_survey::ukf()),
+        of(hoid_survey::fused()),
+        of(hoid_survey::window()).with(&[("refit", "200")]).unwrap(),
     ];
     let sample = |k: usize| Sample {
         e: record.input()[k],
@@ -287,7 +289,7 @@ fn saved(record: &Record) -> (Vec<(TrackOptions, Vec<f64>)>, Vec<f64>) {
         let numbers = tracker.saved();
         (options, numbers)
     };
-    let usual = of(Method::physical());
+    let usual = of(hoid_survey::physical());
     let mut live = Live::new(&usual, 2000, record.sample_time()).unwrap();
     for k in 0..100 {
         live.update(sample(k), &|_| Ok((usual.clone(), None)));
