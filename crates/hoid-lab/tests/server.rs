@@ -308,6 +308,9 @@ fn messages_that_are_none_end_the_connection() {
         "{\"type\":\"batch\",\"number\":NUMBER,\"batch\":{\"first\":7,\"u\":[1],\"e\":[1],\"events\":[],\"frames\":[]}}",
     ));
     closed(Message::text(
+        "{\"type\":\"batch\",\"number\":NUMBER,\"batch\":{\"first\":18446744073709551615,\"u\":[1],\"e\":[1],\"events\":[],\"frames\":[]}}",
+    ));
+    closed(Message::text(
         "{\"type\":\"batch\",\"number\":NUMBER,\"batch\":{\"first\":0,\"u\":[null],\"e\":[1],\"events\":[],\"frames\":[]}}",
     ));
 }

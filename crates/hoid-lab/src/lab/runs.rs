@@ -134,6 +134,7 @@ impl Shared {
         }
         state.running(number)?;
         let Some(run) = &mut state.run else { return Ok(()) };
+        run.log.continued_by(batch)?;
         // First the estimate, which is waited for; the disk may take its time.
         let first = batch.first.next_multiple_of(TICKS_PER_SAMPLE) - batch.first;
         let samples = (first..batch.u.len().min(batch.e.len()))

@@ -128,12 +128,11 @@ impl RunLog {
         })
     }
 
-    /// Appends a batch, all of it or nothing.
+    /// Whether a batch continues what is logged; the tick behind its last.
     ///
     /// # Errors
-    /// [`LabError::Message`] for a batch that does not continue the last one or is beyond the end;
-    /// [`LabError::File`], behind which the files hold the batches before.
-    pub fn append(&mut self, batch: &Batch) -> Result<(), LabError> {
+    /// [`LabError::Message`] for one that does not continue the last one or is beyond the end.
+    pub fn continued_by(&self, batch: &Batch) -> Result<usize, LabError> {
         let end = batch.first.saturating_add(batch.u.len());
         if batch.first != self.logged || batch.u.len() != batch.e.len() || end > self.planned {
             return Err(LabError::Message(format!(
@@ -144,6 +143,15 @@ impl RunLog {
                 self.planned
             )));
         }
+        Ok(end)
+    }
+
+    /// Appends a batch, all of it or nothing.
+    ///
+    /// # Errors
+    /// Those of [`RunLog::continued_by`]; [`LabError::File`], behind which the files hold the batches before.
+    pub fn append(&mut self, batch: &Batch) -> Result<(), LabError> {
+        let end = self.continued_by(batch)?;
         let mut texts = [String::new(), String::new(), String::new()];
         for (k, (u, e)) in batch.u.iter().zip(&batch.e).enumerate() {
             texts[0].push_str(&format!("{},{u:?},{e:?}\n", batch.first + k));

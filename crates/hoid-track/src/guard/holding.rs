@@ -186,7 +186,9 @@ impl Guard {
         }
         // e jumps with its target and moves as before, while the person answers only after their delay.
         let ring = &self.ring[..self.in_ring];
-        let behind = ring[self.in_ring - held as usize..].iter().map(|raw| raw.values[0]);
+        // More is held than stands there only in numbers that were changed.
+        let first = self.in_ring.saturating_sub(held as usize);
+        let behind = ring[first..].iter().map(|raw| raw.values[0]);
         let is_target = c == 0 && !ring.iter().any(|raw| raw.held[1]) && self.channels_before[0].moves_as_usual(behind);
         self.in_ring = 0;
         if !is_target {
