@@ -133,8 +133,12 @@ mod tests {
 
     const TRUTH: [f64; 5] = [0.09, 0.4, 2.420_368, -1.049_822, 0.28];
 
+    /// Runs of C1 with a slow and strong remnant.
     fn runs(n: u64) -> Vec<Record> {
-        let simulator = Simulator::new(&Scenario::condition(Condition::C1)).unwrap();
+        let mut scenario = Scenario::condition(Condition::C1);
+        scenario.remnant.time_constant_s = 0.3;
+        scenario.remnant.strength = scenario.remnant.strength.changed(Some(0.3), None).unwrap();
+        let simulator = Simulator::new(&scenario).unwrap();
         let run = |replication| {
             let seed = RunSeed {
                 seed: 11,
@@ -158,7 +162,7 @@ mod tests {
                 prior: OperatorPrior::none(),
                 ..FamilyEstimator::default()
             };
-            let fit = estimator.fit(&runs(4)).unwrap();
+            let fit = estimator.fit(&runs(8)).unwrap();
             let found = &fit.operator(0).operator;
             let off = BAND_RAD_S.map(|omega| (found.response(omega) / truth.response(omega) - 1.0).norm());
             off.into_iter().fold(0.0, f64::max)
