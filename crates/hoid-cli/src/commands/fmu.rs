@@ -73,7 +73,7 @@ fn of_tracker(args: &FmuArgs) -> Result<Unit, CliError> {
             read.push(PathBuf::from(file));
         }
         Some(prior) => {
-            method.set("prior", prior).map_err(|error| wrong(prior, &error))?;
+            hoid::survey::set(&mut method, "prior", prior).map_err(|error| wrong(prior, &error))?;
             settings = settings.with("prior", FmuStart::Text(prior.clone()));
         }
     }
