@@ -11,7 +11,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 use super::{
     agreement::{Agreement, AgreementMethod, Side, agreement, with_level},
     choice::FormFigures,
-    covariances::BAND_RAD_S,
+    covariances::response_errors,
     estimated::{Errors, Estimated, in_form, operator_of},
     instrumental::{Instrumental, InstrumentalFit},
     joint::with_lines,
@@ -448,13 +448,4 @@ fn coherent_share(describing: &DescribingFunction) -> Option<f64> {
 fn knows_the_response(of: &OperatorInForm) -> bool {
     let errors = response_errors(&of.operator, of.covariance.as_deref());
     errors.is_some_and(|all| all.iter().sum::<f64>() < LARGEST_RESPONSE_ERROR * all.len() as f64)
-}
-
-/// Relative standard errors of the response over the band of manual control.
-fn response_errors(operator: &FamilyOperator, covariance: Option<&[f64]>) -> Option<[f64; BAND_RAD_S.len()]> {
-    let covariance = covariance?;
-    Some(BAND_RAD_S.map(|omega| {
-        let [[gain, _], [_, phase]] = operator.response_and_gradient(omega).relative_covariance(covariance);
-        (gain + phase).sqrt()
-    }))
 }

@@ -16,10 +16,12 @@
 
 use hoid_model::{Complex64, FamilyOperator, uncertainty::variance_along};
 use hoid_numerics::statistics::mean;
+use nalgebra::DMatrix;
 
 use super::{
     clusters::ClusterKind,
     jackknife::{add_open_part, jackknife},
+    layout::FamilyLayout,
     prediction_fit::PredictionFit,
 };
 use crate::{
@@ -43,6 +45,13 @@ pub(super) struct Covariances {
 }
 
 impl Covariances {
+    /// The covariance of the coordinates of a record's operator, out of one of eta.
+    pub fn of_operator(of_eta: &[f64], layout: &FamilyLayout, record: usize) -> Vec<f64> {
+        let (p, places) = (layout.limits().len(), &layout.positions(record)[..layout.coordinates()]);
+        let pairs = places.iter().flat_map(|&i| places.iter().map(move |&j| i * p + j));
+        pairs.map(|at| of_eta[at]).collect()
+    }
+
     /// Adds the bias that another estimate shows: `d d'`, d the difference to it.
     ///
     /// The prediction error fit is biased where its noise model is wrong, by an amount that no
@@ -93,6 +102,18 @@ impl Covariances {
             }
         }
     }
+}
+
+/// Relative standard errors of the response over the band of manual control.
+pub(super) fn response_errors(
+    operator: &FamilyOperator,
+    covariance: Option<&[f64]>,
+) -> Option<[f64; BAND_RAD_S.len()]> {
+    let covariance = covariance?;
+    Some(BAND_RAD_S.map(|omega| {
+        let [[gain, _], [_, phase]] = operator.response_and_gradient(omega).relative_covariance(covariance);
+        (gain + phase).sqrt()
+    }))
 }
 
 /// What the operator's elements off their bounds differ by from another estimate.
@@ -214,14 +235,15 @@ pub(super) fn covariances(fit: &PredictionFit<'_>) -> Option<Covariances> {
 fn add_lines_part(covariance: &mut [f64], factor: f64, fit: &PredictionFit<'_>, inverse: &[f64]) {
     let p = fit.parameters();
     let l = fit.criterion.beside_at(fit.eta(), &mut Workspace::default()).gram;
-    let product = |a: &[f64], b: &[f64]| -> Vec<f64> {
-        let of = |at: usize| (0..p).map(|k| a[at / p * p + k] * b[k * p + at % p]).sum();
-        (0..p * p).map(of).collect()
-    };
-    let part = product(&product(inverse, &l), inverse);
+    let (inverse, l) = (
+        DMatrix::from_row_slice(p, p, inverse),
+        DMatrix::from_row_slice(p, p, &l),
+    );
+    // Symmetric: by columns as by rows.
+    let part = &inverse * l * &inverse;
     covariance
         .iter_mut()
-        .zip(part)
+        .zip(&part)
         .for_each(|(c, part)| *c += factor * part);
 }
 

@@ -102,15 +102,8 @@ impl Estimated {
     pub fn of(fit: &PredictionFit<'_>, errors: &Errors, record: usize) -> Result<Self, IdentError> {
         let layout = fit.layout();
         let operator = layout.operator(fit.eta(), record)?;
-        let p = fit.parameters();
         let places = &layout.positions(record)[..layout.coordinates()];
-        let part = |c: &[f64]| -> Vec<f64> {
-            places
-                .iter()
-                .flat_map(|&i| places.iter().map(move |&j| i * p + j))
-                .map(|at| c[at])
-                .collect()
-        };
+        let part = |c: &[f64]| Covariances::of_operator(c, layout, record);
         let covariances = errors.covariances.as_ref();
         let covariance = covariances.map(|c| part(&c.clustered));
         let model_based = covariances.map(|c| part(&c.model_based));

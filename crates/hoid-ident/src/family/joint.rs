@@ -24,7 +24,7 @@ use std::{borrow::Cow, sync::Arc};
 use hoid_numerics::statistics::mean;
 
 use super::{
-    covariances::{BAND_RAD_S, covariances},
+    covariances::{BAND_RAD_S, Covariances, covariances, response_errors},
     line_fit::LineFit,
     lines::LineData,
     prediction::Prediction,
@@ -32,10 +32,7 @@ use super::{
     prior::OperatorPrior,
     response_fit::{MeasuredResponse, ResponseCriterion},
 };
-use crate::{
-    criterion::Workspace,
-    grey_box::{objective::Beside, parametrisation::Parametrisation},
-};
+use crate::{criterion::Workspace, grey_box::objective::Beside};
 
 /// Part of V_L that `V_L - V_P` is at least: both are estimates.
 const LEAST_DIFFERENCE: f64 = 0.25;
@@ -89,28 +86,17 @@ pub(super) fn with_lines<'a>(
 
 /// w; `None` where it is zero, or a variance is not known.
 fn weight(fit: &PredictionFit<'_>, lines: &LineFit, excess: f64) -> Option<f64> {
-    let layout = fit.layout();
-    let (p, places) = (fit.parameters(), &layout.positions(0)[..layout.coordinates()]);
-    let operator = layout.operator(fit.eta(), 0).ok()?;
-    let clustered = covariances(fit)?.clustered;
-    let own: Vec<f64> = (places.iter())
-        .flat_map(|&i| places.iter().map(move |&j| i * p + j))
-        .map(|at| clustered[at])
+    let operator = fit.layout().operator(fit.eta(), 0).ok()?;
+    let own = Covariances::of_operator(&covariances(fit)?.clustered, fit.layout(), 0);
+    let of_prediction = response_errors(&operator, Some(&own))?.map(|error| error * error);
+    let of_lines = response_errors(&lines.operator, lines.by_lines.as_deref())?.map(|error| excess * error * error);
+    let q: Vec<f64> = (0..BAND_RAD_S.len())
+        .map(|i| {
+            let [here, there] = [&operator, &lines.operator].map(|of| of.response(BAND_RAD_S[i]));
+            let expected = (of_lines[i] - of_prediction[i]).max(LEAST_DIFFERENCE * of_lines[i]);
+            ((there - here) / here).norm_sqr() / expected
+        })
         .collect();
-    let by_lines = lines.by_lines.as_ref()?;
-    let variance = |of: &hoid_model::FamilyOperator, covariance: &[f64], omega: f64| {
-        let [[gain, _], [_, phase]] = of.response_and_gradient(omega).relative_covariance(covariance);
-        gain + phase
-    };
-    let (mut q, mut of_lines, mut of_prediction) = (Vec::new(), Vec::new(), Vec::new());
-    for omega in BAND_RAD_S {
-        let (here, there) = (operator.response(omega), lines.operator.response(omega));
-        let v_l = excess * variance(&lines.operator, by_lines, omega);
-        let v_p = variance(&operator, &own, omega);
-        q.push(((there - here) / here).norm_sqr() / (v_l - v_p).max(LEAST_DIFFERENCE * v_l));
-        of_lines.push(v_l);
-        of_prediction.push(v_p);
-    }
     let share = (1.0 - 1.0 / mean(&q)).min(LARGEST_SHARE);
     let weight = share / (1.0 - share) * mean(&of_lines) / mean(&of_prediction);
     (weight.is_finite() && weight > 0.0).then_some(weight)
