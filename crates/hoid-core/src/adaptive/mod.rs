@@ -51,16 +51,17 @@
 //! let person = Usual::with_delay(0.2);
 //! let mut tracker = AdaptiveFilter::new(person.prior(SAMPLE_TIME_S), [0.0; MEMORY]).ok_or("no filter")?;
 //!
-//! // Somebody with a gain of 0.5, muscles of 11 rad/s and a delay of 0.2 s; some noise.
-//! let (mut u, mut rate, mut late) = (0.0, 0.0, [0.0; 10]);
-//! for k in 0..3000_u32 {
+//! // Two minutes of somebody with a gain of 0.5, muscles of 11 rad/s and a delay of 0.2 s; some noise.
+//! let (mut u, mut rate, mut late, mut draw) = (0.0, 0.0, [0.0; 10], 1_u32);
+//! for k in 0..6000_u32 {
 //!     let t = f64::from(k) * SAMPLE_TIME_S;
-//!     let e = libm::sin(0.6 * t) + 0.7 * libm::sin(1.7 * t) + 0.5 * libm::sin(4.1 * t) + 0.3 * libm::sin(9.0 * t);
+//!     let e: f64 = [0.2, 0.6, 1.1, 1.7, 2.8, 4.1, 6.3, 9.0].map(|w| libm::sin(w * t + w * w)).iter().sum();
 //!     late.rotate_left(1);
 //!     late[9] = e;
 //!     rate += SAMPLE_TIME_S * 121.0 * (0.5 * late[0] - u - 2.0 * 0.25 / 11.0 * rate);
 //!     u += SAMPLE_TIME_S * rate;
-//!     let noise = 0.02 * (f64::from(k * k % 7) - 2.0);
+//!     draw = draw.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+//!     let noise = 0.2 * (f64::from(draw) / f64::from(u32::MAX) - 0.5);
 //!     tracker.step(e, u + noise);
 //! }
 //! let [k_e, k_e_dot, omega_nm, zeta_nm, tau_e] = tracker.operator();
