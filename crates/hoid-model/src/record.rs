@@ -306,6 +306,16 @@ fn check_finite(channel: &Channel) -> Result<(), ModelError> {
     }
 }
 
+impl Detrend {
+    /// The values without it.
+    #[must_use]
+    pub fn taken_out(self, values: &[f64]) -> Vec<f64> {
+        let mut left = values.to_vec();
+        take_out(self, &mut left);
+        left
+    }
+}
+
 fn take_out(how: Detrend, values: &mut [f64]) {
     let n = values.len() as f64;
     let mean = values.iter().sum::<f64>() / n;

@@ -63,11 +63,16 @@ impl BatchEstimator for FamilyEstimator {
     }
 
     fn fit(with: &Identification<Self>, data: &mut Recordings) -> Result<Fitted<FamilyFit>, AnalysisError> {
-        let described = data.described(&with.excitation, with.period_s, with.faults);
+        // A line of an excitation has one ratio of u and e, which more than one input has made.
+        let alone = with.estimator.channels.is_empty();
+        let described = match alone {
+            true => data.described(&with.excitation, with.period_s, with.faults),
+            false => Ok(None),
+        };
         let channel = match &described {
             // What was found, or what was named: instruments need no lines.
             Ok(Some(found)) => found.channel.clone(),
-            _ => with.excitation.named().map(str::to_owned),
+            _ => with.excitation.named().filter(|_| alone).map(str::to_owned),
         };
         let estimator = Self {
             excitation: channel,
@@ -106,7 +111,11 @@ impl BatchEstimator for FamilyEstimator {
             });
         }
         for record in &mut data.records {
-            *record = record.clone().detrended(estimator.detrend);
+            let of_error = match alone {
+                true => record.clone(),
+                false => fit.without_channels(record, estimator.detrend)?,
+            };
+            *record = of_error.detrended(estimator.detrend);
         }
         Ok(Fitted {
             fit,

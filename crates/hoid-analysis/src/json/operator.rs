@@ -1,8 +1,11 @@
 //! The operator of a person as JSON: form, parameters with intervals, the other methods, covariance.
 
-use hoid_ident::family::{
-    AgreementMethod, AgreementPair, AgreementRow, ClusterKind, FamilyFit, FormFigures, LoopMeasures, OperatorOfRecord,
-    Parameter,
+use hoid_ident::{
+    ResponsePoint,
+    family::{
+        AgreementMethod, AgreementPair, AgreementRow, ClusterKind, FamilyFit, FormFigures, LoopMeasures,
+        OperatorOfRecord, Parameter,
+    },
 };
 use hoid_model::{FamilyOperator, uncertainty::Estimate};
 use serde_json::{Map, Value, json};
@@ -13,6 +16,11 @@ use super::{
     termination,
 };
 use crate::{AnalysisError, identified::Identified, registry};
+
+/// Frequencies of the responses to several inputs, rad/s.
+const CHANNEL_FREQUENCIES: [f64; 16] = [
+    0.3, 0.4, 0.5, 0.7, 1.0, 1.4, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 13.0, 16.0,
+];
 
 impl BatchAnswer for FamilyFit {
     const ESTIMATOR: &'static str = registry::OPERATOR;
@@ -58,6 +66,9 @@ impl BatchAnswer for FamilyFit {
         }
         set("remnant", Value::Null);
         set("noise", json!({"c": fit.noise.0, "d": fit.noise.1}));
+        if !fit.channels.is_empty() {
+            set("channels", channels(found));
+        }
         set("forms", fit.forms.iter().map(form_figures).collect());
         set("lines", lines(found));
         set("riv_bj", instrumental(found));
@@ -97,6 +108,52 @@ impl BatchAnswer for FamilyFit {
         set("candidates", json!([]));
         Ok(map)
     }
+}
+
+/// The responses to all inputs, that to the error first.
+fn channels(found: &Identified) -> Value {
+    let fit = &found.fit;
+    let sampling = (fit.sample_time, fit.intersample);
+    let error = found.data.records[0].input_channel().map_or("e", |channel| channel.name.as_str());
+    let feedback = json!({
+        "input": error,
+        "role": "feedback",
+        "form": fit.form.name(),
+        "parameters": fit.operator(0).parameters.iter().map(parameter).collect::<Vec<_>>(),
+        "response": response(&fit.frequency_response(0, &CHANNEL_FREQUENCIES)),
+    });
+    let further = fit.channels.iter().map(|channel| {
+        let of = channel.response.as_ref();
+        json!({
+            "input": channel.name,
+            "role": channel.role.name(),
+            "preview": number(channel.preview_s),
+            "form": of.map(|of| of.operator.form().name()),
+            "parameters": of.map(|of| of.parameters.iter().map(parameter).collect::<Vec<_>>()),
+            "response": channel.frequency_response(&CHANNEL_FREQUENCIES, sampling).map(|all| response(&all)),
+            "p_value": number(channel.p_value),
+            "forms": channel.forms.iter().map(|form| json!({
+                "form": form.form.map(|form| form.name()),
+                "loss": optional(form.loss),
+                "criterion": optional(form.criterion),
+            })).collect::<Vec<_>>(),
+        })
+    });
+    std::iter::once(feedback).chain(further).collect()
+}
+
+/// Gain and phase with their errors, as those of the lines of a describing function.
+fn response(points: &[ResponsePoint]) -> Value {
+    let one = |p: &ResponsePoint| {
+        json!({
+            "omega_rad_s": number(p.omega_rad_s),
+            "gain_db": number(p.magnitude_db.value),
+            "gain_se_db": optional(p.magnitude_db.standard_error),
+            "phase_deg": number(p.phase_deg.value),
+            "phase_se_deg": optional(p.phase_deg.standard_error),
+        })
+    };
+    points.iter().map(one).collect()
 }
 
 fn lines(found: &Identified) -> Value {

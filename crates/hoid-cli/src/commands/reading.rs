@@ -43,7 +43,15 @@ pub fn say_kept(words: Option<String>) {
 fn options(args: &ReadArgs, with_input: bool) -> Result<ReadOptions, CliError> {
     let column = |text: &str| text.parse().map_err(CliError::from);
     Ok(ReadOptions {
-        input: if with_input { Some(column(&args.input)?) } else { None },
+        input: match args.inputs.as_slice() {
+            [input] if with_input => Some(column(input)?),
+            [_] => None,
+            _ => {
+                return Err(CliError::Usage(
+                    "one --input is read here: several belong to hoid identify, of the structure operator".to_owned(),
+                ));
+            }
+        },
         output: column(&args.output)?,
         time: args.time.clone(),
         trial: args.trial.clone(),

@@ -31,10 +31,10 @@ pub(crate) struct InitialStateResponses {
     /// `G[:, kept[k]] = sum over l <= k of Q_l r[k][l]`.
     r: Vec<Vec<f64>>,
     kept: Vec<usize>,
-    /// Impulse response of 1/F.
-    h: Vec<f64>,
-    /// Number of states of 1/F; those of the noise model come after them.
-    nf: usize,
+    /// Impulse response of the 1/F of each input.
+    h: Vec<Vec<f64>>,
+    /// Input and number of each state of a 1/F; those of the noise model come after them.
+    of_inputs: Vec<(usize, usize)>,
     /// Place of the level.
     level: Option<usize>,
     prior_rows: usize,
@@ -45,7 +45,8 @@ pub(crate) struct Past<'a> {
     pub c: &'a [f64],
     /// The polynomial that whitens v together with C.
     pub d: &'a [f64],
-    pub f: &'a [f64],
+    /// F of each input.
+    pub f: &'a [&'a [f64]],
     /// Samples from the first value of w to the first residual.
     pub lead: usize,
     /// The past of the noise when it was stationary; else nothing is known of it.
@@ -58,17 +59,22 @@ pub(crate) struct Past<'a> {
 }
 
 impl InitialStateResponses {
-    /// Responses of `rows` residuals, from the first one on, to the nf initial values of w and the
-    /// states of the noise model.
+    /// Responses of `rows` residuals, from the first one on, to the nf initial values of the w of each
+    /// input and the states of the noise model.
     ///
     /// Any free response of 1/F is a combination of its impulse response `h` started at the first
     /// nf samples (that basis stays independent even where f_nf = 0).
     pub fn of(past: &Past<'_>, rows: usize) -> Self {
         let Past { c, d, f, lead, .. } = *past;
         let mut columns: Vec<Vec<f64>> = Vec::new();
-        let mut h = Vec::new();
-        if !f.is_empty() {
-            h = impulse_response(f, rows + lead);
+        let mut responses_of_inputs = Vec::with_capacity(f.len());
+        let mut of_inputs = Vec::new();
+        for (input, f) in f.iter().enumerate() {
+            let h = if f.is_empty() {
+                Vec::new()
+            } else {
+                impulse_response(f, rows + lead)
+            };
             let mut s = h.clone();
             s.resize((h.len() + d.len()).min(rows + lead), 0.0);
             for (i, di) in d.iter().enumerate() {
@@ -83,7 +89,9 @@ impl InitialStateResponses {
             for i in 0..f.len() {
                 // The state enters i samples after w starts.
                 columns.push(shifted(&s, i, lead, rows));
+                of_inputs.push((input, i));
             }
+            responses_of_inputs.push(h);
         }
         let prior_rows = past.noise.map_or(0, StationaryNoise::states);
         let unknown = if past.noise.is_some() { prior_rows } else { c.len() };
@@ -111,8 +119,8 @@ impl InitialStateResponses {
             }
         }
         let mut free = Self {
-            h,
-            nf: f.len(),
+            h: responses_of_inputs,
+            of_inputs,
             level: past.level.then(|| columns.len() - 1),
             prior_rows,
             ..Self::default()
@@ -120,7 +128,10 @@ impl InitialStateResponses {
         for (index, column) in columns.into_iter().enumerate() {
             let mut whole = vec![0.0; prior_rows];
             // Of a state of the noise.
-            if let Some(z) = index.checked_sub(f.len()).and_then(|state| whole.get_mut(state)) {
+            if let Some(z) = index
+                .checked_sub(free.of_inputs.len())
+                .and_then(|state| whole.get_mut(state))
+            {
                 *z = 1.0;
             }
             whole.extend(column);
@@ -156,10 +167,10 @@ impl InitialStateResponses {
         self.kept.push(index);
     }
 
-    /// Takes the best initial states into the signals: w and v from the first regressed sample on,
-    /// eps (weighted, if there are weights) from the first residual. Returns z, empty where the
-    /// past is not random.
-    pub fn eliminate(&self, w: &mut [f64], v: &mut [f64], eps: &mut [f64]) -> Vec<f64> {
+    /// Takes the best initial states into the signals: the w of each input and v from the first
+    /// regressed sample on, eps (weighted, if there are weights) from the first residual. Returns z,
+    /// empty where the past is not random.
+    pub fn eliminate(&self, w: &mut [&mut [f64]], v: &mut [f64], eps: &mut [f64]) -> Vec<f64> {
         let components: Vec<f64> = self.basis().map(|q| dot(q, &eps[..q.len()])).collect();
         for (q, &component) in self.basis().zip(&components) {
             add_scaled(&mut eps[..q.len()], -component, q);
@@ -179,9 +190,11 @@ impl InitialStateResponses {
         for (&index, &x) in self.kept.iter().zip(&states) {
             if Some(index) == self.level {
                 v.iter_mut().for_each(|v| *v -= x);
-            } else if index < self.nf.min(w.len()) {
-                add_scaled(&mut w[index..], x, &self.h);
-                add_scaled(&mut v[index..], -x, &self.h);
+            } else if let Some(&(input, late)) = self.of_inputs.get(index)
+                && late < v.len()
+            {
+                add_scaled(&mut w[input][late..], x, &self.h[input]);
+                add_scaled(&mut v[late..], -x, &self.h[input]);
             }
         }
         z
@@ -200,7 +213,7 @@ impl InitialStateResponses {
                     .all(|x| x.abs() < DEAD)
         };
         // A basis vector has the size one, an impulse response begins with one.
-        self.h.len() < rows && self.basis().all(dead)
+        self.h.iter().all(|h| h.len() < rows) && self.basis().all(dead)
     }
 
     /// The orthonormal basis in the rows of the residuals; a vector starts at the first residual,

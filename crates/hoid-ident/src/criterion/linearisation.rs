@@ -112,6 +112,7 @@ impl Objective for Criterion<'_> {
         theta.iter().all(|v| v.is_finite())
             && roots_inside(parts.f, 1.0)
             && roots_inside(parts.c, 1.0)
+            && self.further_polynomials(theta).all(|(_, f)| roots_inside(f, 1.0))
             && (self.initial != InitialState::Backcast || roots_inside(self.noise_poles(&parts), 1.0))
     }
 
@@ -138,7 +139,8 @@ impl Objective for Criterion<'_> {
             _ => 0..0,
         };
         let blocks = [c..d, d + o.nd..o.parameters(), noise_poles];
-        blocks.into_iter().filter(|block| !block.is_empty()).collect()
+        let all = blocks.into_iter().chain(self.further_poles());
+        all.filter(|block| !block.is_empty()).collect()
     }
 
     fn output_power(&self) -> f64 {

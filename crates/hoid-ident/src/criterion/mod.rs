@@ -33,6 +33,10 @@
 //! noise model counts as r further residuals z. Where there is no input, A plays the part of D and
 //! the residuals start with the record.
 //!
+//! **Several inputs.** `A u = sum_i (B_i/F_i) q^-nk_i e_i + (C/D) eps`: each has its own s, w, B and
+//! F, psi of its coefficients has the two rows of B and F above with its own signals, and the past
+//! values of each w are unknown ([`further`]). Ljung, 1999, section 4.2 (eq. 4.35).
+//!
 //! **Weights** multiply the squared residuals; they serve the robust loss.
 //!
 //! **A long record** passes span by span behind its first part ([`pass`]), so that a fit needs no
@@ -43,6 +47,7 @@
 //! | `prediction_error` | the criterion: records, orders, which residuals count |
 //! | `initial_state` | what is assumed about the time before a record |
 //! | `polynomials` | A, B, C, D and F as parts of theta |
+//! | `further` | inputs beside e |
 //! | `signals`, `whitening` | the signals of a record at one theta |
 //! | `initial_state_responses` | what a record does not say about its past, eliminated exactly |
 //! | `stationary_noise` | the noise before the record, when it was stationary |
@@ -51,6 +56,7 @@
 //! | `linearisation` | what a search needs of the criterion |
 //! | `workspace` | the memory of the signals |
 
+pub(crate) mod further;
 mod initial_state;
 pub mod initial_state_responses;
 mod linearisation;

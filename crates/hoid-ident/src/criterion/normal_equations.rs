@@ -24,7 +24,7 @@ pub(super) struct Column<'w> {
     pub values: Cow<'w, [f64]>,
     pub sign: f64,
     /// True when this is the column before it, one sample later.
-    follows: bool,
+    pub follows: bool,
 }
 
 impl Criterion<'_> {
@@ -55,6 +55,10 @@ impl Criterion<'_> {
         let (first, end) = (counted.start, counted.end);
         let mut columns = Vec::with_capacity(self.orders.parameters());
         for &block in blocks {
+            if block == Block::Further {
+                columns.extend(self.further_columns(&counted, ws));
+                continue;
+            }
             let (from, count, sign) = block.shifts(&self.orders);
             let signal = match block {
                 Block::D if self.orders.nc == 0 => &ws.v,

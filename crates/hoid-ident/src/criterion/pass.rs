@@ -10,8 +10,8 @@
 //! head
 //! ([`InitialStateResponses::have_died`](crate::criterion::initial_state_responses::InitialStateResponses::have_died));
 //! where a pole is so near the circle that they have not, the record is passed whole. So it is with
-//! weights, of which there is one a sample, and with a stationary past, whose columns are whitened
-//! one by one. The sums differ from those over the whole by rounding alone.
+//! weights, of which there is one a sample, with further inputs, and with a stationary past, whose
+//! columns are whitened one by one. The sums differ from those over the whole by rounding alone.
 
 use std::ops::Range;
 
@@ -68,7 +68,7 @@ impl Criterion<'_> {
         show: &mut dyn FnMut(&EliminatedStates, Range<usize>, &Workspace),
     ) -> Option<EliminatedStates> {
         let Data { e, u, .. } = self.data[record];
-        let plain = self.weights.is_none() && self.initial != InitialState::Backcast;
+        let plain = self.weights.is_none() && self.initial != InitialState::Backcast && self.further.is_empty();
         // Long lags leave the head no residuals.
         let least = 2 * (self.first + self.orders.nk) + SPAN;
         if !plain || u.len() < 2 * head || head < least {

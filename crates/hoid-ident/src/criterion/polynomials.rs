@@ -15,12 +15,13 @@ pub(super) struct Polynomials<'t> {
 }
 
 impl<'t> Polynomials<'t> {
-    /// Theta in the order of [`Orders::parameter_names`].
+    /// Theta in the order of [`Orders::parameter_names`]; what follows belongs to further inputs.
     pub fn split(orders: &Orders, theta: &'t [f64]) -> Self {
         let (a, rest) = theta.split_at(orders.na);
         let (b, rest) = rest.split_at(orders.nb);
         let (c, rest) = rest.split_at(orders.nc);
-        let (d, f) = rest.split_at(orders.nd);
+        let (d, rest) = rest.split_at(orders.nd);
+        let f = &rest[..orders.nf];
         Self { a, b, c, d, f }
     }
 }
@@ -33,14 +34,16 @@ pub(crate) enum Block {
     C,
     D,
     F,
+    /// B and F of all further inputs, in their order.
+    Further,
 }
 
 impl Block {
-    pub(super) const ALL: [Self; 5] = [Self::A, Self::B, Self::C, Self::D, Self::F];
+    pub(super) const ALL: [Self; 6] = [Self::A, Self::B, Self::C, Self::D, Self::F, Self::Further];
 
     /// Its coefficients in theta.
     pub fn place(self, o: &Orders) -> Range<usize> {
-        let counts = [o.na, o.nb, o.nc, o.nd, o.nf];
+        let counts = [o.na, o.nb, o.nc, o.nd, o.nf, 0];
         let from = counts[..self as usize].iter().sum();
         from..from + counts[self as usize]
     }
@@ -53,6 +56,8 @@ impl Block {
             Self::C => (1, o.nc, 1.0),
             Self::D => (1, o.nd, -1.0),
             Self::F => (1, o.nf, -1.0),
+            // Their columns are made one input after the other.
+            Self::Further => (0, 0, 1.0),
         }
     }
 }

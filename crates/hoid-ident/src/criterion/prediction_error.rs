@@ -2,7 +2,7 @@
 
 use hoid_model::{Orders, Record};
 
-use super::{initial_state::InitialState, polynomials::Polynomials};
+use super::{further::FurtherInput, initial_state::InitialState, polynomials::Polynomials};
 use crate::linalg::products::variance;
 
 /// Input and output of one record.
@@ -38,6 +38,9 @@ pub(crate) struct Criterion<'a> {
     /// Square roots of the weights of the residuals of each record, from the first residual on;
     /// none where all count the same.
     pub weights: Option<&'a [Vec<f64>]>,
+    /// Inputs beside e, each with its own B, F and nk; their coefficients follow those of
+    /// [`Self::orders`] in theta.
+    pub further: Vec<FurtherInput<'a>>,
 }
 
 /// Variance of the output around its mean, from sample `first` of each record on.
@@ -55,6 +58,7 @@ impl<'a> Criterion<'a> {
             initial,
             first,
             weights: None,
+            further: Vec::new(),
         }
     }
 
@@ -65,11 +69,12 @@ impl<'a> Criterion<'a> {
 
     /// Number of initial states and levels over all records.
     pub fn states(&self) -> usize {
+        let of_inputs = self.orders.nf + self.further.iter().map(|input| input.orders.nf).sum::<usize>();
         let of_record = match self.initial {
             InitialState::Zero => return 0,
-            InitialState::Estimate => self.orders.nf + self.orders.nc,
+            InitialState::Estimate => of_inputs + self.orders.nc,
             // The states of the noise are random numbers with a known variance, not parameters.
-            InitialState::Backcast => self.orders.nf,
+            InitialState::Backcast => of_inputs,
         };
         self.data.len() * of_record + self.data.iter().filter(|d| d.level).count()
     }

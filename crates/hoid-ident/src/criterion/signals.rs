@@ -36,7 +36,7 @@ impl Criterion<'_> {
         let parts = Polynomials::split(&self.orders, theta);
         let n = data.u.len();
         let o = &self.orders;
-        ws.make_room(o, n);
+        ws.make_room(o, &self.further, n);
         let pad = ws.pad;
         let regressed = self.first_regressed();
         let start = match self.initial {
@@ -49,6 +49,7 @@ impl Criterion<'_> {
         ws.w[..from].fill(0.0);
         ws.v[..from].fill(0.0);
         self.response(&parts, data, regressed..n, from, ws);
+        self.further_responses(theta, record, regressed..n, ws);
         whiten(parts.c, parts.d, &ws.v, &mut ws.eps, pad + start);
 
         let weights = self.weights.map(|all| all[record].as_slice());
@@ -61,19 +62,23 @@ impl Criterion<'_> {
             if self.initial == InitialState::Backcast {
                 states.noise = StationaryNoise::of(parts.c, self.noise_poles(&parts));
             }
+            let poles: Vec<&[f64]> = std::iter::once(parts.f)
+                .chain(self.further_polynomials(theta).map(|(_, f)| f))
+                .collect();
             let past = Past {
                 c: parts.c,
                 d: parts.d,
-                f: parts.f,
+                f: &poles,
                 lead: self.first - regressed,
                 noise: states.noise.as_ref(),
                 weights,
                 level: data.level,
             };
             states.responses = InitialStateResponses::of(&past, n - self.first);
-            states.z = states
-                .responses
-                .eliminate(&mut ws.w[pad + regressed..], &mut ws.v[pad + regressed..], eps);
+            let from = pad + regressed;
+            let own = std::iter::once(&mut ws.w[from..]);
+            let mut w: Vec<&mut [f64]> = own.chain(ws.further.iter_mut().map(|s| &mut s.w[from..])).collect();
+            states.z = states.responses.eliminate(&mut w, &mut ws.v[from..], eps);
         }
         if let Some(weights) = weights {
             eps.iter_mut().zip(weights).for_each(|(x, w)| *x /= w);
@@ -135,6 +140,9 @@ impl Criterion<'_> {
         }
         if blocks.contains(&Block::B) {
             self.whiten_input(&parts, ws);
+        }
+        if blocks.contains(&Block::Further) {
+            self.whiten_further(theta, ws);
         }
         let [_, _, xc, xd, xf] = &mut ws.filtered;
         if o.nc > 0 && blocks.contains(&Block::C) {

@@ -2,6 +2,7 @@ use hoid_model::Orders;
 
 use super::{
     Criterion, Data, InitialState, Workspace, first_residual,
+    further::{FurtherInput, InputOrders},
     initial_state_responses::{InitialStateResponses, Past},
     polynomials::{Block, Polynomials},
     signals::EliminatedStates,
@@ -104,6 +105,7 @@ fn criterion<'a>(orders: Orders, data: Vec<Data<'a>>, initial: InitialState) -> 
         data,
         initial,
         weights: None,
+        further: Vec::new(),
     }
 }
 
@@ -187,7 +189,7 @@ fn estimated_states_leave_nothing_to_gain() {
         let past = Past {
             c: parts.c,
             d: parts.d,
-            f: parts.f,
+            f: &[parts.f],
             lead: orders.nd,
             noise: None,
             weights: None,
@@ -455,4 +457,156 @@ fn what_does_not_die_away_passes_whole() {
         ..c
     };
     assert!(!by_spans(&weighted, 0.9, 4096));
+}
+
+/// Two inputs that are not alike.
+fn inputs(n: usize) -> (Vec<f64>, Vec<f64>, Vec<f64>) {
+    let (e, u) = record(n);
+    let x = (0..n)
+        .map(|t| (0.11 * t as f64).sin() - 0.5 * (0.47 * t as f64 + 0.3).cos() + 0.2 * e[(7 * t + 3) % n])
+        .collect();
+    (e, x, u)
+}
+
+fn with_further<'a>(
+    orders: Orders,
+    further: Vec<FurtherInput<'a>>,
+    data: Vec<Data<'a>>,
+    initial: InitialState,
+) -> Criterion<'a> {
+    let late = further.iter().map(|f| f.orders.first_regressed_sample()).max();
+    let first = match initial {
+        InitialState::Zero => 0,
+        _ => late.unwrap_or(0).max(orders.first_regressed_sample()) + orders.nd,
+    };
+    Criterion {
+        first,
+        further,
+        ..criterion(orders, data, initial)
+    }
+}
+
+#[test]
+fn a_further_input_alone_is_the_first_one() {
+    let (e, u) = record(300);
+    let alone = Orders {
+        nb: 2,
+        nc: 1,
+        nd: 2,
+        nf: 2,
+        nk: 3,
+        ..Orders::default()
+    };
+    let none = Orders {
+        nb: 0,
+        nf: 0,
+        nk: 0,
+        ..alone
+    };
+    // b, c, d, f as c, d, b, f.
+    let theta = [0.2, -0.1, 0.3, -0.5, 0.1, -1.5, 0.62];
+    let order = [2, 3, 4, 0, 1, 5, 6];
+    let moved: Vec<f64> = order.iter().map(|&i| theta[i]).collect();
+    for initial in [InitialState::Zero, InitialState::Estimate] {
+        let further = FurtherInput {
+            orders: InputOrders { nb: 2, nf: 2, nk: 3 },
+            values: vec![&e],
+        };
+        let mut ws = Workspace::default();
+        let one = criterion(alone, vec![Data::new(&e, &u)], initial).linearise(&theta, &mut ws);
+        let other = with_further(none, vec![further], vec![Data::new(&e, &u)], initial);
+        let two = other.linearise(&moved, &mut ws);
+        assert!((one.sum_of_squares / two.sum_of_squares - 1.0).abs() < 1e-13);
+        for (i, &a) in order.iter().enumerate() {
+            assert!((one.descent[a] - two.descent[i]).abs() < 1e-10, "{initial:?} {i}");
+            for (j, &b) in order.iter().enumerate() {
+                let (x, y) = (one.gram[a * 7 + b], two.gram[i * 7 + j]);
+                assert!((x - y).abs() < 1e-10 * (1.0 + x.abs()), "{initial:?} {i} {j}");
+            }
+        }
+    }
+}
+
+#[test]
+fn gradient_of_two_inputs_agrees_with_finite_differences() {
+    let (e, x, u) = inputs(300);
+    let base = Orders {
+        nb: 2,
+        nk: 3,
+        ..Orders::default()
+    };
+    let bj = (
+        Orders {
+            nc: 1,
+            nd: 2,
+            nf: 2,
+            ..base
+        },
+        2,
+        vec![0.2, -0.1, 0.3, -0.5, 0.1, -1.5, 0.62],
+    );
+    let arx = (Orders { na: 2, ..base }, 0, vec![-1.5, 0.6, 0.2, -0.1]);
+    let armax = (Orders { na: 2, nc: 1, ..base }, 1, vec![-1.5, 0.6, 0.2, -0.1, 0.3]);
+    for initial in [InitialState::Zero, InitialState::Estimate] {
+        for (orders, nf, own) in [&bj, &arx, &armax] {
+            let mut theta = own.clone();
+            theta.extend([0.15, -0.05, 0.03]);
+            theta.extend(&[-0.8, 0.1][..*nf]);
+            let further = FurtherInput {
+                orders: InputOrders { nb: 3, nf: *nf, nk: 7 },
+                values: vec![&x, &x[40..170]],
+            };
+            let both = [Data::new(&e, &u), Data::new(&e[40..170], &u[40..170])];
+            let data = both.map(|data| Data { level: true, ..data }).to_vec();
+            let c = with_further(*orders, vec![further], data, initial);
+            let mut ws = Workspace::default();
+            let exact = c.linearise(&theta, &mut ws);
+            for i in 0..theta.len() {
+                let h = 1e-5;
+                let mut at = |delta: f64| {
+                    let mut shifted = theta.clone();
+                    shifted[i] += delta;
+                    c.sum_of_squares(&shifted, &mut ws)
+                };
+                let slope = (8.0 * (at(h) - at(-h)) - (at(2.0 * h) - at(-2.0 * h))) / (12.0 * h);
+                let ours = -2.0 * exact.descent[i];
+                let scale = exact.gram[i * theta.len() + i].sqrt() * exact.sum_of_squares.sqrt();
+                assert!(
+                    (slope - ours).abs() < 1e-7 * scale,
+                    "{initial:?} {orders} {i}: {ours} and {slope}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn two_inputs_without_noise_leave_nothing() {
+    let (e, x, _) = inputs(400);
+    let (mut one, mut two) = (vec![0.5, -0.3, 0.1, 0.2, 0.1, 0.3], vec![0.2; 6]);
+    for t in 6..400 {
+        one.push(1.6 * one[t - 1] - 0.7 * one[t - 2] + 0.2 * e[t - 3] - 0.12 * e[t - 4]);
+        two.push(0.9 * two[t - 1] + 0.3 * x[t - 6]);
+    }
+    let u: Vec<f64> = one.iter().zip(&two).map(|(a, b)| a + b + 2.0).collect();
+    let orders = Orders {
+        nb: 2,
+        nd: 1,
+        nf: 2,
+        nk: 3,
+        ..Orders::default()
+    };
+    let further = FurtherInput {
+        orders: InputOrders { nb: 1, nf: 1, nk: 6 },
+        values: vec![&x[100..]],
+    };
+    let data = Data {
+        level: true,
+        ..Data::new(&e[100..], &u[100..])
+    };
+    let c = with_further(orders, vec![further], vec![data], InitialState::Estimate);
+    let theta = [0.2, -0.12, -0.4, -1.6, 0.7, 0.3, -0.9];
+    let eps = c.residuals_of(&theta, 0, &mut Workspace::default());
+    assert!(eps.iter().all(|v| v.abs() < 1e-12));
+    assert_eq!(c.states(), 4);
 }

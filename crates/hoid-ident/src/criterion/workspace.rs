@@ -7,6 +7,8 @@ use std::{
 
 use hoid_model::Orders;
 
+use super::further::{FurtherInput, FurtherSignals};
+
 /// Signals of one record at one theta. Each has `pad` zeros in front, so that a shift needs no case
 /// distinction.
 #[derive(Debug, Default)]
@@ -18,6 +20,8 @@ pub(crate) struct Workspace {
     pub(super) eps: Vec<f64>,
     pub(super) filtered: [Vec<f64>; 5],
     pub(super) scratch: Vec<f64>,
+    /// Those of further inputs.
+    pub(super) further: Vec<FurtherSignals>,
 }
 
 thread_local! {
@@ -66,8 +70,10 @@ const KEPT: usize = 1 << 17;
 impl Workspace {
     /// Makes room for a record, for the signals that these orders have; every pass writes all of a
     /// signal before it reads it, zeros in front included.
-    pub(super) fn make_room(&mut self, o: &Orders, n: usize) {
-        let pad = o.na.max(o.nb).max(o.nd).max(o.nc + o.nf);
+    pub(super) fn make_room(&mut self, o: &Orders, further: &[FurtherInput<'_>], n: usize) {
+        let lags = |input: &FurtherInput<'_>| input.orders.nb.max(o.nc + input.orders.nf);
+        let own = o.na.max(o.nb).max(o.nd).max(o.nc + o.nf);
+        let pad = further.iter().map(lags).fold(own, usize::max);
         self.pad = pad;
         let [a, b, c, d, f] = &mut self.filtered;
         for (signal, needed) in [

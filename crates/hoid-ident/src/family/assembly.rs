@@ -10,6 +10,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::{
     agreement::{Agreement, AgreementMethod, Side, agreement, with_level},
+    channels::{ChannelFit, with_responses},
     choice::FormFigures,
     covariances::response_errors,
     estimated::{Errors, Estimated, in_form, operator_of},
@@ -60,6 +61,8 @@ pub(super) struct Chosen<'p, 'a> {
     /// All forms that were compared.
     pub forms: Vec<FormFigures>,
     pub prediction: &'p Prediction<'a>,
+    /// The channels beside the error, as they were compared.
+    pub channels: Vec<ChannelFit>,
     /// The records, detrended.
     pub records: &'p [Record],
     /// Channel of the recorded excitation.
@@ -128,6 +131,7 @@ impl<'a> Chosen<'_, 'a> {
             None => free_model(fit, workspace),
             Some(_) => None,
         };
+        let channels = with_responses(self.channels.clone(), self.prediction, found, &errors)?;
         let residuals = residuals(fit, workspace);
         let of_delay = layout.delays().first().copied().unwrap_or(0);
         let all_parameters: Vec<_> = operators.iter().flat_map(|o| o.parameters.clone()).collect();
@@ -154,7 +158,7 @@ impl<'a> Chosen<'_, 'a> {
                 .and_then(|errors| errors.into_iter().min_by(f64::total_cmp)),
             weighed: &weighed,
         }));
-        let noise = &found.eta()[layout.operator_elements()..];
+        let noise = &found.eta()[layout.noise_begins()..];
         Ok(FamilyFit {
             form: layout.form,
             neuromuscular: layout.neuromuscular,
@@ -164,6 +168,7 @@ impl<'a> Chosen<'_, 'a> {
             prior: self.prediction.prior.clone(),
             forms,
             weighed,
+            channels,
             run_to_run: errors.run_to_run,
             coherent_share: self.lines.describing.and_then(coherent_share),
             lines: self.lines.fit,
@@ -208,7 +213,7 @@ impl<'a> Chosen<'_, 'a> {
     fn instrumental(&self, separate: usize, workspace: &mut Workspace) -> Option<Result<InstrumentalFit, IdentError>> {
         let channel = self
             .excitation
-            .filter(|_| separate == 1 && self.prediction.noise_free().is_none())?;
+            .filter(|_| separate == 1 && self.prediction.noise_free().is_none() && self.channels.is_empty())?;
         let own = self.fit.layout().coordinates_of(self.fit.eta(), 0);
         let auxiliary = match &self.lines.fit {
             Some(lines) => {
@@ -359,7 +364,7 @@ fn agreement_of(
 /// Box-Jenkins of the same orders and delay from the polynomials of the fit, for one operator.
 fn free_model(fit: &PredictionFit<'_>, workspace: &mut Workspace) -> Option<FreeModel> {
     let layout = fit.layout();
-    if layout.elements.iter().any(|(_, record)| record.is_some()) {
+    if layout.elements.iter().any(|(_, record)| record.is_some()) || !layout.channels.is_empty() {
         return None;
     }
     let mapped = fit.criterion.model_of(fit.eta(), 0).ok()?;
@@ -369,6 +374,7 @@ fn free_model(fit: &PredictionFit<'_>, workspace: &mut Workspace) -> Option<Free
         initial: fit.criterion.initial,
         first: fit.criterion.first,
         weights: None,
+        further: Vec::new(),
     };
     let search = SearchOptions {
         tolerance: 1e-8,

@@ -14,7 +14,7 @@ use statrs::distribution::{ContinuousCDF, StudentsT};
 use super::layout::FamilyLayout;
 use crate::{
     IdentError,
-    criterion::{Criterion, Workspace},
+    criterion::Workspace,
     grey_box::{objective::PhysicalCriterion, parametrisation::Parametrisation},
     linalg::least_squares::dot,
 };
@@ -69,13 +69,7 @@ impl Clusters {
         let mut parts = Vec::new();
         for record in 0..records {
             let mapped = criterion.model_of(eta, record)?;
-            let of_theta = Criterion {
-                orders: mapped.orders,
-                data: vec![criterion.data[record]],
-                initial: criterion.initial,
-                first: criterion.first,
-                weights: None,
-            };
+            let of_theta = criterion.of_record(&mapped, record);
             let residuals = of_theta.residuals_of(&mapped.theta, 0, workspace);
             let psi = of_theta.jacobian(&mapped.theta, 0, workspace);
             let positions = criterion.layout.positions(record);

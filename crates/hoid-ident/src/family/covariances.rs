@@ -67,9 +67,11 @@ impl Covariances {
     pub fn add_bias(&mut self, fit: &PredictionFit<'_>, other: &[f64]) {
         let p = fit.parameters();
         let mut difference = vec![0.0; p];
-        let found = differences(fit, other);
+        let elements = fit.layout().operator_elements();
+        let (found, of_channels): (Vec<_>, Vec<_>) =
+            (differences(fit, other).into_iter()).partition(|(place, _)| *place < elements);
         let found = responding(fit, other, &found).unwrap_or(found);
-        for (place, d) in found {
+        for (place, d) in found.into_iter().chain(of_channels) {
             difference[place] = d;
         }
         for i in 0..p {
@@ -116,11 +118,13 @@ pub(super) fn response_errors(
     }))
 }
 
-/// What the operator's elements off their bounds differ by from another estimate.
+/// What the elements of the operator and of its channels, off their bounds, differ by from another estimate, as far as
+/// it has them.
 fn differences(fit: &PredictionFit<'_>, other: &[f64]) -> Vec<(usize, f64)> {
-    let elements = fit.layout().operator_elements();
+    let elements = fit.layout().noise_begins();
     let free = fit.free().into_iter().filter(|place| *place < elements);
-    free.map(|place| (place, fit.eta()[place] - other[place])).collect()
+    free.filter_map(|place| Some((place, fit.eta()[place] - other.get(place)?)))
+        .collect()
 }
 
 /// By how much `J d` may exceed the difference of two responses before it stands for none.

@@ -50,6 +50,11 @@ impl Errors {
         }
     }
 
+    /// Quantile of Student's distribution for 95 %.
+    pub fn quantile(&self) -> f64 {
+        self.quantile
+    }
+
     /// Largest ratio of a clustered to a model-based standard error.
     pub fn largest_ratio(&self, fit: &PredictionFit<'_>) -> Option<f64> {
         let (c, p) = (self.covariances.as_ref()?, fit.parameters());
@@ -175,7 +180,9 @@ pub(super) fn operator_of(
         .collect();
     let layout = fit.layout();
     let p = fit.parameters();
-    let mapped = fit.criterion.model_of(fit.eta(), record)?;
+    let mut mapped = fit.criterion.model_of(fit.eta(), record)?;
+    // From e to u: without the coefficients of channels beside it.
+    mapped.theta.truncate(mapped.orders.parameters());
     let of_theta =
         (errors.covariances.as_ref()).map(|c| mapped.covariance_of_theta(&c.clustered, p, layout.positions(record)));
     let polynomial_fit = Fit {

@@ -6,6 +6,7 @@ use hoid_model::{Detrend, Form, Record, Structure};
 use super::{
     arx_response::ArxResponse,
     assembly::{AtLines, Beside, Chosen},
+    channels::Seen,
     comparison::{Comparison, Tried},
     coordinates::Grid,
     intersample::Intersample,
@@ -20,7 +21,7 @@ use super::{
     result::FamilyFit,
 };
 use crate::{
-    IdentError,
+    IdentError, InitialState,
     criterion::{Data, Workspace},
     frequency::{DescribingFunction, DescriptionOptions, describe_runs},
     informative_data, progress,
@@ -72,27 +73,47 @@ impl FamilyEstimator {
     ) -> Result<FamilyFit, IdentError> {
         informative_data::common_sample_time(records)?;
         let records: Vec<Record> = records.iter().map(|r| r.clone().detrended(self.detrend)).collect();
+        let (records, seen) = Seen::of(records, &self.channels, self.detrend)?;
         let forms = self.sorted_forms()?;
         let mut prediction = self.prediction(self.intersample, &records, &forms)?;
+        if self.initial_state != InitialState::Zero && !seen.is_empty() {
+            let sampling = (prediction.sample_time, prediction.intersample);
+            let of_channels = seen.first_regressed_sample(self.neuromuscular, sampling) + self.nd.end();
+            prediction.first = prediction.first.max(of_channels);
+        }
         self.check(&records, prediction.first)?;
 
-        let (describing, mut no_lines) = match describing {
+        // The ratio of u and e at a line is a sum of responses where more is seen than e.
+        let (describing, mut no_lines) = match describing.filter(|_| seen.is_empty()) {
             None => (None, None),
             Some(Ok(found)) => (Some(found), None),
             Some(Err(error)) => (None, Some(error.to_string())),
         };
         let lines = describing.as_ref().map(LineData::new);
         // It gives starts alone: the lines do as well.
-        let response = match ArxResponse::of(&records) {
-            Err(error) if lines.is_none() => return Err(error),
-            found => found.map_or(Vec::new(), |found| found.points),
+        let mut begun = Vec::new();
+        let response = if seen.is_empty() {
+            match ArxResponse::of(&records) {
+                Err(error) if lines.is_none() => return Err(error),
+                found => found.map_or(Vec::new(), |found| found.points),
+            }
+        } else {
+            let mut responses = seen.responses(&records)?;
+            let sampling = (prediction.sample_time, prediction.intersample);
+            begun = seen.begun(&responses, self.neuromuscular, sampling, &self.search)?;
+            prediction.channels = begun.iter().filter_map(|forms| forms.first().cloned()).collect();
+            responses.swap_remove(0)
         };
         let mut workspace = Workspace::of_thread();
         let mut starts = Vec::new();
         for &form in &forms {
             starts.push(self.start(form, lines.as_ref(), (&response, Grid::Usual), &prediction)?);
         }
-        let noise = match self.with_little_noise(&prediction, &records, &mut starts, &mut workspace)? {
+        let little_noise = match seen.is_empty() {
+            true => self.with_little_noise(&prediction, &records, &mut starts, &mut workspace)?,
+            false => None,
+        };
+        let noise = match little_noise {
             Some(found) => {
                 // They hold the leakage of the record and of its aliases more than such noise.
                 starts.iter_mut().for_each(|start| start.lines = None);
@@ -103,6 +124,15 @@ impl FamilyEstimator {
             None => None,
         };
         let noise = noise.map_or_else(|| self.noise_orders(&prediction, &starts, &mut workspace), Ok)?;
+        let mut channels = Vec::new();
+        if !seen.is_empty() {
+            let least = self.least_left(&prediction, &starts, noise.1, &mut workspace)?;
+            let of = (
+                (starts[least].form, self.neuromuscular),
+                starts[least].coordinates.as_slice(),
+            );
+            channels = seen.choose(&mut prediction, begun, of, noise, &mut workspace)?;
+        }
         let count = starts.len();
         let mut tried: Vec<Tried<'_>> = Vec::with_capacity(count);
         for start in starts {
@@ -144,6 +174,7 @@ impl FamilyEstimator {
             beside: beside.collect::<Result<_, IdentError>>()?,
             forms: figures,
             prediction: &prediction,
+            channels,
             records: &records,
             excitation: self.excitation.as_deref(),
             run_to_run: match prediction.noise_free() {
@@ -192,6 +223,7 @@ impl FamilyEstimator {
         )?;
         Ok(Prediction {
             data: Data::of(records),
+            channels: Vec::new(),
             sample_time,
             intersample,
             course_is_known: intersample != Intersample::Auto,
@@ -354,6 +386,31 @@ impl FamilyEstimator {
             start.coordinates.push(found.coordinates);
         }
         Ok(start)
+    }
+
+    /// The start that leaves least, whitened by an autoregression of this order.
+    fn least_left(
+        &self,
+        prediction: &Prediction<'_>,
+        starts: &[Start],
+        order: usize,
+        workspace: &mut Workspace,
+    ) -> Result<usize, IdentError> {
+        let mut least: Option<(f64, usize)> = None;
+        for (i, start) in starts.iter().enumerate() {
+            for coordinates in &start.coordinates {
+                let form = (start.form, self.neuromuscular);
+                let Ok(series) = prediction.unexplained(form, coordinates, workspace) else {
+                    continue;
+                };
+                if let Some(found) = NoiseProducts::new(&series, order).fit_up_to(order)
+                    && least.is_none_or(|(loss, _)| found.loss < loss)
+                {
+                    least = Some((found.loss, i));
+                }
+            }
+        }
+        least.map(|(_, i)| i).ok_or(IdentError::NoFiniteLoss)
     }
 
     /// The orders of the noise model, by Akaike's criterion, for the form that leaves least.

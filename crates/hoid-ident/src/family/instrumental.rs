@@ -197,6 +197,7 @@ impl<'p, 'a> Instrumental<'p, 'a> {
             initial: self.prediction.initial,
             first: self.prediction.first,
             weights: None,
+            further: Vec::new(),
         };
         let eps = of_theta.residuals_of(&mapped.theta, 0, workspace);
         let by_theta = of_theta.jacobian(&mapped.theta, 0, workspace);
@@ -474,6 +475,7 @@ mod tests {
             (SampleTime::SIXTIETH, Intersample::Auto),
         );
         let prediction = Prediction {
+            channels: Vec::new(),
             data: Data::of(&records),
             sample_time: SampleTime::SIXTIETH,
             intersample: Intersample::Auto,
@@ -500,7 +502,7 @@ mod tests {
             order: NOISE_ORDER,
         };
         let minimum = fit.layout().coordinates_of(fit.eta(), 0);
-        let d = fit.eta()[fit.layout().operator_elements()..].to_vec();
+        let d = fit.eta()[fit.layout().noise_begins()..].to_vec();
         let (_, z) = method.equation(&minimum, &d, &mut workspace).unwrap();
         let products = z.iter().flat_map(|a| z.iter().map(move |b| dot(a, b))).collect();
         let of_held = method.held(&minimum, &mut workspace).unwrap();

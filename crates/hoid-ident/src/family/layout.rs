@@ -1,8 +1,9 @@
 //! Where the coordinates of an operator and the coefficients of its noise model stand in eta.
 //!
-//! `eta = [coordinates.., c_1 .. c_nc, d_1 .. d_nd]`: those of the operator first, then those of
-//! the noise `v = (C/D) eps`. A coordinate that each record has for itself stands once for each of
-//! them; the noise is common to all.
+//! `eta = [coordinates.., of channels.., c_1 .. c_nc, d_1 .. d_nd]`: those of the operator first, then
+//! those of what is seen besides the error, then those of the noise `v = (C/D) eps`. A coordinate that
+//! each record has for itself stands once for each of them; channels and noise are common to all. The
+//! neuromuscular part of a channel is that of the operator.
 
 use std::ops::Range;
 
@@ -13,7 +14,10 @@ use hoid_model::{
 };
 
 use super::intersample::Intersample;
-use crate::grey_box::parametrisation::{Mapped, Parametrisation};
+use crate::{
+    criterion::further::InputOrders,
+    grey_box::parametrisation::{HeldSamples, Mapped, Parametrisation},
+};
 
 /// Places of the parameters of each record.
 #[derive(Debug, Clone, PartialEq)]
@@ -28,8 +32,21 @@ pub(super) struct FamilyLayout {
     /// Place in eta of each slot, for each record.
     positions: Vec<Vec<usize>>,
     limits: Vec<(f64, f64)>,
-    /// Coordinate and record of each element of eta before the noise; no record where it is common.
+    /// Coordinate and record of each element of the operator in eta; no record where it is common.
     pub elements: Vec<(Coordinate, Option<usize>)>,
+    /// What is seen besides the error.
+    pub channels: Vec<ChannelInLayout>,
+}
+
+/// The response to a channel beside the error.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct ChannelInLayout {
+    pub form: Form,
+    /// Bounds and start of its own coordinates: those without the neuromuscular part.
+    pub limits: Vec<(f64, f64)>,
+    pub start: Vec<f64>,
+    /// Place of the first of them in eta.
+    pub place: usize,
 }
 
 impl FamilyLayout {
@@ -51,6 +68,7 @@ impl FamilyLayout {
             positions: vec![Vec::new(); records],
             limits: Vec::new(),
             elements: Vec::new(),
+            channels: Vec::new(),
         };
         for (coordinate, bound) in form.coordinates(neuromuscular).into_iter().zip(bounds) {
             let own = records > 1 && individual.contains(&coordinate);
@@ -68,6 +86,60 @@ impl FamilyLayout {
             layout.positions.iter_mut().for_each(|p| p.push(place));
         }
         layout
+    }
+
+    /// The same with channels beside the error.
+    pub fn with_channels(mut self, channels: &[ChannelInLayout]) -> Self {
+        let noise = self.limits.split_off(self.elements.len());
+        for positions in &mut self.positions {
+            positions.truncate(self.form.coordinates(self.neuromuscular).len());
+        }
+        for channel in channels {
+            self.channels.push(ChannelInLayout {
+                place: self.limits.len(),
+                ..channel.clone()
+            });
+            self.limits.extend_from_slice(&channel.limits);
+        }
+        let first = self.limits.len();
+        self.limits.extend(noise);
+        for record in 0..self.positions.len() {
+            let of_channels: Vec<usize> = (self.channels.iter())
+                .flat_map(|channel| self.places_of(channel, record))
+                .collect();
+            let positions = &mut self.positions[record];
+            positions.extend(first..self.limits.len());
+            positions.extend(of_channels);
+        }
+        self
+    }
+
+    /// Place in eta of each coordinate of a channel.
+    pub fn places_of(&self, channel: &ChannelInLayout, record: usize) -> Vec<usize> {
+        let of_operator = self.form.coordinates(self.neuromuscular);
+        let mut own = channel.place..;
+        let place = |coordinate: Coordinate| match coordinate {
+            Coordinate::LogOmega | Coordinate::LogZeta => {
+                let shared = of_operator.iter().position(|c| *c == coordinate);
+                shared.map(|i| self.positions[record][i])
+            }
+            _ => own.next(),
+        };
+        let all = channel.form.coordinates(self.neuromuscular).into_iter();
+        all.filter_map(place).collect()
+    }
+
+    /// The operator of a channel in a record.
+    pub fn channel(&self, eta: &[f64], channel: &ChannelInLayout, record: usize) -> Result<FamilyOperator, ModelError> {
+        let x: Vec<f64> = (self.places_of(channel, record).iter())
+            .map(|&place| eta[place])
+            .collect();
+        FamilyOperator::new(channel.form, self.neuromuscular, &x)
+    }
+
+    /// Place of the first coefficient of the noise.
+    pub fn noise_begins(&self) -> usize {
+        self.elements.len() + self.channels.iter().map(|channel| channel.limits.len()).sum::<usize>()
     }
 
     /// Number of coordinates of one operator.
@@ -93,7 +165,9 @@ impl FamilyLayout {
             let index = all.iter().position(|c| c == coordinate).unwrap_or(0);
             coordinates[index]
         };
-        self.elements.iter().map(value).chain(noise.iter().copied()).collect()
+        let of_channels = self.channels.iter().flat_map(|channel| &channel.start);
+        let operators = self.elements.iter().map(value);
+        operators.chain(of_channels.chain(noise).copied()).collect()
     }
 
     /// The operator of a record.
@@ -123,7 +197,11 @@ impl Parametrisation for FamilyLayout {
 
     fn delays(&self) -> Vec<usize> {
         let delay = |i: &usize| self.elements[*i].0 == Coordinate::Delay;
-        (0..self.elements.len()).filter(delay).collect()
+        let of_channels = self
+            .channels
+            .iter()
+            .map(|channel| channel.place + channel.limits.len() - 1);
+        (0..self.elements.len()).filter(delay).chain(of_channels).collect()
     }
 
     fn delay_of(&self, record: usize) -> usize {
@@ -154,35 +232,69 @@ impl Parametrisation for FamilyLayout {
     }
 
     fn stable_blocks(&self) -> Vec<Range<usize>> {
-        let first = self.elements.len();
+        let first = self.noise_begins();
         Vec::from_iter((self.nc > 0).then_some(first..first + self.nc))
     }
 
-    fn map(&self, eta: &[f64], record: usize, sample: Option<usize>) -> Result<Mapped, ModelError> {
+    fn further(&self) -> Vec<InputOrders> {
+        let muscles = if self.neuromuscular { 2 } else { 0 };
+        let orders = |channel: &ChannelInLayout| {
+            let order = usize::from(channel.form.has_pole()) + muscles;
+            InputOrders {
+                nb: self.intersample.gains(order, channel.form.degree()),
+                nf: order,
+                nk: 1,
+            }
+        };
+        self.channels.iter().map(orders).collect()
+    }
+
+    fn map(&self, eta: &[f64], record: usize, held: HeldSamples<'_>) -> Result<Mapped, ModelError> {
         let operator = self.operator(eta, record)?;
-        let held = self.intersample.discrete(&operator, sample, self.sample_time)?;
-        let noise = &eta[self.elements.len()..];
-        let nb = held.b.len();
-        let (coordinates, extra) = (self.coordinates(), noise.len());
-        let mut theta = held.b.clone();
+        let found = self
+            .intersample
+            .discrete(&operator, held.of(self.delay_of(record)), self.sample_time)?;
+        let noise = &eta[self.noise_begins()..];
+        let orders = self.orders(found.nk);
+        let mut theta = found.b.clone();
         theta.extend_from_slice(noise);
-        theta.extend_from_slice(&held.f);
-        let of_coordinate = |i: usize| {
-            let slope = |row: &[f64; hoid_model::operator_family::PARTIALS]| row[i];
-            let mut column: Vec<f64> = held.jacobian[..nb].iter().map(slope).collect();
-            column.resize(nb + extra, 0.0);
-            column.extend(held.jacobian[nb..].iter().map(slope));
-            column
-        };
-        let of_noise = |k: usize| {
+        theta.extend_from_slice(&found.f);
+        // Each slot: its derivatives, and from where they stand in theta.
+        let mut slopes: Vec<Vec<(usize, f64)>> = Vec::new();
+        let (nb, behind) = (found.b.len(), found.b.len() + noise.len());
+        for i in 0..self.coordinates() {
+            let rows = found.jacobian.iter().enumerate();
+            let at = |row: usize| if row < nb { row } else { behind + row - nb };
+            slopes.push(rows.map(|(row, slope)| (at(row), slope[i])).collect());
+        }
+        slopes.extend((nb..behind).map(|place| vec![(place, 1.0)]));
+        let mut further = Vec::with_capacity(self.channels.len());
+        for channel in &self.channels {
+            let operator = self.channel(eta, channel, record)?;
+            let delay = channel.place + channel.limits.len() - 1;
+            let found = self.intersample.discrete(&operator, held.of(delay), self.sample_time)?;
+            let from = theta.len();
+            theta.extend_from_slice(&found.b);
+            theta.extend_from_slice(&found.f);
+            for i in 0..operator.coordinates().len() {
+                let rows = found.jacobian.iter().enumerate();
+                slopes.push(rows.map(|(row, slope)| (from + row, slope[i])).collect());
+            }
+            further.push(InputOrders {
+                nb: found.b.len(),
+                nf: found.f.len(),
+                nk: found.nk,
+            });
+        }
+        let column = |slopes: &Vec<(usize, f64)>| {
             let mut column = vec![0.0; theta.len()];
-            column[nb + k] = 1.0;
+            slopes.iter().for_each(|(place, slope)| column[*place] = *slope);
             column
         };
-        let columns = (0..coordinates).map(of_coordinate).chain((0..extra).map(of_noise));
         Ok(Mapped {
-            orders: self.orders(held.nk),
-            columns: columns.collect(),
+            orders,
+            further,
+            columns: slopes.iter().map(column).collect(),
             theta,
         })
     }

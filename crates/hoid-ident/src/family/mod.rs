@@ -24,6 +24,7 @@
 //! |---|---|
 //! | `options` | [`FamilyEstimator`]: what may be chosen, by fields and by names |
 //! | `estimator` | the searches of all forms |
+//! | `channels` | what a person sees besides the error |
 //! | `comparison` | what each form is worth beside the others |
 //! | `assembly` | from the searches of the forms that count to the result |
 //! | `estimated` | the operator of a record with its errors |
@@ -57,6 +58,7 @@
 mod agreement;
 mod arx_response;
 mod assembly;
+mod channels;
 mod choice;
 mod clusters;
 mod comparison;
@@ -90,6 +92,7 @@ mod result;
 mod sensitivity;
 
 pub use agreement::{Agreement, AgreementMethod, AgreementPair, AgreementRow};
+pub use channels::{ChannelFit, ChannelForm, ChannelResponse, ChannelRole, SeenChannel};
 pub use choice::FormFigures;
 pub use clusters::ClusterKind;
 pub use instrumental::InstrumentalFit;

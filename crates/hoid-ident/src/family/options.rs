@@ -3,7 +3,7 @@
 
 use hoid_model::{Detrend, Form, operator_family::Coordinate};
 
-use super::{intersample::Intersample, prior::OperatorPrior};
+use super::{channels::SeenChannel, intersample::Intersample, prior::OperatorPrior};
 use crate::{
     IdentError, InitialState, SearchOptions,
     order_selection::{NamedOrders, written},
@@ -33,6 +33,8 @@ pub struct FamilyEstimator {
     pub nc: std::ops::RangeInclusive<usize>,
     /// Orders nd of the noise model to choose from. Default 0 to 24.
     pub nd: std::ops::RangeInclusive<usize>,
+    /// What the person sees or feels besides the error, as channels of the records. Default none.
+    pub channels: Vec<SeenChannel>,
     /// Channel of the recorded disturbance or target, for the fit at its lines.
     pub excitation: Option<String>,
     /// Period of the excitation in s; found from its lines where it is `None`.
@@ -55,13 +57,14 @@ pub struct FamilyEstimator {
 impl Default for FamilyEstimator {
     fn default() -> Self {
         Self {
-            forms: Form::ALL.to_vec(),
+            forms: Form::OF_ERROR.to_vec(),
             neuromuscular: true,
             prior: OperatorPrior::population(),
             delay_range_s: (0.02, 0.8),
             intersample: Intersample::Auto,
             nc: 0..=0,
             nd: 0..=HIGHEST_NOISE_ORDER,
+            channels: Vec::new(),
             excitation: None,
             period_s: None,
             individual: Vec::new(),
@@ -120,7 +123,7 @@ impl BatchOptions for FamilyEstimator {
                 Ok(())
             }),
             shared::change(),
-            shared::form(|how: &mut Self, form| how.forms = form.map_or(Form::ALL.to_vec(), |form| vec![form]))
+            shared::form(|how: &mut Self, form| how.forms = form.map_or(Form::OF_ERROR.to_vec(), |form| vec![form]))
                 .printed("form", |how, _| Some(how.forms_in_words())),
             shared::neuromuscular(|how: &mut Self| &mut how.neuromuscular)
                 .printed("neuromuscular", |how, _| Some(shared::yes_words(how.neuromuscular))),
@@ -156,6 +159,23 @@ impl BatchOptions for FamilyEstimator {
                 Ok(())
             })
             .printed("variation from run to run", |how, _| Some(how.run_to_run.to_string())),
+            BatchOption::new(role(), |how: &mut Self, option, text| {
+                let typed: Vec<String> = option.read(text)?;
+                let mut channels: Vec<SeenChannel> = Vec::with_capacity(typed.len());
+                for part in &typed {
+                    let channel = part.parse::<SeenChannel>().map_err(|why| option.refused(part, &why))?;
+                    if channels.iter().any(|known| known.name == channel.name) {
+                        return Err(option.error(format!("names {} twice", channel.name)));
+                    }
+                    channels.push(channel);
+                }
+                how.channels = channels;
+                Ok(())
+            })
+            .printed("further inputs", |how, _| {
+                let words: Vec<String> = how.channels.iter().map(SeenChannel::to_string).collect();
+                (!words.is_empty()).then(|| words.join(", "))
+            }),
             shared::individual(|how: &mut Self, option, names| {
                 let coordinate = |name: &String| {
                     let expected = "K, T_L, T_I, omega_nm, zeta_nm or tau_e";
@@ -192,6 +212,11 @@ fn intersample() -> Setting {
     let help = "What e does between its samples: zoh is held, foh runs straight (logged from what is faster or continuous; tau_e is \
                 half a sample longer); auto: smooth, with the delay of a held one, and what data without noise show";
     Setting::new("intersample", Kind::Choice(&Intersample::NAMES), help).default("auto")
+}
+
+fn role() -> Setting {
+    let help = "Inputs beside the error, and what they are to the person: r=feedforward (a target that is seen; r=feedforward:0.5 with                 0.5 s of its future), motion, output; one form alone as r=feedforward/derivative";
+    Setting::new("role", Kind::Names, help)
 }
 
 fn run_to_run(usual: f64) -> Setting {

@@ -15,6 +15,7 @@ use hoid_model::{
 };
 
 use super::{
+    channels::Channel,
     clusters::Clusters,
     coordinates, covariances,
     intersample::Intersample,
@@ -25,7 +26,7 @@ use super::{
 };
 use crate::{
     IdentError, InitialState, Reason, SearchOptions,
-    criterion::{Criterion, Data, Workspace, first_residual},
+    criterion::{Data, Workspace, first_residual},
     grey_box::{
         objective::{Penalty, PhysicalCriterion},
         parametrisation::Parametrisation,
@@ -47,6 +48,8 @@ const SETTLED: f64 = 0.05;
 #[derive(Debug, Clone)]
 pub(super) struct Prediction<'a> {
     pub data: Vec<Data<'a>>,
+    /// What is seen besides the error.
+    pub channels: Vec<Channel<'a>>,
     pub sample_time: SampleTime,
     /// What the error does between its samples.
     pub intersample: Intersample,
@@ -96,10 +99,14 @@ impl<'a> Prediction<'a> {
         let records = self.data.len();
         let sampling = (self.sample_time, self.intersample);
         FamilyLayout::new(form, noise, records, &self.individual, &limits, sampling)
+            .with_channels(&self.channels.iter().map(Channel::in_layout).collect::<Vec<_>>())
     }
 
     pub fn criterion(&self, form: (Form, bool), noise: NoiseOrders) -> PhysicalCriterion<'a, FamilyLayout> {
-        PhysicalCriterion::new(self.layout(form, noise), self.data.clone(), self.initial, self.first)
+        PhysicalCriterion {
+            further: self.channels.iter().map(|channel| channel.values.clone()).collect(),
+            ..PhysicalCriterion::new(self.layout(form, noise), self.data.clone(), self.initial, self.first)
+        }
     }
 
     /// What an operator leaves of u in each record: `v = u - Y e`, the states of Y estimated.
@@ -114,21 +121,11 @@ impl<'a> Prediction<'a> {
         (0..self.data.len())
             .map(|record| {
                 let mapped = criterion.model_of(&eta, record)?;
-                Ok(self
-                    .of_record(&mapped.orders, record)
+                Ok(criterion
+                    .of_record(&mapped, record)
                     .residuals_of(&mapped.theta, 0, workspace))
             })
             .collect()
-    }
-
-    fn of_record(&self, orders: &hoid_model::Orders, record: usize) -> Criterion<'a> {
-        Criterion {
-            orders: *orders,
-            data: vec![self.data[record]],
-            initial: self.initial,
-            first: self.first,
-            weights: None,
-        }
     }
 
     /// The fit of a form from these coordinates, and from the noise model that is best for them.
@@ -193,7 +190,7 @@ impl<'a> Prediction<'a> {
         let layout = fit.layout();
         let mut criterion = self.criterion((layout.form, layout.neuromuscular), noise);
         criterion.penalty.clone_from(&fit.criterion.penalty);
-        let operators = &fit.eta()[..layout.operator_elements()];
+        let operators = &fit.eta()[..layout.noise_begins()];
         let search = SearchOptions {
             max_iterations,
             tolerance,

@@ -49,7 +49,7 @@ impl PredictionFit<'_> {
         let mapped = self.criterion.model_of(self.eta(), record).ok()?;
         Some(
             self.criterion
-                .of_record(mapped.orders, record)
+                .of_record(&mapped, record)
                 .residuals_of(&mapped.theta, 0, workspace),
         )
     }

@@ -146,6 +146,17 @@ impl OperatorPrior {
         Self::new(found.into_iter().filter_map(entry).collect())
     }
 
+    /// What is known of the neuromuscular system alone.
+    pub(super) fn of_muscles(mut self) -> Self {
+        self.entries.retain(|entry| {
+            matches!(
+                coordinate_of(&entry.parameter),
+                Some(Coordinate::LogOmega | Coordinate::LogZeta)
+            )
+        });
+        self
+    }
+
     /// What is known of each parameter.
     pub fn entries(&self) -> &[ParameterPrior] {
         &self.entries

@@ -3,12 +3,13 @@
 use std::f64::consts::{LN_10, PI};
 
 use hoid_model::{
-    ContinuousTransferFunction, FamilyOperator, Finding, Form, SampleTime, Verdict, operator_family::Coordinate,
-    uncertainty::Estimate,
+    ContinuousTransferFunction, Detrend, FamilyOperator, Finding, Form, Record, SampleTime, Verdict,
+    operator_family::Coordinate, uncertainty::Estimate,
 };
 
 use super::{
     agreement::Agreement,
+    channels::{ChannelFit, SeenChannel, without_channels},
     choice::FormFigures,
     clusters::ClusterKind,
     instrumental::InstrumentalFit,
@@ -20,7 +21,7 @@ use super::{
     parameter::Parameter,
     prior::OperatorPrior,
 };
-use crate::{Fit, ResponsePoint, Termination};
+use crate::{Fit, IdentError, ResponsePoint, Termination};
 
 /// An operator of one or several records.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -92,6 +93,9 @@ pub struct FamilyFit {
     pub forms: Vec<FormFigures>,
     /// Those that the data leave, over which estimates are averaged: the one in front first.
     pub weighed: Vec<WeighedForm>,
+    /// What was found of the channels beside the error, in the order in which they were asked for.
+    #[serde(default)]
+    pub channels: Vec<ChannelFit>,
     /// What the gain of the person varies by beyond these runs, as a part of it: standard deviation of their
     /// mean. Zero where errors are those of the scatter between runs, which hold it.
     pub run_to_run: f64,
@@ -159,6 +163,27 @@ impl FamilyFit {
     /// Form and noise model in a line; [`Fit::title`] of its polynomials says the same.
     pub fn title(&self) -> String {
         title(self.form, self.neuromuscular, self.noise_orders)
+    }
+
+    /// The channels with a response, each in the form that was found.
+    pub fn channels_in_use(&self) -> Vec<SeenChannel> {
+        let of = |channel: &ChannelFit| {
+            Some(SeenChannel {
+                name: channel.name.clone(),
+                role: channel.role,
+                preview_s: channel.preview_s,
+                forms: vec![channel.response.as_ref()?.operator.form()],
+            })
+        };
+        self.channels.iter().filter_map(of).collect()
+    }
+
+    /// A record with what u does beside the responses to channels other than the error.
+    ///
+    /// # Errors
+    /// [`IdentError`] for a record without one of them.
+    pub fn without_channels(&self, record: &Record, taken_out: Detrend) -> Result<Record, IdentError> {
+        without_channels(&self.channels, record, (taken_out, self.intersample))
     }
 
     /// The operator of a record; of records beyond them, the last.

@@ -55,7 +55,7 @@ pub(super) fn rivals(
     let mut orders: Vec<NoiseOrders> = vec![(0, highest / 4), (0, highest / 2), (0, highest), MIXED];
     orders.retain(|&(nc, nd)| (nc, nd) != own && nd > 0 && nd <= highest && nc <= highest);
     orders.dedup();
-    let elements = layout.operator_elements();
+    let elements = layout.noise_begins();
     let start = layout.coordinates_of(fit.eta(), 0);
     let Ok(series) = prediction.unexplained((layout.form, layout.neuromuscular), &start, workspace) else {
         return Vec::new();

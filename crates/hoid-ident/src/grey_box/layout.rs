@@ -14,7 +14,7 @@ use hoid_model::{
     remnant_noise::remnant_noise,
 };
 
-use super::parametrisation::{Mapped, Parametrisation};
+use super::parametrisation::{HeldSamples, Mapped, Parametrisation};
 use crate::{Constraint, IdentError};
 
 /// Number of slots with a remnant filter.
@@ -298,7 +298,8 @@ impl Parametrisation for Layout {
         Vec::new()
     }
 
-    fn map(&self, eta: &[f64], record: usize, sample: Option<usize>) -> Result<Mapped, ModelError> {
+    fn map(&self, eta: &[f64], record: usize, held: HeldSamples<'_>) -> Result<Mapped, ModelError> {
+        let sample = held.of(self.delay_of(record));
         let Polynomials {
             orders,
             theta,
@@ -306,7 +307,12 @@ impl Parametrisation for Layout {
         } = self.polynomials(eta, record, sample)?;
         let column = |slot: usize| -> Vec<f64> { jacobian.iter().map(|row| row[slot]).collect() };
         let columns = (0..self.slots_in_use()).map(column).collect();
-        Ok(Mapped { orders, theta, columns })
+        Ok(Mapped {
+            orders,
+            further: Vec::new(),
+            theta,
+            columns,
+        })
     }
 }
 

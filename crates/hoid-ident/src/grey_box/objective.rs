@@ -9,19 +9,24 @@ use std::{fmt, sync::Arc};
 
 use crate::{
     IdentError, InitialState,
-    criterion::{Criterion, Data, Workspace},
+    criterion::{
+        Criterion, Data, Workspace,
+        further::{FurtherInput, InputOrders},
+    },
     linalg::least_squares::dot,
     optimize::Linearisation,
     optimize::{Minimum, Objective, SearchOptions, minimise},
 };
 
-use super::parametrisation::{Mapped, Parametrisation};
+use super::parametrisation::{HeldSamples, Mapped, Parametrisation};
 
 /// The criterion over one or several records.
 #[derive(Debug, Clone)]
 pub(crate) struct PhysicalCriterion<'a, P> {
     pub layout: P,
     pub data: Vec<Data<'a>>,
+    /// The values of each input beside e, record by record.
+    pub further: Vec<Vec<&'a [f64]>>,
     pub initial: InitialState,
     pub first: usize,
     /// Sample in which each delay of [`Parametrisation::delays`] is held; by the delay itself where there is
@@ -129,6 +134,7 @@ impl<'a, P: Parametrisation> PhysicalCriterion<'a, P> {
         Self {
             layout,
             data,
+            further: Vec::new(),
             initial,
             first,
             samples: None,
@@ -153,22 +159,49 @@ impl<'a, P: Parametrisation> PhysicalCriterion<'a, P> {
 
     /// Number of initial states over all records.
     pub fn states(&self) -> usize {
-        let of_record = |record: usize| self.of_record(self.layout.orders(1), record).states();
+        let further = self.layout.further();
+        let of_record = |record: usize| {
+            self.with_data((self.layout.orders(1), &further), record, self.data[record])
+                .states()
+        };
         (0..self.data.len()).map(of_record).sum()
     }
 
     /// The criterion of one record in theta.
-    pub fn of_record(&self, orders: hoid_model::Orders, record: usize) -> Criterion<'a> {
-        Criterion::of_record(orders, self.data[record], self.initial, self.first)
+    pub fn of_record(&self, mapped: &Mapped, record: usize) -> Criterion<'a> {
+        self.with_data((mapped.orders, &mapped.further), record, self.data[record])
+    }
+
+    /// The same with another e and u of as many samples.
+    pub fn with_data<'b>(
+        &self,
+        (orders, further): (hoid_model::Orders, &[InputOrders]),
+        record: usize,
+        data: Data<'b>,
+    ) -> Criterion<'b>
+    where
+        'a: 'b,
+    {
+        let input = |(orders, values): (&InputOrders, &Vec<&'a [f64]>)| FurtherInput {
+            orders: *orders,
+            values: vec![values[record]],
+        };
+        Criterion {
+            further: further.iter().zip(&self.further).map(input).collect(),
+            ..Criterion::of_record(orders, data, self.initial, self.first)
+        }
     }
 
     fn polynomials(&self, eta: &[f64], record: usize) -> Option<Mapped> {
-        let sample = self.samples.as_ref().and_then(|samples| {
-            let place = self.layout.delay_of(record);
-            let index = self.layout.delays().iter().position(|&i| i == place)?;
-            samples.get(index).copied()
-        });
-        self.layout.map(eta, record, sample).ok()
+        let delays = self.layout.delays();
+        let held = match &self.samples {
+            Some(samples) => HeldSamples {
+                delays: &delays,
+                samples,
+            },
+            None => HeldSamples::default(),
+        };
+        self.layout.map(eta, record, held).ok()
     }
 
     /// The gains that are best for the other parameters, and the sum of squares there: the residual
@@ -274,7 +307,7 @@ impl<'a, P: Parametrisation> PhysicalCriterion<'a, P> {
 
     /// What the polynomials of a record are at eta.
     pub fn model_of(&self, eta: &[f64], record: usize) -> Result<Mapped, IdentError> {
-        Ok(self.layout.map(eta, record, None)?)
+        Ok(self.layout.map(eta, record, HeldSamples::default())?)
     }
 }
 
@@ -286,7 +319,7 @@ impl<P: Parametrisation> Objective for PhysicalCriterion<'_, P> {
         eta.iter().all(|v| v.is_finite())
             && (0..self.data.len()).all(|record| {
                 self.polynomials(eta, record)
-                    .is_some_and(|p| self.of_record(p.orders, record).is_feasible(&p.theta))
+                    .is_some_and(|p| self.of_record(&p, record).is_feasible(&p.theta))
             })
     }
 
@@ -304,7 +337,7 @@ impl<P: Parametrisation> Objective for PhysicalCriterion<'_, P> {
                 return total;
             };
             let of_theta = self
-                .of_record(polynomials.orders, record)
+                .of_record(&polynomials, record)
                 .linearise(&polynomials.theta, workspace);
             total.sum_of_squares += of_theta.sum_of_squares;
             let positions = self.layout.positions(record);

@@ -4,13 +4,33 @@ use std::ops::Range;
 
 use hoid_model::{ModelError, Orders, SampleTime};
 
+use crate::criterion::further::InputOrders;
+
 /// Orders and theta of one record at one eta, and the derivatives of theta: a column for each slot
 /// of the record.
 #[derive(Debug, Clone)]
 pub(crate) struct Mapped {
     pub orders: Orders,
+    /// Orders of inputs beside e, whose coefficients follow in theta.
+    pub further: Vec<InputOrders>,
     pub theta: Vec<f64>,
     pub columns: Vec<Vec<f64>>,
+}
+
+/// The samples in which delays are held, where the caller has chosen them.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct HeldSamples<'s> {
+    /// Places of the delays in eta.
+    pub delays: &'s [usize],
+    pub samples: &'s [usize],
+}
+
+impl HeldSamples<'_> {
+    /// The sample of the delay at this place.
+    pub fn of(&self, place: usize) -> Option<usize> {
+        let index = self.delays.iter().position(|&delay| delay == place)?;
+        self.samples.get(index).copied()
+    }
 }
 
 impl Mapped {
@@ -55,12 +75,15 @@ pub(crate) trait Parametrisation: Clone {
     fn orders(&self, nk: usize) -> Orders;
     /// Places in eta of the polynomials C that must be stable and have no limits of their own.
     fn stable_blocks(&self) -> Vec<Range<usize>>;
-    /// The polynomials of one record; `sample` is the sample in which its delay lies, where the
-    /// caller has chosen one.
+    /// Orders of the inputs beside e, at the shortest delay; none by default.
+    fn further(&self) -> Vec<InputOrders> {
+        Vec::new()
+    }
+    /// The polynomials of one record, its delays in these samples.
     ///
     /// # Errors
     /// [`ModelError`] for an eta without a model.
-    fn map(&self, eta: &[f64], record: usize, sample: Option<usize>) -> Result<Mapped, ModelError>;
+    fn map(&self, eta: &[f64], record: usize, held: HeldSamples<'_>) -> Result<Mapped, ModelError>;
 }
 
 #[cfg(test)]
@@ -72,6 +95,7 @@ mod tests {
         // theta = [x + 2 y, x - y] of eta = [y, other, x].
         let mapped = Mapped {
             orders: Orders::default(),
+            further: Vec::new(),
             theta: vec![0.0; 2],
             columns: vec![vec![1.0, 1.0], vec![2.0, -1.0]],
         };

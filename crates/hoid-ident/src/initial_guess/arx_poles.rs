@@ -26,6 +26,7 @@ pub(crate) fn arx_poles(criterion: &Criterion<'_>, data: &[Data<'_>], workspace:
         initial: InitialState::Estimate,
         first: criterion.first.max(first_residual(&orders, InitialState::Estimate)),
         weights: None,
+        further: Vec::new(),
     };
     if data.iter().any(|d| d.u.len() <= equation_error.first) {
         return None;

@@ -110,6 +110,7 @@ impl AveragedRecords {
             initial: InitialState::Estimate,
             first: first_residual(&self.orders, InitialState::Estimate),
             weights: None,
+            further: Vec::new(),
         }
     }
 }

@@ -256,6 +256,7 @@ mod tests {
             initial: InitialState::Estimate,
             first: first_residual(&orders, InitialState::Estimate),
             weights: None,
+            further: Vec::new(),
         };
         let mut workspace = Workspace::default();
         let arx = arx_poles(&criterion, &criterion.data, &mut workspace).unwrap();
@@ -287,6 +288,7 @@ mod tests {
             initial: InitialState::Zero,
             first: 0,
             weights: None,
+            further: Vec::new(),
         };
         assert!(reduced_arx(&criterion, &mut Workspace::default()).is_none());
     }

@@ -83,6 +83,7 @@ mod tests {
             initial: InitialState::Estimate,
             first: first_residual(&orders, InitialState::Estimate),
             weights: None,
+            further: Vec::new(),
         })
     }
 

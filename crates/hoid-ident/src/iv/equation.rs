@@ -223,7 +223,7 @@ impl<'a> IvProblem<'a> {
         let past = Past {
             c: &[],
             d: &[],
-            f: &poles[1..],
+            f: &[&poles[1..]],
             lead: 0,
             noise: None,
             weights: None,

@@ -67,6 +67,7 @@ impl InstrumentalVariable {
             initial: InitialState::Estimate,
             first,
             weights: None,
+            further: Vec::new(),
         };
         check_degrees_of_freedom(&criterion, records)?;
         let sources = match &self.instruments {

@@ -156,11 +156,13 @@ pub fn of_family(
         nd: nd..=nd,
         excitation: None,
         intersample: fit.intersample,
+        channels: fit.channels_in_use(),
         ..estimator.clone()
     };
+    // What is slow would be taken out of e and u alone, and not out of what is seen besides.
     let asked = match &fit.lines {
-        Some(_) => &Without::ALL[..1],
-        None => &Without::ALL,
+        None if again.channels.is_empty() => &Without::ALL[..],
+        _ => &Without::ALL[..1],
     };
     let measures = |of: &FamilyFit| of.loop_measures_in_front(0, element?);
     opinions(asked, records, |others| {

@@ -43,6 +43,7 @@ fn run_with(e: &[f64], u: &[f64], start: &[f64], options: &SearchOptions) -> Opt
         initial: InitialState::Estimate,
         first: first_residual(&orders(), InitialState::Estimate),
         weights: None,
+        further: Vec::new(),
     };
     minimise(&criterion, start.to_vec(), options, None, &mut Workspace::default())
 }
@@ -173,6 +174,7 @@ fn unstable_starts_are_refused_and_limits_are_told() {
         initial: InitialState::Zero,
         first: 0,
         weights: None,
+        further: Vec::new(),
     };
     let limited = SearchOptions {
         max_iterations: 1,
@@ -212,6 +214,7 @@ fn the_secant_saves_steps_where_the_model_is_wrong_and_ends_in_the_same_place() 
         initial: InitialState::Estimate,
         first: first_residual(&orders, InitialState::Estimate),
         weights: None,
+        further: Vec::new(),
     };
     let by = |method| {
         let options = SearchOptions {

@@ -59,6 +59,7 @@ impl FitSettings {
             initial: self.initial_state,
             first,
             weights: None,
+            further: Vec::new(),
         };
         check_degrees_of_freedom(&criterion, records)?;
         Ok((criterion, sample_time))

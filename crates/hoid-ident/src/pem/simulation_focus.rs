@@ -121,6 +121,7 @@ fn covariance(simulated: &Fit, fit: &Fit, records: &[Record], first: usize) -> R
         initial: simulated.initial_state(),
         first: first.max(first_residual(&orders, simulated.initial_state())),
         weights: None,
+        further: Vec::new(),
     };
     let theta = simulated.model().theta();
     let q = theta.len();

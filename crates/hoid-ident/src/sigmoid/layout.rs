@@ -186,6 +186,7 @@ impl Layout {
         match (coordinate, self.form) {
             (Coordinate::Gain, Form::Lead) => "K_e",
             (Coordinate::Gain, Form::QuadraticIntegral) => "K_I",
+            (Coordinate::Gain, form) if form.is_derivative() => "K_d",
             (Coordinate::Gain, form) if form.has_lag() => "K_over_T_I",
             _ => coordinate.parameter(),
         }

@@ -187,6 +187,8 @@ fn parameters(form: Form, n: &[f64], metric: impl Fn(usize, usize) -> f64) -> [f
         Form::Gain | Form::Lag => [n[0], 0.0, 0.0],
         Form::Lead | Form::LeadLag => [n[0], over(n[1], n[0]), 0.0],
         Form::QuadraticIntegral => [n[0], over(n[1], n[0]), over(n[2], n[0])],
+        Form::Derivative => [n[1], 0.0, 0.0],
+        Form::DerivativeLead => [n[1], over(n[2], n[1]), 0.0],
         Form::Lead2 | Form::Lead2Lag => square_of_a_lead(form, n, metric),
         Form::LeadDroop => {
             // n = k (alpha, 1 + T alpha, T): k is a root of k^2 - n_1 k + n_0 n_2.

@@ -24,9 +24,13 @@ pub enum Form {
     /// `K (T_L s + 1) (1 + alpha/s)`: a lead with the droop of the phase at low frequencies,
     /// `e^{-j alpha/omega}` by its rational approximation.
     LeadDroop,
+    /// `K_d s`: the response to the rate of a target that is seen.
+    Derivative,
+    /// `K_d s (T_L s + 1)`: the response to rate and acceleration of a target that is seen.
+    DerivativeLead,
 }
 
-crate::named_choice!(Form, "form of the operator", 8, {
+crate::named_choice!(Form, "form of the operator", 10, {
     Gain => "gain",
     Lead => "lead",
     Lead2 => "lead2",
@@ -35,6 +39,8 @@ crate::named_choice!(Form, "form of the operator", 8, {
     Lead2Lag => "lead2-lag",
     QuadraticIntegral => "quadratic-integral",
     LeadDroop => "lead-droop",
+    Derivative => "derivative",
+    DerivativeLead => "derivative-lead",
 });
 
 /// Pole of an integration, 1/s: a leak that no record shows keeps the discrete model stable.
@@ -44,7 +50,7 @@ const LEAK: f64 = 1e-4;
 /// coordinates whose estimates are nearly normal also where the data say little.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
 pub enum Coordinate {
-    /// K without a lag, `K/T_I` with one.
+    /// K without a lag, `K/T_I` with one, K_d of a derivative in s.
     Gain,
     /// T_L, s.
     Lead,
@@ -98,7 +104,7 @@ impl Coordinate {
     /// and for what is no parameter.
     pub fn of_parameter(name: &str) -> Option<Self> {
         match name {
-            "K_over_T_I" | "K_I" | "K_e" => Some(Self::Gain),
+            "K_over_T_I" | "K_I" | "K_e" | "K_d" => Some(Self::Gain),
             _ => Self::ALL.into_iter().find(|coordinate| coordinate.parameter() == name),
         }
     }
@@ -126,18 +132,44 @@ pub(super) struct Rational {
 }
 
 impl Form {
+    /// The forms of the response to the error: a loop that leaves what is constant alone is none of people's.
+    pub const OF_ERROR: [Self; 8] = [
+        Self::Gain,
+        Self::Lead,
+        Self::Lead2,
+        Self::Lag,
+        Self::LeadLag,
+        Self::Lead2Lag,
+        Self::QuadraticIntegral,
+        Self::LeadDroop,
+    ];
+
+    /// The forms of the response to what is seen besides: a target, its rate and acceleration.
+    pub const OF_TARGET: [Self; 5] = [
+        Self::Gain,
+        Self::Lead,
+        Self::Lag,
+        Self::Derivative,
+        Self::DerivativeLead,
+    ];
+
+    /// True where a constant input has no response.
+    pub fn is_derivative(self) -> bool {
+        matches!(self, Self::Derivative | Self::DerivativeLead)
+    }
+
     /// Power p of the lead; the degree of the numerator.
     pub fn degree(self) -> usize {
         match self {
             Self::Gain | Self::Lag => 0,
-            Self::Lead | Self::LeadLag => 1,
-            Self::Lead2 | Self::Lead2Lag | Self::QuadraticIntegral | Self::LeadDroop => 2,
+            Self::Lead | Self::LeadLag | Self::Derivative => 1,
+            Self::Lead2 | Self::Lead2Lag | Self::QuadraticIntegral | Self::LeadDroop | Self::DerivativeLead => 2,
         }
     }
 
     /// True where the form has a pole of its own: a lag or an integration.
     pub fn has_pole(self) -> bool {
-        !matches!(self, Self::Gain | Self::Lead | Self::Lead2)
+        !matches!(self, Self::Gain | Self::Lead | Self::Lead2) && !self.is_derivative()
     }
 
     /// True where the pole is a lag with a time constant T_I.
@@ -155,8 +187,8 @@ impl Form {
     pub fn coordinates(self, neuromuscular: bool) -> Vec<Coordinate> {
         let mut all = vec![Coordinate::Gain];
         match self {
-            Self::Gain => {}
-            Self::Lead | Self::Lead2 => all.push(Coordinate::Lead),
+            Self::Gain | Self::Derivative => {}
+            Self::Lead | Self::Lead2 | Self::DerivativeLead => all.push(Coordinate::Lead),
             Self::Lag => all.push(Coordinate::LagRate),
             Self::LeadLag | Self::Lead2Lag => all.extend([Coordinate::Lead, Coordinate::LagRate]),
             Self::QuadraticIntegral => all.extend([Coordinate::Linear, Coordinate::Quadratic]),
@@ -173,8 +205,8 @@ impl Form {
     /// alpha. They stand behind the gain in [`Form::coordinates`], before those of the poles.
     pub fn varying_beside_gain(self) -> usize {
         match self {
-            Self::Gain | Self::Lag => 0,
-            Self::Lead | Self::Lead2 | Self::LeadLag | Self::Lead2Lag => 1,
+            Self::Gain | Self::Lag | Self::Derivative => 0,
+            Self::Lead | Self::Lead2 | Self::LeadLag | Self::Lead2Lag | Self::DerivativeLead => 1,
             Self::QuadraticIntegral | Self::LeadDroop => 2,
         }
     }
@@ -195,6 +227,8 @@ impl Form {
                 let (t, alpha) = (x[0], x[1]);
                 ([alpha, 1.0 + t * alpha, t], [[0.0, alpha, 1.0], [1.0, t, 0.0]])
             }
+            Self::Derivative => ([0.0, 1.0, 0.0], [none; 2]),
+            Self::DerivativeLead => ([0.0, 1.0, x[0]], [[0.0, 0.0, 1.0], none]),
         }
     }
 
@@ -211,6 +245,8 @@ impl Form {
             Self::Lead2Lag => ([k, (k * x[1]).scaled(2.0), k * x[1] * x[1]], Some(x[2])),
             Self::QuadraticIntegral => ([k, k * x[1], k * x[2]], Some(Dual::constant(LEAK))),
             Self::LeadDroop => ([k * x[2], k + k * x[1] * x[2], k * x[1]], Some(Dual::constant(LEAK))),
+            Self::Derivative => ([zero, k, zero], None),
+            Self::DerivativeLead => ([zero, k, k * x[1]], None),
         };
         Rational { numerator, pole }
     }

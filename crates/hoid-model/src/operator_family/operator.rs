@@ -12,10 +12,11 @@ use crate::{
 };
 
 /// The parameters of all forms, as [`FamilyOperator::named`] calls them, with their units.
-pub const PARAMETERS: [(&str, &str); 13] = [
+pub const PARAMETERS: [(&str, &str); 14] = [
     ("K", ""),
     ("K_over_T_I", "1/s"),
     ("K_I", "1/s"),
+    ("K_d", "s"),
     ("K_e", ""),
     ("K_e_dot", "s"),
     ("T_L", "s"),
@@ -175,6 +176,7 @@ impl FamilyOperator {
                     None => (&["K"], need("K")? / positive("T_I")?),
                 },
                 Coordinate::Gain if form == Form::QuadraticIntegral => (&["K_I"], need("K_I")?),
+                Coordinate::Gain if form.is_derivative() => (&["K_d"], need("K_d")?),
                 Coordinate::Gain => match find("K") {
                     Some(k) => (&["K"], k),
                     None => (&["K_e"], need("K_e")?),
@@ -258,6 +260,7 @@ impl FamilyOperator {
                 }
                 Coordinate::Gain if self.form == Form::Lead => put("K_e", "", gain, own),
                 Coordinate::Gain if self.form == Form::QuadraticIntegral => put("K_I", "1/s", gain, own),
+                Coordinate::Gain if self.form.is_derivative() => put("K_d", "s", gain, own),
                 Coordinate::Gain => put("K", "", gain, own),
                 Coordinate::Lead => {
                     put("T_L", "s", x, own);

@@ -2,7 +2,10 @@
 
 use hoid::analysis::{Account, Identified, Setting};
 use hoid::ident::{
-    family::{ClusterKind, FamilyFit, FormFigures, Intersample, LoopMeasures, OperatorOfRecord, Parameter},
+    ResponsePoint,
+    family::{
+        ChannelFit, ChannelRole, ClusterKind, FamilyFit, FormFigures, Intersample, LoopMeasures, Parameter,
+    },
     validation::GoodnessOfFit,
 };
 use hoid::model::{ContinuousTransferFunction, GainUnit, Record, uncertainty::Estimate};
@@ -13,6 +16,9 @@ use crate::{error::CliError, text};
 /// Standard errors of tau_e, and a time in s, that half a sample is more than where both delays are printed.
 const STRAIGHT_ERRORS: f64 = 2.0;
 const LEAST_HALF_S: f64 = 0.007;
+
+/// Frequencies at which a response to a target is shown with the controlled element, rad/s.
+const AT_RAD_S: [f64; 3] = [1.0, 2.5, 4.0];
 
 /// Everything that was found.
 pub struct Found<'a> {
@@ -59,10 +65,11 @@ impl Found<'_> {
             if fit.operators.len() > 1 {
                 page.push_str(&format!("{}:\n", self.files[k]));
             }
-            page.push_str(&parameters(of, &gain));
+            page.push_str(&parameters(&of.parameters, &gain));
             page.push('\n');
         }
         page.push_str(&self.between_samples());
+        page.push_str(&self.channels(&gain, verbose));
         if let Some(element) = self.element {
             let here = fit.loop_measures(0, element);
             page.push_str(&format!("Open loop with {element}: {}\n", measures(here.as_ref())));
@@ -91,6 +98,70 @@ impl Found<'_> {
         }
         page.push_str(&text::records(self.files, self.records, self.accounts, false));
         Ok(page)
+    }
+
+    /// The responses to inputs beside the error.
+    fn channels(&self, gain: &GainUnit, verbose: bool) -> String {
+        let mut page = String::new();
+        for channel in &self.fit.channels {
+            let (name, role) = (&channel.name, channel.role);
+            match &channel.response {
+                None => page.push_str(&format!(
+                    "No response to {name} ({role}) was found (p = {:.2} for the best of {} forms).\n",
+                    channel.p_value,
+                    channel.forms.len() - 1
+                )),
+                Some(of) => {
+                    page.push_str(&format!("Response to {name} ({role}): {}\n", of.operator.form()));
+                    page.push_str(&parameters(&of.parameters, gain));
+                    page.push('\n');
+                    page.push_str(&self.with_element(channel));
+                }
+            }
+            if verbose {
+                let mut rows = text::table(&["form", "loss", "AIC beside the best"]);
+                for form in &channel.forms {
+                    rows.add_row([
+                        form.form.map_or("no response", |form| form.name()).to_owned(),
+                        form.loss.map_or_else(String::new, numbers::plain),
+                        form.criterion.map_or_else(String::new, |c| format!("{c:.1}")),
+                    ]);
+                }
+                page.push_str(&format!("{rows}\n"));
+            }
+        }
+        page
+    }
+
+    /// What a response to a target does with the controlled element: one in all where the target alone moves the machine
+    /// along with it.
+    fn with_element(&self, channel: &ChannelFit) -> String {
+        let Some(element) = self.element.filter(|_| channel.role == ChannelRole::Feedforward) else {
+            return String::new();
+        };
+        let sampling = (self.fit.sample_time, self.fit.intersample);
+        let Some(points) = channel.frequency_response(&AT_RAD_S, sampling) else {
+            return String::new();
+        };
+        let one = |point: &ResponsePoint| {
+            let of_element = element.response(point.omega_rad_s);
+            let gain = 10_f64.powf(point.magnitude_db.value / 20.0) * of_element.norm();
+            let phase = (point.phase_deg.value + of_element.arg().to_degrees() + 180.0).rem_euclid(360.0) - 180.0;
+            let error = |e: Option<f64>| e.map_or_else(String::new, |e| format!(" ± {e:.0}"));
+            let of_gain = point.magnitude_db.standard_error.map(|db| gain * db * std::f64::consts::LN_10 / 20.0);
+            format!(
+                "{} at {} rad/s ({phase:.0}{} deg)",
+                with_error(gain, of_gain),
+                point.omega_rad_s,
+                error(point.phase_deg.standard_error)
+            )
+        };
+        let all: Vec<String> = points.iter().map(one).collect();
+        format!(
+            "F·M of {}, 1 and 0 deg where the target is followed without an error: {}.\n",
+            channel.name,
+            all.join(", ")
+        )
     }
 
     /// What tau_e owes to the course of the error between its samples: the other delay that the data may mean, where half
@@ -298,9 +369,9 @@ fn with_error(value: f64, error: Option<f64>) -> String {
 }
 
 /// Parameters with interval, prior share and whether they are determined.
-fn parameters(of: &OperatorOfRecord, gain: &GainUnit) -> String {
+fn parameters(of: &[Parameter], gain: &GainUnit) -> String {
     let mut rows = text::table(&["parameter", "value", "95 % from", "to", "of it prior"]);
-    for p in &of.parameters {
+    for p in of {
         let end = |v: f64| {
             if v.is_infinite() {
                 "open".to_owned()

@@ -1,8 +1,14 @@
 //! From the options of `hoid identify` to what is asked of the library.
 
+use std::collections::BTreeMap;
+
 use hoid::analysis::{Asked, Request};
 
 use crate::{args::IdentifyArgs, error::CliError, output};
+
+/// The option of inputs beside the error, and what the error itself is.
+const ROLE: &str = "role";
+const FEEDBACK: &str = "feedback";
 
 /// What is asked for, the options checked against each other.
 ///
@@ -12,11 +18,7 @@ pub fn asked(args: &IdentifyArgs) -> Result<Asked, CliError> {
     let request = Request {
         structure: args.structure.clone(),
         method: Some(args.method.clone()),
-        options: args
-            .options
-            .given()
-            .map(|(name, text)| (name.to_owned(), text.to_owned()))
-            .collect(),
+        options: options(args)?,
         faults: args.faults.faults,
         rate: args.read.prepare.rate.decimate,
     };
@@ -28,6 +30,38 @@ pub fn asked(args: &IdentifyArgs) -> Result<Asked, CliError> {
         Some((option, with)) => Err(CliError::Usage(format!("{option} belongs to {with}"))),
         None => Ok(asked),
     }
+}
+
+/// The options by their names; every input beside the first has a role.
+fn options(args: &IdentifyArgs) -> Result<BTreeMap<String, String>, CliError> {
+    let given = args.options.given();
+    let mut all: BTreeMap<String, String> = given.map(|(name, text)| (name.to_owned(), text.to_owned())).collect();
+    let [first, further @ ..] = args.read.inputs.as_slice() else {
+        return Ok(all);
+    };
+    let typed = all.remove(ROLE).unwrap_or_default();
+    let mut roles: Vec<String> = Vec::new();
+    for role in typed.split(',').map(str::trim).filter(|role| !role.is_empty()) {
+        match role.split_once('=') {
+            Some((name, FEEDBACK)) if name == first => {}
+            Some((name, FEEDBACK)) => {
+                return Err(CliError::Usage(format!(
+                    "--role {name}={FEEDBACK}: the feedback is the first --input, {first}; name {name} first"
+                )));
+            }
+            _ => roles.push(role.to_owned()),
+        }
+    }
+    let named = |role: &String, input: &String| role.split(['=', '/']).next() == Some(input.as_str());
+    for input in further {
+        if !roles.iter().any(|role| named(role, input)) {
+            roles.push(input.clone());
+        }
+    }
+    if !roles.is_empty() {
+        all.insert(ROLE.to_owned(), roles.join(","));
+    }
+    Ok(all)
 }
 
 /// The first option of reading and writing that has no meaning for what is asked, and what it belongs to.

@@ -17,7 +17,7 @@ use serde_json::Value;
 
 use super::{family, request, sigmoid};
 use crate::{
-    args::IdentifyArgs,
+    args::{IdentifyArgs, ReadArgs},
     commands::{figure, paper_table, places, reading},
     error::CliError,
     family_operator, json, output, text,
@@ -30,7 +30,12 @@ pub fn run(args: &IdentifyArgs) -> Result<(), CliError> {
     if let Some(path) = &args.picture.figure {
         figure::check(path)?;
     }
-    let reading = reading::of(&args.read, Some(&args.mask), asked.has_input())?;
+    // Inputs beside the first are channels of the record, which it has anyway.
+    let first = ReadArgs {
+        inputs: args.read.inputs[..1].to_vec(),
+        ..args.read.clone()
+    };
+    let reading = reading::of(&first, Some(&args.mask), asked.has_input())?;
     let read = reading.files(&args.records, reading::told)?;
     let (rate, counts) = (args.read.prepare.rate.decimate, asked.counts_samples());
     reading::say_kept(read.kept_rate(rate, counts));

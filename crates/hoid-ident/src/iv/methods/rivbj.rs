@@ -90,6 +90,7 @@ fn noise_of(
         initial: InitialState::Estimate,
         first: first_residual(&orders, InitialState::Estimate),
         weights: None,
+        further: Vec::new(),
     };
     let start = before.map_or_else(|| [d.as_slice(), &c].concat(), |n| [n.d.as_slice(), &n.c].concat());
     match minimise(

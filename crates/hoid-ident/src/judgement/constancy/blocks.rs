@@ -7,7 +7,7 @@
 use std::ops::Range;
 
 use crate::{
-    criterion::{Criterion, Data, Workspace},
+    criterion::{Data, Workspace},
     grey_box::{objective::PhysicalCriterion, parametrisation::Parametrisation},
     linalg::least_squares::{add_scaled, dot},
 };
@@ -105,8 +105,12 @@ pub(crate) fn physical_blocks<P: Parametrisation>(
 ) -> Option<Vec<ScoreBlock>> {
     let ts = criterion.layout.sample_time().s();
     let mut scores = |record: usize, data: Data<'_>| -> Option<Scores> {
+        // A piece of a long record does not say which piece of the other inputs is its own.
+        if !criterion.further.is_empty() && data.u.len() != criterion.data[record].u.len() {
+            return None;
+        }
         let mapped = criterion.model_of(eta, record).ok()?;
-        let of_theta = Criterion::of_record(mapped.orders, data, criterion.initial, criterion.first);
+        let of_theta = criterion.with_data((mapped.orders, &mapped.further), record, data);
         let eps = of_theta.residuals_of(&mapped.theta, 0, workspace);
         let psi = of_theta.jacobian(&mapped.theta, 0, workspace);
         let places = criterion.layout.positions(record).iter();

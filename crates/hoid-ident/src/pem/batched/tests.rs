@@ -108,6 +108,7 @@ fn a_lane_has_the_criterion_of_its_record_alone() {
                 initial: InitialState::Estimate,
                 first: first_residual(&o, InitialState::Estimate),
                 weights: None,
+                further: Vec::new(),
             };
             let alone = criterion.linearise(&thetas[lane], &mut Workspace::default());
             let p = o.parameters();

@@ -1,0 +1,142 @@
+//! Inputs beside e: `w_i = (B_i/F_i) q^-nk_i x_i`, each with its own polynomials.
+//!
+//! Theta is that of the first input, then `b_0 .. f_1 ..` of each further one. The columns of psi
+//! are those of the first input with the signals of the other: `(D/(C F_i)) x_i(t - nk_i - j)` and
+//! `-(D/(C F_i)) w_i(t - j)`.
+
+use std::{borrow::Cow, ops::Range};
+
+use hoid_core::filter::divide;
+
+use super::{
+    normal_equations::Column, polynomials::Polynomials, prediction_error::Criterion, whitening::whiten,
+    workspace::Workspace,
+};
+use crate::linalg::least_squares::add_scaled;
+
+/// Numbers of coefficients of B and F of one input, and its delay in samples.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
+pub struct InputOrders {
+    /// Coefficients `b0 ... b_{nb-1}` of B.
+    pub nb: usize,
+    /// Coefficients `f1 ... f_nf` of F.
+    pub nf: usize,
+    /// Delay of b0 in samples.
+    pub nk: usize,
+}
+
+impl InputOrders {
+    /// First sample at which its response needs nothing from before the record: `nk + nb - 1`.
+    pub fn first_regressed_sample(&self) -> usize {
+        self.nk.saturating_add(self.nb.saturating_sub(1))
+    }
+}
+
+/// An input beside e: its orders, and its values in each record.
+#[derive(Debug, Clone)]
+pub(crate) struct FurtherInput<'a> {
+    pub orders: InputOrders,
+    pub values: Vec<&'a [f64]>,
+}
+
+/// The signals of a further input at one theta, each with the zeros of the workspace in front.
+#[derive(Debug, Default)]
+pub(super) struct FurtherSignals {
+    s: Vec<f64>,
+    pub w: Vec<f64>,
+    of_b: Vec<f64>,
+    of_f: Vec<f64>,
+}
+
+impl Criterion<'_> {
+    /// B and F of each further input.
+    pub(super) fn further_polynomials<'t>(
+        &self,
+        theta: &'t [f64],
+    ) -> impl Iterator<Item = (&'t [f64], &'t [f64])> + use<'t, '_> {
+        let mut at = self.orders.parameters();
+        self.further.iter().map(move |input| {
+            let b = &theta[at..at + input.orders.nb];
+            at += input.orders.nb;
+            let f = &theta[at..at + input.orders.nf];
+            at += input.orders.nf;
+            (b, f)
+        })
+    }
+
+    /// The places of each further F in theta.
+    pub(super) fn further_poles(&self) -> impl Iterator<Item = Range<usize>> {
+        let mut at = self.orders.parameters();
+        self.further.iter().map(move |input| {
+            let from = at + input.orders.nb;
+            at = from + input.orders.nf;
+            from..at
+        })
+    }
+
+    /// s and w of the further inputs over these samples; w leaves v.
+    pub(super) fn further_responses(&self, theta: &[f64], record: usize, samples: Range<usize>, ws: &mut Workspace) {
+        let (pad, n) = (ws.pad, samples.end);
+        ws.further.resize_with(self.further.len(), FurtherSignals::default);
+        let from = pad + samples.start;
+        for ((input, (b, f)), signals) in self
+            .further
+            .iter()
+            .zip(self.further_polynomials(theta))
+            .zip(&mut ws.further)
+        {
+            let FurtherSignals { s, w, .. } = signals;
+            let begin = pad + input.orders.nk.min(n);
+            s.resize(pad + n, 0.0);
+            s[..begin].fill(0.0);
+            divide(f, &input.values[record][..pad + n - begin], &mut s[begin..]);
+            w.resize(pad + n, 0.0);
+            w.fill(0.0);
+            for (j, &bj) in b.iter().enumerate() {
+                add_scaled(&mut w[from..], bj, &s[from - j..pad + n - j]);
+            }
+            add_scaled(&mut ws.v[from..pad + n], -1.0, &w[from..]);
+        }
+    }
+
+    /// The signals whose shifts are the columns of the further inputs.
+    pub(super) fn whiten_further(&self, theta: &[f64], ws: &mut Workspace) {
+        let parts = Polynomials::split(&self.orders, theta);
+        let from = ws.pad + self.first_regressed();
+        for ((input, (_, f)), signals) in self
+            .further
+            .iter()
+            .zip(self.further_polynomials(theta))
+            .zip(&mut ws.further)
+        {
+            let FurtherSignals { s, w, of_b, of_f } = signals;
+            of_b.resize(s.len(), 0.0);
+            let begin = ws.pad + input.orders.nk.min(s.len() - ws.pad);
+            whiten(parts.c, parts.d, s, of_b, begin);
+            if input.orders.nf > 0 {
+                let mut filtered = vec![0.0; w.len()];
+                divide(f, &w[from..], &mut filtered[from..]);
+                of_f.resize(w.len(), 0.0);
+                whiten(parts.c, parts.d, &filtered, of_f, from);
+            }
+        }
+    }
+
+    /// The columns of psi of the further inputs over these places of the workspace.
+    pub(super) fn further_columns<'w>(&self, counted: &Range<usize>, ws: &'w Workspace) -> Vec<Column<'w>> {
+        let mut columns = Vec::new();
+        let mut add = |signal: &'w [f64], shifts: Range<usize>, sign: f64| {
+            let first = shifts.start;
+            columns.extend(shifts.map(|j| Column {
+                values: Cow::Borrowed(&signal[counted.start - j..counted.end - j]),
+                sign,
+                follows: j > first,
+            }));
+        };
+        for (input, signals) in self.further.iter().zip(&ws.further) {
+            add(&signals.of_b, 0..input.orders.nb, 1.0);
+            add(&signals.of_f, 1..input.orders.nf + 1, -1.0);
+        }
+        columns
+    }
+}

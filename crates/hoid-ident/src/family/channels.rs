@@ -1,0 +1,944 @@
+//! What a person sees or feels besides the error: a target with its future, the output of the machine, its motion.
+//!
+//! `u = Y e + sum_i Y_i x_i + (C/D) eps`: a human is a multichannel controller (D. T. McRuer and H. R. Jex, *IEEE
+//! Trans. Human Factors in Electronics* 8 (1967) 231-249, section II; M. Mulder et al., *IEEE Trans. Human-Machine
+//! Systems* 48 (2018) 457-469). Each channel has its own form, gains and delay, and the neuromuscular system of the
+//! operator, through which all of them move the hand. All are fitted together by prediction error: in a closed loop the
+//! response to e of a person who also sees the target is not `U/E`, at its lines or anywhere.
+//!
+//! **Starts.** An ARX model of high order with all inputs is one linear regression and consistent in a closed loop
+//! (L. Ljung, *System Identification*, 1999, sections 13.4 and 13.5). Each form is fitted to its responses; searches from
+//! elsewhere end in other minima.
+//!
+//! **Forms** of a channel are compared by prediction errors, in units of the inflation kappa, no response at all among
+//! them: that one is given up where the likelihood ratio of the best form is beyond what chance gives in one of a hundred
+//! records without a response, divided by the number of forms that were tried (Bonferroni).
+//!
+//! **A future that is shown** makes delays that are negative: x is taken from as many samples ahead as are shown, and what
+//! is fitted is the delay to that.
+
+use std::{fmt, str::FromStr};
+
+use hoid_core::filter::{divide_in_place, fir};
+use hoid_model::{
+    Complex64, Detrend, FamilyOperator, Form, Record, SampleTime, operator_family::Coordinate, uncertainty::Estimate,
+};
+use statrs::distribution::{ChiSquared, ContinuousCDF};
+
+use super::{
+    coordinates::{self, Grid},
+    covariances::Covariances,
+    estimated::Errors,
+    intersample::Intersample,
+    layout::ChannelInLayout,
+    parameter::{Known, Parameter},
+    prediction::{NoiseOrders, Prediction},
+    prediction_fit::PredictionFit,
+    prior::OperatorPrior,
+    response_fit::{MeasuredResponse, ResponseCriterion},
+};
+use crate::{
+    IdentError, InitialState, ResponsePoint, SearchOptions,
+    criterion::{
+        Criterion, Data, Workspace,
+        further::{FurtherInput, InputOrders},
+    },
+    grey_box::parametrisation::Parametrisation,
+    linalg::least_squares::{add_scaled, dot, solve_symmetric},
+    optimize::Objective,
+};
+
+/// Probability of a response where there is none.
+const BY_CHANCE: f64 = 0.01;
+/// Part of an input that the others must leave of it.
+const LEAST_OWN_PART: f64 = 1e-9;
+/// Order of A of the regression, and the fewest coefficients before it is given up.
+const POLES: usize = 16;
+const FEWEST: usize = 4;
+/// Most coefficients of a B, and the time that it covers, s.
+const MOST_GAINS: usize = 60;
+const RESPONSE_S: f64 = 0.7;
+/// Part of its diagonal that is added to the normal matrix.
+const RIDGE: f64 = 1e-7;
+/// Frequencies of the responses, rad/s, evenly over their logarithm.
+const BAND_RAD_S: (f64, f64) = (0.5, 20.0);
+const POINTS: usize = 24;
+/// Longest delay of a channel, s, behind what is shown first.
+const LONGEST_DELAY_S: f64 = 0.8;
+
+/// What a channel beside the error is to the person.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum ChannelRole {
+    /// A target that they see.
+    #[default]
+    Feedforward,
+    /// Motion of the machine that they feel.
+    Motion,
+    /// The output of the machine that they see beside the error.
+    Output,
+}
+
+hoid_model::named_choice!(ChannelRole, "role of a channel", 3, {
+    Feedforward => "feedforward",
+    Motion => "motion",
+    Output => "output",
+});
+
+/// A channel beside the error, as it is asked for.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SeenChannel {
+    /// Name of the channel in the records.
+    pub name: String,
+    /// What it is to the person.
+    pub role: ChannelRole,
+    /// How much of its future is shown, s.
+    pub preview_s: f64,
+    /// The forms to choose from; no response at all is always one of them unless there is one form alone.
+    pub forms: Vec<Form>,
+}
+
+impl SeenChannel {
+    /// A channel of which nothing else is known.
+    pub fn new(name: impl Into<String>, role: ChannelRole) -> Self {
+        Self {
+            name: name.into(),
+            role,
+            preview_s: 0.0,
+            forms: Form::OF_TARGET.to_vec(),
+        }
+    }
+}
+
+impl fmt::Display for SeenChannel {
+    /// As it is typed: `r=feedforward:0.5`.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}={}", self.name, self.role)?;
+        if self.preview_s > 0.0 {
+            write!(f, ":{}", self.preview_s)?;
+        }
+        match self.forms.as_slice() {
+            [only] => write!(f, "/{only}"),
+            _ => Ok(()),
+        }
+    }
+}
+
+impl FromStr for SeenChannel {
+    type Err = String;
+
+    /// `NAME`, `NAME=ROLE`, `NAME=ROLE:PREVIEW`, each with `/FORM` behind it.
+    fn from_str(text: &str) -> Result<Self, String> {
+        let expected = || "NAME=ROLE, as r=feedforward, r=feedforward:0.5 or r=feedforward/derivative".to_owned();
+        let (text, form) = match text.split_once('/') {
+            Some((head, form)) => (head, Some(form)),
+            None => (text, None),
+        };
+        let (name, role) = text.split_once('=').unwrap_or((text, ChannelRole::default().name()));
+        let (role, shown) = match role.split_once(':') {
+            Some((role, shown)) => (role, Some(shown)),
+            None => (role, None),
+        };
+        if name.trim().is_empty() {
+            return Err(expected());
+        }
+        let role = role.trim().parse::<ChannelRole>().map_err(|error| error.to_string())?;
+        let mut channel = Self::new(name.trim(), role);
+        if let Some(shown) = shown {
+            let seconds = shown.trim().trim_end_matches('s').parse::<f64>();
+            channel.preview_s = seconds.ok().filter(|s| *s >= 0.0 && s.is_finite()).ok_or_else(expected)?;
+        }
+        if let Some(form) = form {
+            channel.forms = vec![form.trim().parse::<Form>().map_err(|error| error.to_string())?];
+        }
+        Ok(channel)
+    }
+}
+
+/// What was found of a channel beside the error.
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct ChannelFit {
+    /// Name of the channel.
+    pub name: String,
+    /// What it is to the person.
+    pub role: ChannelRole,
+    /// How much of its future is shown, s.
+    pub preview_s: f64,
+    /// The forms that were compared, and the response that is none.
+    pub forms: Vec<ChannelForm>,
+    /// Probability of so large a likelihood ratio of the best form without a response, for all forms that were tried.
+    pub p_value: f64,
+    /// The response; `None` where none was found.
+    pub response: Option<ChannelResponse>,
+}
+
+/// A form of a channel, and what it leaves.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct ChannelForm {
+    /// The form; `None` is no response.
+    pub form: Option<Form>,
+    /// Loss of the prediction error fit, where there is one.
+    pub loss: Option<f64>,
+    /// Akaike's criterion in units of the inflation, less that of the best.
+    pub criterion: Option<f64>,
+}
+
+/// The response to a channel.
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+pub struct ChannelResponse {
+    /// The operator; its delay is that to the end of what is shown.
+    pub operator: FamilyOperator,
+    /// Covariance of its coordinates by rows.
+    pub covariance: Option<Vec<f64>>,
+    /// Its parameters; the delay `tau_f` is that to what happens now, and negative where the person anticipates.
+    pub parameters: Vec<Parameter>,
+}
+
+impl ChannelFit {
+    /// Gain and phase of the response to the channel at frequencies in rad/s; `None` where there is none.
+    pub fn frequency_response(
+        &self,
+        omega_rad_s: &[f64],
+        (sample_time, intersample): (SampleTime, Intersample),
+    ) -> Option<Vec<ResponsePoint>> {
+        let of = self.response.as_ref()?;
+        let point = |&omega: &f64| {
+            let found = of.operator.response_and_gradient(omega);
+            let held = found.value
+                * intersample.response(omega, sample_time)
+                * Complex64::from_polar(1.0, omega * self.lead_s(sample_time));
+            let relative = of.covariance.as_deref().map(|c| found.relative_covariance(c));
+            let error = |part: usize| relative.map(|c| c[part][part].max(0.0).sqrt());
+            ResponsePoint {
+                omega_rad_s: omega,
+                magnitude_db: Estimate {
+                    value: 20.0 * held.norm().log10(),
+                    standard_error: error(0).map(|e| e * 20.0 / std::f64::consts::LN_10),
+                },
+                phase_deg: Estimate {
+                    value: held.arg().to_degrees(),
+                    standard_error: error(1).map(f64::to_degrees),
+                },
+            }
+        };
+        Some(omega_rad_s.iter().map(point).collect())
+    }
+
+    /// What is shown, in whole samples, s.
+    fn lead_s(&self, sample_time: SampleTime) -> f64 {
+        lead(self.preview_s, sample_time) as f64 * sample_time.s()
+    }
+}
+
+/// Samples of the future that are shown.
+fn lead(preview_s: f64, sample_time: SampleTime) -> usize {
+    (preview_s / sample_time.s()).round() as usize
+}
+
+/// The channels of the records: their values without what was taken out of e and u.
+#[derive(Debug)]
+pub(super) struct Seen<'s> {
+    all: &'s [SeenChannel],
+    /// Of each channel, of each record.
+    values: Vec<Vec<Vec<f64>>>,
+    leads: Vec<usize>,
+}
+
+impl<'s> Seen<'s> {
+    /// The channels, and the records as far as all of them have samples.
+    ///
+    /// # Errors
+    /// [`IdentError::BadOption`] for a channel that a record lacks, that is constant, or that is a sum of other inputs.
+    pub fn of(
+        records: Vec<Record>,
+        all: &'s [SeenChannel],
+        detrend: Detrend,
+    ) -> Result<(Vec<Record>, Self), IdentError> {
+        let refuse = |found: String, expected: &str| {
+            Err(IdentError::BadOption {
+                option: "the inputs".to_owned(),
+                found,
+                expected: expected.to_owned(),
+            })
+        };
+        let Some(first) = records.first().filter(|_| !all.is_empty()) else {
+            let none = Self {
+                all,
+                values: Vec::new(),
+                leads: Vec::new(),
+            };
+            return Ok((records, none));
+        };
+        let sample_time = first.sample_time();
+        for channel in all {
+            let shown = channel.preview_s;
+            if !(shown.is_finite() && (0.0..=10.0).contains(&shown)) {
+                return refuse(
+                    format!("{} with {shown} s of its future", channel.name),
+                    "0 to 10 s that are shown",
+                );
+            }
+        }
+        let leads: Vec<usize> = all.iter().map(|c| lead(c.preview_s, sample_time)).collect();
+        let longest = leads.iter().copied().max().unwrap_or(0);
+        let mut values = vec![Vec::with_capacity(records.len()); all.len()];
+        let mut cut = Vec::with_capacity(records.len());
+        for record in records {
+            let left = record.len().saturating_sub(longest);
+            if left == 0 {
+                return refuse(
+                    format!("{} samples of {}", record.len(), record.label()),
+                    "more than the future that is shown has",
+                );
+            }
+            for ((channel, &lead), values) in all.iter().zip(&leads).zip(&mut values) {
+                let Some(found) = record.channel(&channel.name) else {
+                    let names: Vec<&str> = record.channels().map(|c| c.name.as_str()).collect();
+                    return refuse(
+                        format!("no channel {} in {}", channel.name, record.label()),
+                        &format!("one of {}", names.join(", ")),
+                    );
+                };
+                values.push(detrend.taken_out(&found[lead..lead + left]));
+            }
+            cut.push(if longest == 0 {
+                record
+            } else {
+                record.span(record.time_s(0), record.time_s(left))?
+            });
+        }
+        let found = Self { all, values, leads };
+        found.check(&cut)?;
+        Ok((cut, found))
+    }
+
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.all.is_empty()
+    }
+
+    /// Inputs that are constant, or combinations of those before them: `r = e + y` of the three signals of one loop.
+    fn check(&self, records: &[Record]) -> Result<(), IdentError> {
+        let refuse = |found: String, expected: String| {
+            Err(IdentError::BadOption {
+                option: "the inputs".to_owned(),
+                found,
+                expected,
+            })
+        };
+        let whole = |of: &dyn Fn(usize) -> Vec<f64>| -> Vec<f64> { (0..records.len()).flat_map(of).collect() };
+        let mut names = vec!["e"];
+        let mut basis = vec![whole(&|k| Detrend::Mean.taken_out(records[k].input()))];
+        for (channel, values) in self.all.iter().zip(&self.values) {
+            let own = whole(&|k| Detrend::Mean.taken_out(&values[k]));
+            let power = dot(&own, &own);
+            if power <= 0.0 {
+                return refuse(
+                    format!("{} is constant", channel.name),
+                    format!(
+                        "inputs that move; drop {}: a response to it leaves no trace",
+                        channel.name
+                    ),
+                );
+            }
+            // Twice: the second time takes out the rounding of the first.
+            let mut left = own;
+            for _ in 0..2 {
+                for known in &basis {
+                    let size = dot(known, known);
+                    if size > 0.0 {
+                        let share = dot(known, &left) / size;
+                        left.iter_mut().zip(known).for_each(|(x, k)| *x -= share * k);
+                    }
+                }
+            }
+            if dot(&left, &left) <= LEAST_OWN_PART * power {
+                return refuse(
+                    format!("{} is a sum of {}", channel.name, names.join(" and ")),
+                    format!(
+                        "inputs of which none follows from the others, as r = e + y does; drop one of {}, {}",
+                        names.join(", "),
+                        channel.name
+                    ),
+                );
+            }
+            names.push(&channel.name);
+            basis.push(left);
+        }
+        Ok(())
+    }
+
+    /// First sample that all channels leave without anything from before the record, noise left out.
+    pub fn first_regressed_sample(&self, neuromuscular: bool, sampling: (SampleTime, Intersample)) -> usize {
+        let (sample_time, intersample) = sampling;
+        let muscles = if neuromuscular { 2 } else { 0 };
+        let of = |(channel, lead): (&SeenChannel, &usize)| {
+            let gains = |form: &Form| intersample.gains(usize::from(form.has_pole()) + muscles, form.degree());
+            let most = channel.forms.iter().map(gains).max().unwrap_or(1);
+            *lead + (LONGEST_DELAY_S / sample_time.s()).ceil() as usize + 2 + most
+        };
+        self.all.iter().zip(&self.leads).map(of).max().unwrap_or(0)
+    }
+
+    /// The responses to e and to each channel, by one regression, without a form.
+    ///
+    /// # Errors
+    /// [`IdentError::SingularRegressors`] where the records do not tell the inputs apart.
+    pub fn responses(&self, records: &[Record]) -> Result<Vec<Vec<MeasuredResponse>>, IdentError> {
+        let ts = records[0].sample_time().s();
+        let shortest = records.iter().map(Record::len).min().unwrap_or(0);
+        let inputs = self.all.len() + 1;
+        let mut na = POLES.min(shortest / 12).max(2);
+        let mut nb = (RESPONSE_S / ts).ceil() as usize;
+        nb = nb.clamp(FEWEST, MOST_GAINS).min(shortest / (8 * inputs)).max(2);
+        loop {
+            if let Some(found) = self.regressed(records, na, nb) {
+                return Ok(found);
+            }
+            if na.max(nb) <= FEWEST {
+                let names = self.all.iter().map(|c| c.name.clone()).collect::<Vec<_>>().join(", ");
+                return Err(IdentError::SingularRegressors {
+                    columns: format!("e, {names} and their pasts"),
+                });
+            }
+            (na, nb) = (na.div_ceil(2).max(2), nb.div_ceil(2).max(2));
+        }
+    }
+
+    fn regressed(&self, records: &[Record], na: usize, nb: usize) -> Option<Vec<Vec<MeasuredResponse>>> {
+        let sample_time = records[0].sample_time();
+        let orders = hoid_model::Orders {
+            na,
+            nb,
+            nk: 1,
+            ..hoid_model::Orders::default()
+        };
+        let mut further = Vec::with_capacity(self.values.len());
+        for (values, lead) in self.values.iter().zip(&self.leads) {
+            further.push(FurtherInput {
+                orders: InputOrders {
+                    // The delay to the end of what is shown comes on top.
+                    nb: (nb + lead).min(2 * MOST_GAINS),
+                    nf: 0,
+                    nk: 0,
+                },
+                values: values.iter().map(Vec::as_slice).collect(),
+            });
+        }
+        let late = further.iter().map(|f| f.orders.first_regressed_sample()).max();
+        let first = orders.first_regressed_sample().max(late.unwrap_or(0));
+        if records.iter().any(|record| record.len() <= first) {
+            return None;
+        }
+        let counts: Vec<usize> = std::iter::once(nb).chain(further.iter().map(|f| f.orders.nb)).collect();
+        let criterion = Criterion {
+            orders,
+            data: Data::of(records),
+            initial: InitialState::Estimate,
+            first,
+            weights: None,
+            further,
+        };
+        let p = na + counts.iter().sum::<usize>();
+        let n = criterion.residuals();
+        if n <= 2 * p {
+            return None;
+        }
+        let mut at = criterion.linearise(&vec![0.0; p], &mut Workspace::of_thread());
+        // A sum of few sines determines as few combinations of its past: the response at its lines, and no more.
+        (0..p).for_each(|i| at.gram[i * p + i] *= 1.0 + RIDGE);
+        let theta = solve_symmetric(&at.gram, &at.descent)?;
+        let squares = (at.sum_of_squares - dot(&theta, &at.descent)).max(0.0);
+        // Never better known than the rounding of such a regression.
+        let variance = squares.max(1e-12 * at.sum_of_squares) / (n - p) as f64;
+        let mut inverse = vec![0.0; p * p];
+        for i in 0..p {
+            let mut unit = vec![0.0; p];
+            unit[i] = 1.0;
+            inverse[i * p..(i + 1) * p].copy_from_slice(&solve_symmetric(&at.gram, &unit)?);
+        }
+        let highest = BAND_RAD_S.1.min(0.8 * sample_time.nyquist_rad_s());
+        let mut at = na;
+        let mut all = Vec::with_capacity(counts.len());
+        for (input, count) in counts.into_iter().enumerate() {
+            let (places, nk) = (at..at + count, usize::from(input == 0));
+            at += count;
+            let point = |i: usize| {
+                let omega = BAND_RAD_S.0 * (highest / BAND_RAD_S.0).powf(i as f64 / (POINTS as f64 - 1.0));
+                let back = |k: usize| Complex64::from_polar(1.0, -omega * sample_time.s() * k as f64);
+                let a = (1..=na).fold(Complex64::new(1.0, 0.0), |sum, k| sum + theta[k - 1] * back(k));
+                let b: Complex64 = places.clone().map(|k| theta[k] * back(k - places.start + nk)).sum();
+                let response = b / a;
+                let slope = |k: usize| {
+                    if k < na {
+                        -response * back(k + 1) / a
+                    } else if places.contains(&k) {
+                        back(k - places.start + nk) / a
+                    } else {
+                        Complex64::new(0.0, 0.0)
+                    }
+                };
+                let slopes: Vec<Complex64> = (0..p).map(slope).collect();
+                let along = |part: fn(&Complex64) -> f64| {
+                    let gradient: Vec<f64> = slopes.iter().map(part).collect();
+                    variance * hoid_model::uncertainty::variance_along(&gradient, &inverse)
+                };
+                let found = along(|z| z.re) + along(|z| z.im);
+                MeasuredResponse {
+                    omega_rad_s: omega,
+                    response,
+                    variance: found.max(1e-6 * response.norm_sqr()),
+                }
+            };
+            all.push((0..POINTS).map(point).collect());
+        }
+        Some(all)
+    }
+
+    /// Every channel with the form that lies nearest to its response.
+    ///
+    /// # Errors
+    /// [`IdentError::NoFiniteLoss`] where no form could be fitted to a response.
+    pub fn begun(
+        &self,
+        responses: &[Vec<MeasuredResponse>],
+        neuromuscular: bool,
+        sampling: (SampleTime, Intersample),
+        search: &SearchOptions,
+    ) -> Result<Vec<Vec<Channel<'_>>>, IdentError> {
+        let mut all = Vec::with_capacity(self.all.len());
+        for (k, channel) in self.all.iter().enumerate() {
+            let shown_s = self.leads[k] as f64 * sampling.0.s();
+            let range = (sampling.1.shortest_delay_s(sampling.0), shown_s + LONGEST_DELAY_S);
+            let mut forms: Vec<(f64, Channel<'_>)> = Vec::new();
+            for &form in channel.forms.iter().filter(|form| form.is_proper(neuromuscular)) {
+                let prior = OperatorPrior::population().of_muscles();
+                let points = &responses[k + 1];
+                let criterion = ResponseCriterion::new(form, neuromuscular, points, &prior, range, sampling);
+                let Ok(found) = criterion.fit_from_grid(search, Grid::Usual) else {
+                    continue;
+                };
+                let limits = coordinates::limits(form, neuromuscular, range, sampling.0);
+                let own = |coordinate: &Coordinate| !matches!(coordinate, Coordinate::LogOmega | Coordinate::LogZeta);
+                let coordinates = form.coordinates(neuromuscular);
+                let places: Vec<usize> = (0..coordinates.len()).filter(|&i| own(&coordinates[i])).collect();
+                let cost = found.chi_squared + 2.0 * places.len() as f64;
+                forms.push((
+                    cost,
+                    Channel {
+                        index: k,
+                        form,
+                        limits: places.iter().map(|&i| limits[i]).collect(),
+                        start: places.iter().map(|&i| found.coordinates[i]).collect(),
+                        values: self.values[k].iter().map(Vec::as_slice).collect(),
+                    },
+                ));
+            }
+            if forms.is_empty() {
+                return Err(IdentError::NoFiniteLoss);
+            }
+            forms.sort_by(|a, b| a.0.total_cmp(&b.0));
+            all.push(forms.into_iter().map(|(_, channel)| channel).collect());
+        }
+        Ok(all)
+    }
+
+    /// The forms of the channels by prediction error, beside this form of the operator from these coordinates: leaves in
+    /// the prediction those that have a response, and returns what was compared.
+    ///
+    /// # Errors
+    /// [`IdentError::NoFiniteLoss`] where nothing could be fitted.
+    pub fn choose<'a>(
+        &self,
+        prediction: &mut Prediction<'a>,
+        begun: Vec<Vec<Channel<'a>>>,
+        (form, starts): ((Form, bool), &[Vec<f64>]),
+        noise: NoiseOrders,
+        workspace: &mut Workspace,
+    ) -> Result<Vec<ChannelFit>, IdentError> {
+        let mut compared = Vec::with_capacity(begun.len());
+        for (k, forms) in begun.into_iter().enumerate() {
+            let asked = &self.all[k];
+            let others: Vec<Channel<'a>> = prediction.channels.iter().filter(|c| c.index != k).cloned().collect();
+            let mut best_of = |channel: Option<&Channel<'a>>| -> Option<PredictionFit<'a>> {
+                let tried = Prediction {
+                    channels: others.iter().chain(channel).cloned().collect(),
+                    ..prediction.clone()
+                };
+                let fits = starts
+                    .iter()
+                    .filter_map(|start| tried.fit(form, noise, start, workspace).ok());
+                fits.min_by(|a, b| a.objective().total_cmp(&b.objective()))
+            };
+            let without = best_of(None);
+            let fits: Vec<(Channel<'a>, Option<PredictionFit<'a>>)> = (forms.into_iter())
+                .map(|channel| {
+                    let fit = best_of(Some(&channel));
+                    (channel, fit)
+                })
+                .collect();
+            let inflation = fits.iter().filter_map(|(_, fit)| Some(fit.as_ref()?.inflation));
+            let inflation = inflation.fold(f64::NAN, f64::min);
+            let value = |fit: &PredictionFit<'a>| {
+                fit.residuals as f64 * fit.loss.ln() / inflation + 2.0 * fit.parameters() as f64
+            };
+            let best = (fits.iter())
+                .filter_map(|(channel, fit)| Some((channel, fit.as_ref()?)))
+                .min_by(|a, b| value(a.1).total_cmp(&value(b.1)));
+            let (best, fit) = best.ok_or(IdentError::NoFiniteLoss)?;
+            let p_value = without.as_ref().map_or(0.0, |without| {
+                let ratio = fit.residuals as f64 * (without.loss / fit.loss).ln() / inflation;
+                let more = fit.parameters().saturating_sub(without.parameters()).max(1);
+                let chance = ChiSquared::new(more as f64).map_or(1.0, |chi| chi.sf(ratio.max(0.0)));
+                (chance * fits.len() as f64).min(1.0)
+            });
+            let least = std::iter::once(value(fit))
+                .chain(without.as_ref().map(value))
+                .fold(f64::INFINITY, f64::min);
+            let row = |form: Option<Form>, fit: Option<&PredictionFit<'a>>| ChannelForm {
+                form,
+                loss: fit.map(|fit| fit.loss),
+                criterion: fit.map(|fit| value(fit) - least),
+            };
+            let mut rows = vec![row(None, without.as_ref())];
+            rows.extend(fits.iter().map(|(channel, fit)| row(Some(channel.form), fit.as_ref())));
+            compared.push(ChannelFit {
+                name: asked.name.clone(),
+                role: asked.role,
+                preview_s: asked.preview_s,
+                forms: rows,
+                p_value,
+                response: None,
+            });
+            let has_response = p_value < BY_CHANCE || asked.forms.len() == 1;
+            let chosen = has_response.then(|| {
+                let own = &fit.layout().channels[others.len()];
+                Channel {
+                    start: fit.eta()[own.place..own.place + own.limits.len()].to_vec(),
+                    ..best.clone()
+                }
+            });
+            prediction.channels = others.into_iter().chain(chosen).collect();
+            prediction.channels.sort_by_key(|channel| channel.index);
+        }
+        Ok(compared)
+    }
+}
+
+/// A channel beside the error in one form: what a prediction needs of it.
+#[derive(Debug, Clone)]
+pub(super) struct Channel<'a> {
+    /// Which of the channels that were asked for.
+    pub index: usize,
+    pub form: Form,
+    /// Bounds and start of its own coordinates.
+    pub limits: Vec<(f64, f64)>,
+    pub start: Vec<f64>,
+    /// Its values in each record.
+    pub values: Vec<&'a [f64]>,
+}
+
+impl Channel<'_> {
+    pub fn in_layout(&self) -> ChannelInLayout {
+        ChannelInLayout {
+            form: self.form,
+            limits: self.limits.clone(),
+            start: self.start.clone(),
+            place: 0,
+        }
+    }
+}
+
+/// Puts the responses of the final fit into what was compared.
+///
+/// # Errors
+/// Those of the operator.
+pub(super) fn with_responses(
+    mut compared: Vec<ChannelFit>,
+    prediction: &Prediction<'_>,
+    fit: &PredictionFit<'_>,
+    errors: &Errors,
+) -> Result<Vec<ChannelFit>, IdentError> {
+    let layout = fit.layout();
+    let p = fit.parameters();
+    for (channel, own) in prediction.channels.iter().zip(&layout.channels) {
+        let places = layout.places_of(own, 0);
+        let operator = layout.channel(fit.eta(), own, 0)?;
+        let of = |c: &Covariances| -> Vec<f64> {
+            let pairs = places.iter().flat_map(|&i| places.iter().map(move |&j| (i, j)));
+            pairs.map(|(i, j)| c.clustered[i * p + j]).collect()
+        };
+        let covariance = errors.covariances.as_ref().map(of);
+        let limits: Vec<(f64, f64)> = places.iter().map(|&i| layout.limits()[i]).collect();
+        let known = Known {
+            operator: &operator,
+            covariance: covariance.as_deref(),
+            prior_share: &vec![0.0; places.len()],
+            limits: &limits,
+            profile: &vec![None; places.len()],
+            quantile: errors.quantile(),
+            run_to_run: errors.run_to_run,
+        };
+        let target = &mut compared[channel.index];
+        let shown_s = target.lead_s(layout.sample_time);
+        let muscles = [Coordinate::LogOmega, Coordinate::LogZeta].map(Coordinate::parameter);
+        let parameters = known.parameters().into_iter();
+        let own = parameters.filter(|parameter| !muscles.contains(&parameter.name.as_str()));
+        let parameters = own.map(|parameter| {
+            if parameter.name == Coordinate::Delay.parameter() {
+                let delay = |tau: f64| tau - shown_s;
+                Parameter {
+                    name: "tau_f".to_owned(),
+                    value: delay(parameter.value),
+                    interval: parameter.interval.map(|(low, high)| (delay(low), delay(high))),
+                    // Zero is a delay as any other.
+                    determined: parameter.standard_error.is_some(),
+                    ..parameter
+                }
+            } else {
+                parameter
+            }
+        });
+        target.response = Some(ChannelResponse {
+            parameters: parameters.collect(),
+            operator: operator.clone(),
+            covariance: covariance.clone(),
+        });
+    }
+    Ok(compared)
+}
+
+/// u of a record without the responses to channels beside the error, from rest.
+///
+/// # Errors
+/// [`IdentError`] for a record without one of them.
+pub(super) fn without_channels(
+    channels: &[ChannelFit],
+    record: &Record,
+    (detrend, intersample): (Detrend, Intersample),
+) -> Result<Record, IdentError> {
+    let asked: Vec<SeenChannel> = (channels.iter())
+        .map(|channel| SeenChannel {
+            preview_s: channel.preview_s,
+            ..SeenChannel::new(channel.name.clone(), channel.role)
+        })
+        .collect();
+    let label = record.label().to_owned();
+    let (mut cut, seen) = Seen::of(vec![record.clone()], &asked, detrend)?;
+    let Some(record) = cut.pop() else {
+        return Ok(record.clone());
+    };
+    let mut total = vec![0.0; record.len()];
+    for (channel, values) in channels.iter().zip(&seen.values) {
+        let Some(found) = &channel.response else { continue };
+        let held = intersample.discrete(&found.operator, None, record.sample_time())?;
+        let mut response = vec![0.0; record.len()];
+        fir(&held.b, held.nk, &values[0], &mut response);
+        divide_in_place(&held.f, &mut response);
+        add_scaled(&mut total, -1.0, &response);
+    }
+    let mut of_output = false;
+    let left = record.map_signals(|values| {
+        if std::mem::replace(&mut of_output, true) {
+            add_scaled(values, 1.0, &total);
+        }
+    })?;
+    Ok(left.labelled(label))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::TAU;
+
+    use hoid_model::Channel as Signal;
+    use rand_chacha::{
+        ChaCha8Rng,
+        rand_core::{Rng, SeedableRng},
+    };
+
+    use super::*;
+    use crate::family::FamilyEstimator;
+
+    const TS: f64 = 0.02;
+
+    /// A normal deviate.
+    fn normal(random: &mut ChaCha8Rng) -> f64 {
+        let mut uniform = || (random.next_u64() >> 11) as f64 / (1_u64 << 53) as f64;
+        (0..12).map(|_| uniform()).sum::<f64>() - 6.0
+    }
+
+    /// A sum of sines on these periods of 40 s.
+    fn sines(lines: &[u32], t: f64) -> f64 {
+        let one = |(i, k): (usize, &u32)| (TAU * f64::from(*k) / 40.0 * t + 2.4 * i as f64 * i as f64).sin();
+        lines.iter().enumerate().map(one).map(|x| 0.5 * x).sum()
+    }
+
+    /// A person on 4/s who sees e and r, `preview` samples of r ahead; 80 s.
+    fn run(operator: &FamilyOperator, target: Option<&FamilyOperator>, preview: usize, seed: u64) -> Record {
+        let ts = SampleTime::new(TS).unwrap();
+        let n = 4000;
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let own = operator.hold(ts).unwrap();
+        let of_target = target.map(|target| target.hold(ts).unwrap());
+        let shown: Vec<f64> = (0..n + preview)
+            .map(|k| sines(&[3, 7, 13, 19, 31, 43, 61], k as f64 * TS))
+            .collect();
+        let (mut e, mut u, mut y, mut w, mut v) =
+            (vec![0.0; n], vec![0.0; n], vec![0.0; n], vec![0.0; n], vec![0.0; n]);
+        let past = |x: &[f64], k: usize, lag: usize| k.checked_sub(lag).map_or(0.0, |at| x[at]);
+        let mut slow = 0.0;
+        for k in 0..n {
+            let d = 0.5 * sines(&[5, 11, 17, 23, 37, 47, 67], k as f64 * TS + 11.0);
+            y[k] = past(&y, k, 1) + TS * 4.0 * (past(&u, k, 1) + d);
+            e[k] = shown[k] - y[k];
+            for (held, x, out) in [(Some(&own), &e, &mut w), (of_target.as_ref(), &shown, &mut v)] {
+                let Some(held) = held else { continue };
+                let b: f64 = held
+                    .b
+                    .iter()
+                    .enumerate()
+                    .map(|(j, b)| {
+                        let ahead = if x.len() > n { preview } else { 0 };
+                        (k + ahead).checked_sub(held.nk + j).map_or(0.0, |at| b * x[at])
+                    })
+                    .sum();
+                let f: f64 = held.f.iter().enumerate().map(|(j, f)| f * past(out, k, j + 1)).sum();
+                out[k] = b - f;
+            }
+            slow = 0.9 * slow + 0.03 * normal(&mut random);
+            u[k] = w[k] + v[k] + slow;
+        }
+        let cut = shown[..n].to_vec();
+        Record::new(ts, Signal::new("e", "", e), Signal::new("u", "", u))
+            .unwrap()
+            .with_channel(Signal::new("r", "", cut))
+            .unwrap()
+            .with_channel(Signal::new("y", "", y))
+            .unwrap()
+    }
+
+    fn operators() -> (FamilyOperator, FamilyOperator) {
+        let muscles = [11.0_f64.ln(), 0.3_f64.ln()];
+        (
+            FamilyOperator::new(Form::Gain, true, &[0.6, muscles[0], muscles[1], 0.22]).unwrap(),
+            FamilyOperator::new(Form::Derivative, true, &[0.15, muscles[0], muscles[1], 0.2]).unwrap(),
+        )
+    }
+
+    fn estimator() -> FamilyEstimator {
+        FamilyEstimator {
+            intersample: Intersample::Zoh,
+            channels: vec![SeenChannel::new("r", ChannelRole::Feedforward)],
+            ..FamilyEstimator::default()
+        }
+    }
+
+    fn within(parameters: &[Parameter], name: &str, truth: f64) -> f64 {
+        let found = parameters
+            .iter()
+            .find(|p| p.name == name)
+            .unwrap_or_else(|| panic!("{name}: {parameters:?}"));
+        (found.value - truth) / found.standard_error.unwrap()
+    }
+
+    #[test]
+    fn both_responses_of_a_person_are_found() {
+        let (operator, target) = operators();
+        let record = run(&operator, Some(&target), 0, 3);
+        let fit = estimator().fit(std::slice::from_ref(&record)).unwrap();
+        let of = &fit.operators[0].parameters;
+        let [channel] = fit.channels.as_slice() else {
+            panic!("one channel")
+        };
+        let response = channel.response.as_ref().unwrap();
+        println!("{of:#?} {channel:#?}");
+        assert_eq!(response.operator.form(), Form::Derivative, "{channel:?}");
+        for (all, name, truth) in [
+            (of, "K", 0.6),
+            (of, "tau_e", 0.22),
+            (of, "omega_nm", 11.0),
+            (&response.parameters, "K_d", 0.15),
+            (&response.parameters, "tau_f", 0.2),
+        ] {
+            assert!(
+                within(all, name, truth).abs() < 3.0,
+                "{name} {}",
+                within(all, name, truth)
+            );
+        }
+        // With one input the response to e is another one.
+        let one = FamilyEstimator {
+            channels: Vec::new(),
+            forms: vec![Form::Gain],
+            ..estimator()
+        };
+        let one = one.fit(std::slice::from_ref(&record)).unwrap();
+        assert!(within(&one.operators[0].parameters, "K", 0.6).abs() > 3.0);
+    }
+
+    #[test]
+    fn channels_as_typed() {
+        for text in ["r=feedforward", "r=feedforward:0.5", "phi=motion", "r=output/lag", "r=feedforward:0.25/derivative"] {
+            assert_eq!(text.parse::<SeenChannel>().unwrap().to_string(), text);
+        }
+        assert_eq!("r".parse::<SeenChannel>().unwrap(), SeenChannel::new("r", ChannelRole::Feedforward));
+        for wrong in ["", "=motion", "r=sight", "r=feedforward:x", "r=feedforward:-1", "r=feedforward/bend"] {
+            assert!(wrong.parse::<SeenChannel>().is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn what_is_not_there_is_not_found() {
+        let (operator, _) = operators();
+        for seed in 0..4 {
+            let record = run(&operator, None, 0, seed);
+            let fit = estimator().fit(&[record]).unwrap();
+            assert!(fit.channels[0].response.is_none(), "{:?}", fit.channels[0]);
+            assert!(fit.channels[0].p_value >= BY_CHANCE);
+        }
+    }
+
+    #[test]
+    fn a_future_that_is_shown_makes_a_negative_delay() {
+        let (operator, target) = operators();
+        let record = run(&operator, Some(&target), 20, 5);
+        let shown = SeenChannel {
+            preview_s: 0.4,
+            ..SeenChannel::new("r", ChannelRole::Feedforward)
+        };
+        let estimator = FamilyEstimator {
+            channels: vec![shown],
+            ..estimator()
+        };
+        let fit = estimator.fit(&[record]).unwrap();
+        let response = fit.channels[0].response.as_ref().unwrap();
+        println!("{response:#?}");
+        assert!(within(&response.parameters, "tau_f", -0.2).abs() < 3.0);
+    }
+
+    #[test]
+    fn inputs_that_say_nothing_are_refused() {
+        let (operator, target) = operators();
+        let record = run(&operator, Some(&target), 0, 3);
+        let of = |names: &[&str]| {
+            let channels = names.iter().map(|name| SeenChannel::new(*name, ChannelRole::Output));
+            let estimator = FamilyEstimator {
+                channels: channels.collect(),
+                ..estimator()
+            };
+            estimator.fit(std::slice::from_ref(&record)).unwrap_err().to_string()
+        };
+        assert!(of(&["r", "y"]).contains("y is a sum of e and r"), "{}", of(&["r", "y"]));
+        assert!(of(&["q"]).contains("no channel q"), "{}", of(&["q"]));
+        let still = record
+            .clone()
+            .with_channel(Signal::new("s", "", vec![2.0; record.len()]))
+            .unwrap();
+        let estimator = FamilyEstimator {
+            channels: vec![SeenChannel::new("s", ChannelRole::Motion)],
+            ..estimator()
+        };
+        let error = estimator.fit(&[still]).unwrap_err().to_string();
+        assert!(error.contains("s is constant"), "{error}");
+    }
+}
