@@ -114,7 +114,9 @@ impl BatchAnswer for FamilyFit {
 fn channels(found: &Identified) -> Value {
     let fit = &found.fit;
     let sampling = (fit.sample_time, fit.intersample);
-    let error = found.data.records[0].input_channel().map_or("e", |channel| channel.name.as_str());
+    let error = found.data.records[0]
+        .input_channel()
+        .map_or("e", |channel| channel.name.as_str());
     let feedback = json!({
         "input": error,
         "role": "feedback",

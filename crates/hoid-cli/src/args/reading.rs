@@ -11,7 +11,12 @@ use super::choices::choice_of;
 pub struct ReadArgs {
     /// Column of the input (tracking error): a name, -name, or a difference such as r-y. Repeated: columns of
     /// what the person sees besides, as --input r-y --input r (see --role)
-    #[arg(long = "input", value_name = "COLUMN", default_value = "e", allow_hyphen_values = true)]
+    #[arg(
+        long = "input",
+        value_name = "COLUMN",
+        default_value = "e",
+        allow_hyphen_values = true
+    )]
     pub inputs: Vec<String>,
     /// Column of the output (control): a name, -name, or a difference
     #[arg(long, value_name = "COLUMN", default_value = "u", allow_hyphen_values = true)]

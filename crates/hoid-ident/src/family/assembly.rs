@@ -10,12 +10,13 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::{
     agreement::{Agreement, AgreementMethod, Side, agreement, with_level},
+    channel_lines::{AtChannelLines, InForm, tells_apart},
     channels::{ChannelFit, with_responses},
     choice::FormFigures,
     covariances::response_errors,
     estimated::{Errors, Estimated, in_form, operator_of},
     instrumental::{Instrumental, InstrumentalFit},
-    joint::with_lines,
+    joint::{Lines, with_lines},
     judgement::{Judged, LARGEST_RESPONSE_ERROR, findings},
     line_fit::LineFit,
     lines::LineData,
@@ -39,6 +40,10 @@ use crate::{
 /// What the lines of the excitation gave for a form.
 pub(super) struct AtLines<'d> {
     pub describing: Option<&'d DescribingFunction>,
+    /// The lines of several inputs, where there are such.
+    pub channels: Option<AtChannelLines<'d>>,
+    /// Their forms.
+    pub in_form: Vec<InForm>,
     pub fit: Option<LineFit>,
     /// Why there is no fit, where one was wanted.
     pub why_none: Option<String>,
@@ -154,6 +159,7 @@ impl<'a> Chosen<'_, 'a> {
             cluster_kind: fit.clusters.kind,
             clusters: fit.clusters.parts.len(),
             has_covariance: errors.covariances.is_some(),
+            apart: self.channels.is_empty() || self.prediction.channels.is_empty() || self.tells_apart(),
             response_error: response_errors(&operators[0].operator, operators[0].covariance.as_deref())
                 .and_then(|errors| errors.into_iter().min_by(f64::total_cmp)),
             weighed: &weighed,
@@ -205,8 +211,19 @@ impl<'a> Chosen<'_, 'a> {
         if separate > 1 || self.prediction.noise_free().is_some() {
             return None;
         }
-        let data = LineData::new(self.lines.describing?);
+        let data = match (&self.lines.channels, self.lines.describing) {
+            (Some(at), _) => Lines::Channels(at.criterion(fit.layout().form, &self.lines.in_form)),
+            (None, Some(describing)) => Lines::Response(LineData::new(describing)),
+            (None, None) => return None,
+        };
         with_lines(self.prediction, fit, (lines?, &data), workspace)
+    }
+
+    /// Whether every input has lines of its own.
+    fn tells_apart(&self) -> bool {
+        let names: Vec<String> = self.channels.iter().map(|channel| channel.name.clone()).collect();
+        let lines = self.lines.channels.as_ref().map(|at| at.lines.as_ref());
+        tells_apart(lines, &names)
     }
 
     /// Refined instrumental variables with the recorded excitation, for one operator of all records.
@@ -277,10 +294,10 @@ fn add_bias(
             let owes: Vec<bool> = (lines.prior_shares.iter())
                 .map(|share| *share > LARGEST_SHARE_AT_LINES)
                 .collect();
-            covariances.add_bias(fit, lines.operator.coordinates());
+            covariances.add_bias(fit, &lines.elements());
             if owes.contains(&true) {
                 for other in others {
-                    covariances.add_besides(fit, other, 1.0, |place| owes[place]);
+                    covariances.add_besides(fit, other, 1.0, |place| owes.get(place) == Some(&true));
                 }
             }
         }

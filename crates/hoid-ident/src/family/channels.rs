@@ -10,14 +10,14 @@
 //! (L. Ljung, *System Identification*, 1999, sections 13.4 and 13.5). Each form is fitted to its responses; searches from
 //! elsewhere end in other minima.
 //!
-//! **Forms** of a channel are compared by prediction errors, in units of the inflation kappa, no response at all among
-//! them: that one is given up where the likelihood ratio of the best form is beyond what chance gives in one of a hundred
+//! **Forms** of a channel are compared at the lines of what excites the loop ([`super::channel_lines`]), where there are
+//! lines, else by prediction errors, in units of the inflation kappa; no response at all is among them: that one is given up where the likelihood ratio of the best form is beyond what chance gives in one of a hundred
 //! records without a response, divided by the number of forms that were tried (Bonferroni).
 //!
 //! **A future that is shown** makes delays that are negative: x is taken from as many samples ahead as are shown, and what
 //! is fitted is the delay to that.
 
-use std::{fmt, str::FromStr};
+use std::{fmt, str::FromStr, sync::Arc};
 
 use hoid_core::filter::{divide_in_place, fir};
 use hoid_model::{
@@ -26,6 +26,7 @@ use hoid_model::{
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::{
+    channel_lines::{AtChannelLines, ChannelLines, ChannelMinimum, InForm, own_places},
     coordinates::{self, Grid},
     covariances::Covariances,
     estimated::Errors,
@@ -146,7 +147,10 @@ impl FromStr for SeenChannel {
         let mut channel = Self::new(name.trim(), role);
         if let Some(shown) = shown {
             let seconds = shown.trim().trim_end_matches('s').parse::<f64>();
-            channel.preview_s = seconds.ok().filter(|s| *s >= 0.0 && s.is_finite()).ok_or_else(expected)?;
+            channel.preview_s = seconds
+                .ok()
+                .filter(|s| *s >= 0.0 && s.is_finite())
+                .ok_or_else(expected)?;
         }
         if let Some(form) = form {
             channel.forms = vec![form.trim().parse::<Form>().map_err(|error| error.to_string())?];
@@ -230,6 +234,26 @@ impl ChannelFit {
     }
 }
 
+impl ChannelFit {
+    /// What was compared, its response not yet known.
+    fn compared(asked: &SeenChannel, forms: Vec<ChannelForm>, p_value: f64) -> Self {
+        Self {
+            name: asked.name.clone(),
+            role: asked.role,
+            preview_s: asked.preview_s,
+            forms,
+            p_value,
+            response: None,
+        }
+    }
+}
+
+/// Probability of a likelihood ratio as large for so many more parameters, in the best of so many forms.
+fn by_chance(ratio: f64, more: usize, forms: usize) -> f64 {
+    let chance = ChiSquared::new(more as f64).map_or(1.0, |chi| chi.sf(ratio.max(0.0)));
+    (chance * forms as f64).min(1.0)
+}
+
 /// Samples of the future that are shown.
 fn lead(preview_s: f64, sample_time: SampleTime) -> usize {
     (preview_s / sample_time.s()).round() as usize
@@ -242,6 +266,8 @@ pub(super) struct Seen<'s> {
     /// Of each channel, of each record.
     values: Vec<Vec<Vec<f64>>>,
     leads: Vec<usize>,
+    /// The records as they were, of whole periods, with what was taken out of e and u.
+    whole: Vec<Record>,
 }
 
 impl<'s> Seen<'s> {
@@ -266,6 +292,7 @@ impl<'s> Seen<'s> {
                 all,
                 values: Vec::new(),
                 leads: Vec::new(),
+                whole: Vec::new(),
             };
             return Ok((records, none));
         };
@@ -283,6 +310,7 @@ impl<'s> Seen<'s> {
         let longest = leads.iter().copied().max().unwrap_or(0);
         let mut values = vec![Vec::with_capacity(records.len()); all.len()];
         let mut cut = Vec::with_capacity(records.len());
+        let whole = records.clone();
         for record in records {
             let left = record.len().saturating_sub(longest);
             if left == 0 {
@@ -307,7 +335,12 @@ impl<'s> Seen<'s> {
                 record.span(record.time_s(0), record.time_s(left))?
             });
         }
-        let found = Self { all, values, leads };
+        let found = Self {
+            all,
+            values,
+            leads,
+            whole,
+        };
         found.check(&cut)?;
         Ok((cut, found))
     }
@@ -378,6 +411,131 @@ impl<'s> Seen<'s> {
             *lead + (LONGEST_DELAY_S / sample_time.s()).ceil() as usize + 2 + most
         };
         self.all.iter().zip(&self.leads).map(of).max().unwrap_or(0)
+    }
+
+    /// Names of the channels.
+    pub fn names(&self) -> Vec<String> {
+        self.all.iter().map(|channel| channel.name.clone()).collect()
+    }
+
+    /// The lines of what excites the loop; `None` where there are none.
+    pub fn lines(&self, excitation: Option<&str>, period_s: Option<f64>) -> Option<Arc<ChannelLines>> {
+        ChannelLines::of(&self.whole, &self.names(), (excitation, period_s)).map(Arc::new)
+    }
+
+    /// Each channel in a form.
+    fn in_form(&self, index: usize, form: Form, (sample_time, intersample): (SampleTime, Intersample)) -> InForm {
+        let lead_s = self.leads[index] as f64 * sample_time.s();
+        InForm {
+            index,
+            form,
+            lead_s,
+            delay_range_s: (intersample.shortest_delay_s(sample_time), lead_s + LONGEST_DELAY_S),
+        }
+    }
+
+    /// The lines with their variances, from the responses without a form.
+    pub fn weighed(
+        &self,
+        at: &AtChannelLines<'_>,
+        begun: &[Vec<Channel<'_>>],
+        responses: &[Vec<MeasuredResponse>],
+    ) -> Arc<ChannelLines> {
+        let nearest = |points: &Vec<MeasuredResponse>, omega: f64| {
+            let off = |p: &MeasuredResponse| (p.omega_rad_s / omega).ln().abs();
+            let near = points.iter().min_by(|a, b| off(a).total_cmp(&off(b)));
+            near.map_or(Complex64::new(0.0, 0.0), |p| p.response)
+        };
+        let flexible = begun.iter().enumerate().filter_map(|(k, forms)| {
+            let form = forms.first()?.form;
+            Some(self.in_form(k, form, at.sampling))
+        });
+        at.weighed((Form::LeadLag, &flexible.collect::<Vec<_>>()), |omega| {
+            let turned = |(k, points): (usize, &Vec<MeasuredResponse>)| {
+                let lead_s = k
+                    .checked_sub(1)
+                    .map_or(0.0, |k| self.leads[k] as f64 * at.sampling.0.s());
+                nearest(points, omega) * Complex64::from_polar(1.0, omega * lead_s)
+            };
+            responses.iter().enumerate().map(turned).collect()
+        })
+    }
+
+    /// The forms of the channels at the lines, whichever of these forms the operator has: what was compared, and those
+    /// with a response, in their forms.
+    ///
+    /// # Errors
+    /// [`IdentError::NoFiniteLoss`] where nothing could be fitted.
+    pub fn choose_at_lines<'a>(
+        &self,
+        at: &AtChannelLines<'_>,
+        operators: &[Form],
+        begun: Vec<Vec<Channel<'a>>>,
+    ) -> Result<(Vec<ChannelFit>, Vec<Channel<'a>>, Vec<InForm>), IdentError> {
+        let best_of = |channels: &[InForm]| {
+            let fits = operators
+                .iter()
+                .filter_map(|&form| Some((form, at.fit(form, channels)?)));
+            fits.min_by(|a, b| a.1.criterion().total_cmp(&b.1.criterion()))
+        };
+        let mut in_use: Vec<InForm> = (begun.iter().enumerate())
+            .filter_map(|(k, forms)| Some(self.in_form(k, forms.first()?.form, at.sampling)))
+            .collect();
+        let mut compared = Vec::with_capacity(begun.len());
+        let mut best = None;
+        for (k, asked) in self.all.iter().enumerate() {
+            let others: Vec<InForm> = in_use.iter().filter(|c| c.index != k).copied().collect();
+            let with = |form: Form| {
+                let mut all = others.clone();
+                all.push(self.in_form(k, form, at.sampling));
+                all.sort_by_key(|channel| channel.index);
+                all
+            };
+            let without = best_of(&others);
+            let fits: Vec<(Form, Option<(Form, ChannelMinimum)>)> =
+                begun[k].iter().map(|c| (c.form, best_of(&with(c.form)))).collect();
+            let found = fits.iter().filter_map(|(form, fit)| Some((*form, fit.as_ref()?)));
+            let found = found.min_by(|a, b| a.1.1.criterion().total_cmp(&b.1.1.criterion()));
+            let (form, fit) = found.ok_or(IdentError::NoFiniteLoss)?;
+            let p_value = without.as_ref().map_or(0.0, |(_, without)| {
+                let ratio = (without.chi_squared - fit.1.chi_squared) / fit.1.excess();
+                let more = fit.1.coordinates.len().saturating_sub(without.coordinates.len()).max(1);
+                by_chance(ratio, more, fits.len())
+            });
+            let least = (without.iter().chain([fit]))
+                .map(|(_, fit)| fit.criterion())
+                .fold(f64::INFINITY, f64::min);
+            let row = |form: Option<Form>, fit: Option<&(Form, ChannelMinimum)>| ChannelForm {
+                form,
+                loss: None,
+                criterion: fit.map(|(_, fit)| fit.criterion() - least),
+            };
+            let mut rows = vec![row(None, without.as_ref())];
+            rows.extend(fits.iter().map(|(form, fit)| row(Some(*form), fit.as_ref())));
+            compared.push(ChannelFit::compared(asked, rows, p_value));
+            if p_value < BY_CHANCE || asked.forms.len() == 1 {
+                in_use = with(form);
+                best = Some(fit.1.clone());
+            } else {
+                in_use = others;
+                best = without.map(|(_, fit)| fit);
+            }
+        }
+        let mut start = best.map(|fit| fit.coordinates).unwrap_or_default();
+        let own = |channel: &InForm| own_places(channel.form, at.neuromuscular).len();
+        let of_channels: usize = in_use.iter().map(own).sum();
+        start.drain(..start.len().saturating_sub(of_channels));
+        let mut channels = Vec::with_capacity(in_use.len());
+        for channel in &in_use {
+            let begun = begun[channel.index].iter().find(|c| c.form == channel.form);
+            let begun = begun.ok_or(IdentError::NoFiniteLoss)?;
+            let rest = start.split_off(own(channel).min(start.len()));
+            channels.push(Channel {
+                start: std::mem::replace(&mut start, rest),
+                ..begun.clone()
+            });
+        }
+        Ok((compared, channels, in_use))
     }
 
     /// The responses to e and to each channel, by one regression, without a form.
@@ -519,9 +677,7 @@ impl<'s> Seen<'s> {
                     continue;
                 };
                 let limits = coordinates::limits(form, neuromuscular, range, sampling.0);
-                let own = |coordinate: &Coordinate| !matches!(coordinate, Coordinate::LogOmega | Coordinate::LogZeta);
-                let coordinates = form.coordinates(neuromuscular);
-                let places: Vec<usize> = (0..coordinates.len()).filter(|&i| own(&coordinates[i])).collect();
+                let places = own_places(form, neuromuscular);
                 let cost = found.chi_squared + 2.0 * places.len() as f64;
                 forms.push((
                     cost,
@@ -589,8 +745,7 @@ impl<'s> Seen<'s> {
             let p_value = without.as_ref().map_or(0.0, |without| {
                 let ratio = fit.residuals as f64 * (without.loss / fit.loss).ln() / inflation;
                 let more = fit.parameters().saturating_sub(without.parameters()).max(1);
-                let chance = ChiSquared::new(more as f64).map_or(1.0, |chi| chi.sf(ratio.max(0.0)));
-                (chance * fits.len() as f64).min(1.0)
+                by_chance(ratio, more, fits.len())
             });
             let least = std::iter::once(value(fit))
                 .chain(without.as_ref().map(value))
@@ -602,14 +757,7 @@ impl<'s> Seen<'s> {
             };
             let mut rows = vec![row(None, without.as_ref())];
             rows.extend(fits.iter().map(|(channel, fit)| row(Some(channel.form), fit.as_ref())));
-            compared.push(ChannelFit {
-                name: asked.name.clone(),
-                role: asked.role,
-                preview_s: asked.preview_s,
-                forms: rows,
-                p_value,
-                response: None,
-            });
+            compared.push(ChannelFit::compared(asked, rows, p_value));
             let has_response = p_value < BY_CHANCE || asked.forms.len() == 1;
             let chosen = has_response.then(|| {
                 let own = &fit.layout().channels[others.len()];
@@ -775,6 +923,16 @@ mod tests {
 
     /// A person on 4/s who sees e and r, `preview` samples of r ahead; 80 s.
     fn run(operator: &FamilyOperator, target: Option<&FamilyOperator>, preview: usize, seed: u64) -> Record {
+        disturbed(operator, target, (preview, 0.5), seed)
+    }
+
+    /// The same with a disturbance of this amplitude, in the channel d.
+    fn disturbed(
+        operator: &FamilyOperator,
+        target: Option<&FamilyOperator>,
+        (preview, amplitude): (usize, f64),
+        seed: u64,
+    ) -> Record {
         let ts = SampleTime::new(TS).unwrap();
         let n = 4000;
         let mut random = ChaCha8Rng::seed_from_u64(seed);
@@ -787,9 +945,11 @@ mod tests {
             (vec![0.0; n], vec![0.0; n], vec![0.0; n], vec![0.0; n], vec![0.0; n]);
         let past = |x: &[f64], k: usize, lag: usize| k.checked_sub(lag).map_or(0.0, |at| x[at]);
         let mut slow = 0.0;
+        let mut disturbance = vec![0.0; n];
         for k in 0..n {
-            let d = 0.5 * sines(&[5, 11, 17, 23, 37, 47, 67], k as f64 * TS + 11.0);
+            let d = amplitude * sines(&[5, 11, 17, 23, 37, 47, 67], k as f64 * TS + 11.0);
             y[k] = past(&y, k, 1) + TS * 4.0 * (past(&u, k, 1) + d);
+            disturbance[k] = d;
             e[k] = shown[k] - y[k];
             for (held, x, out) in [(Some(&own), &e, &mut w), (of_target.as_ref(), &shown, &mut v)] {
                 let Some(held) = held else { continue };
@@ -814,6 +974,8 @@ mod tests {
             .with_channel(Signal::new("r", "", cut))
             .unwrap()
             .with_channel(Signal::new("y", "", y))
+            .unwrap()
+            .with_channel(Signal::new("d", "", disturbance))
             .unwrap()
     }
 
@@ -866,6 +1028,18 @@ mod tests {
                 within(all, name, truth)
             );
         }
+        assert!(fit.lines.is_some(), "the lines of d and r");
+        let together =
+            |fit: &crate::family::FamilyFit| fit.verdict.findings().iter().any(|f| f.kind == "inputs-together");
+        assert!(!together(&fit));
+        // Where the target alone moves the loop, that is said.
+        let alone = disturbed(&operator, Some(&target), (0, 0.0), 3);
+        let alone = estimator().fit(std::slice::from_ref(&alone)).unwrap();
+        assert!(
+            alone.channels[0].response.is_none() || together(&alone),
+            "{:?}",
+            alone.channels[0]
+        );
         // With one input the response to e is another one.
         let one = FamilyEstimator {
             channels: Vec::new(),
@@ -878,11 +1052,27 @@ mod tests {
 
     #[test]
     fn channels_as_typed() {
-        for text in ["r=feedforward", "r=feedforward:0.5", "phi=motion", "r=output/lag", "r=feedforward:0.25/derivative"] {
+        for text in [
+            "r=feedforward",
+            "r=feedforward:0.5",
+            "phi=motion",
+            "r=output/lag",
+            "r=feedforward:0.25/derivative",
+        ] {
             assert_eq!(text.parse::<SeenChannel>().unwrap().to_string(), text);
         }
-        assert_eq!("r".parse::<SeenChannel>().unwrap(), SeenChannel::new("r", ChannelRole::Feedforward));
-        for wrong in ["", "=motion", "r=sight", "r=feedforward:x", "r=feedforward:-1", "r=feedforward/bend"] {
+        assert_eq!(
+            "r".parse::<SeenChannel>().unwrap(),
+            SeenChannel::new("r", ChannelRole::Feedforward)
+        );
+        for wrong in [
+            "",
+            "=motion",
+            "r=sight",
+            "r=feedforward:x",
+            "r=feedforward:-1",
+            "r=feedforward/bend",
+        ] {
             assert!(wrong.parse::<SeenChannel>().is_err(), "{wrong}");
         }
     }

@@ -1,11 +1,14 @@
 //! From records of a person to their operator: the searches of each form.
 //! The steps are those of the [module](super).
 
+use std::sync::Arc;
+
 use hoid_model::{Detrend, Form, Record, Structure};
 
 use super::{
     arx_response::ArxResponse,
     assembly::{AtLines, Beside, Chosen},
+    channel_lines::AtChannelLines,
     channels::Seen,
     comparison::{Comparison, Tried},
     coordinates::Grid,
@@ -92,6 +95,15 @@ impl FamilyEstimator {
         let lines = describing.as_ref().map(LineData::new);
         // It gives starts alone: the lines do as well.
         let mut begun = Vec::new();
+        let mut channel_lines = None;
+        let at_lines = AtChannelLines {
+            lines: &Arc::default(),
+            neuromuscular: self.neuromuscular,
+            delay_range_s: prediction.delay_range_s,
+            sampling: (prediction.sample_time, prediction.intersample),
+            prior: &self.prior,
+            search: &self.search,
+        };
         let response = if seen.is_empty() {
             match ArxResponse::of(&records) {
                 Err(error) if lines.is_none() => return Err(error),
@@ -102,12 +114,34 @@ impl FamilyEstimator {
             let sampling = (prediction.sample_time, prediction.intersample);
             begun = seen.begun(&responses, self.neuromuscular, sampling, &self.search)?;
             prediction.channels = begun.iter().filter_map(|forms| forms.first().cloned()).collect();
+            let lines = seen.lines(self.excitation.as_deref(), self.period_s);
+            channel_lines = lines.map(|lines| {
+                let at = AtChannelLines {
+                    lines: &lines,
+                    ..at_lines
+                };
+                seen.weighed(&at, &begun, &responses)
+            });
             responses.swap_remove(0)
         };
         let mut workspace = Workspace::of_thread();
         let mut starts = Vec::new();
         for &form in &forms {
             starts.push(self.start(form, lines.as_ref(), (&response, Grid::Usual), &prediction)?);
+        }
+        let at_lines = (channel_lines.as_ref()).map(|lines| AtChannelLines { lines, ..at_lines });
+        let (mut channels, mut in_form) = (Vec::new(), Vec::new());
+        if let Some(at) = &at_lines {
+            (channels, prediction.channels, in_form) = seen.choose_at_lines(at, &forms, std::mem::take(&mut begun))?;
+            for start in &mut starts {
+                let Some(found) = at.fit(start.form, &in_form) else {
+                    continue;
+                };
+                let criterion = at.criterion(start.form, &in_form);
+                let operator = criterion.operator(&found.coordinates)?;
+                start.coordinates.insert(0, operator.coordinates().to_vec());
+                start.lines = Some(LineFit::of_channels(operator, &found, criterion.penalty()));
+            }
         }
         let little_noise = match seen.is_empty() {
             true => self.with_little_noise(&prediction, &records, &mut starts, &mut workspace)?,
@@ -124,8 +158,7 @@ impl FamilyEstimator {
             None => None,
         };
         let noise = noise.map_or_else(|| self.noise_orders(&prediction, &starts, &mut workspace), Ok)?;
-        let mut channels = Vec::new();
-        if !seen.is_empty() {
+        if !seen.is_empty() && at_lines.is_none() {
             let least = self.least_left(&prediction, &starts, noise.1, &mut workspace)?;
             let of = (
                 (starts[least].form, self.neuromuscular),
@@ -168,6 +201,8 @@ impl FamilyEstimator {
             weight,
             lines: AtLines {
                 describing: describing.as_ref(),
+                channels: at_lines,
+                in_form,
                 fit: lines,
                 why_none: no_lines,
             },

@@ -24,7 +24,9 @@ use std::{borrow::Cow, sync::Arc};
 use hoid_numerics::statistics::mean;
 
 use super::{
+    channel_lines::ChannelCriterion,
     covariances::{BAND_RAD_S, Covariances, covariances, response_errors},
+    layout::FamilyLayout,
     line_fit::LineFit,
     lines::LineData,
     prediction::Prediction,
@@ -32,7 +34,7 @@ use super::{
     prior::OperatorPrior,
     response_fit::{MeasuredResponse, ResponseCriterion},
 };
-use crate::{criterion::Workspace, grey_box::objective::Beside};
+use crate::{criterion::Workspace, grey_box::objective::Beside, optimize::Objective};
 
 /// Part of V_L that `V_L - V_P` is at least: both are estimates.
 const LEAST_DIFFERENCE: f64 = 0.25;
@@ -41,41 +43,71 @@ const FEWEST_RUNS: usize = 3;
 /// Largest part of the way to the lines.
 const LARGEST_SHARE: f64 = 0.9;
 
+/// The lines that stand beside the samples.
+pub(super) enum Lines<'d> {
+    /// The response to the error.
+    Response(LineData<'d>),
+    /// The responses to several inputs.
+    Channels(ChannelCriterion),
+}
+
+impl Lines<'_> {
+    fn runs(&self) -> usize {
+        match self {
+            Self::Response(data) => data.runs(),
+            Self::Channels(criterion) => criterion.runs(),
+        }
+    }
+
+    /// chi^2 over the elements of eta before the noise, all variances larger by this factor.
+    fn criterion(
+        &self,
+        layout: &FamilyLayout,
+        excess: f64,
+        delay_range_s: (f64, f64),
+    ) -> Arc<dyn Objective + Send + Sync> {
+        let data = match self {
+            Self::Channels(criterion) => return Arc::new(criterion.clone().of_lines_alone(excess)),
+            Self::Response(data) => data,
+        };
+        let points: Vec<MeasuredResponse> = (data.points.iter())
+            .map(|point| MeasuredResponse {
+                variance: point.variance * excess,
+                ..*point
+            })
+            .collect();
+        Arc::new(ResponseCriterion {
+            points: Cow::Owned(points),
+            ..ResponseCriterion::new(
+                layout.form,
+                layout.neuromuscular,
+                &[],
+                &OperatorPrior::none(),
+                delay_range_s,
+                (layout.sample_time, layout.intersample),
+            )
+        })
+    }
+}
+
 /// The fit with the lines beside it; `None` where both agree, or it has no end.
 pub(super) fn with_lines<'a>(
     prediction: &Prediction<'a>,
     fit: &PredictionFit<'a>,
-    (lines, data): (&LineFit, &LineData<'_>),
+    (lines, measured): (&LineFit, &Lines<'_>),
     workspace: &mut Workspace,
 ) -> Option<PredictionFit<'a>> {
-    if data.runs() < FEWEST_RUNS {
+    if measured.runs() < FEWEST_RUNS {
         return None;
     }
     let layout = fit.layout();
     // Lines that no operator of the form passes through are off by more than their variances.
     let excess = lines.reduced_chi_squared().unwrap_or(1.0).max(1.0);
     let weight = weight(fit, lines, excess)?;
-    let points: Vec<MeasuredResponse> = (data.points.iter())
-        .map(|point| MeasuredResponse {
-            variance: point.variance * excess,
-            ..*point
-        })
-        .collect();
-    let measured = ResponseCriterion {
-        points: Cow::Owned(points),
-        ..ResponseCriterion::new(
-            layout.form,
-            layout.neuromuscular,
-            &[],
-            &OperatorPrior::none(),
-            prediction.delay_range_s,
-            (layout.sample_time, layout.intersample),
-        )
-    };
     let mut criterion = fit.criterion.clone();
     criterion.beside = Some(Beside {
-        criterion: Arc::new(measured),
-        elements: layout.operator_elements(),
+        criterion: measured.criterion(layout, excess, prediction.delay_range_s),
+        elements: layout.noise_begins(),
         weight: weight * fit.innovation_variance * fit.inflation,
     });
     let minimum = criterion.search(fit.eta().to_vec(), &prediction.search, None, workspace)?;

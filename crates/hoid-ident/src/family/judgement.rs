@@ -59,6 +59,8 @@ pub(super) struct Judged<'a> {
     pub has_covariance: bool,
     /// Smallest relative standard error of the response over the band of manual control.
     pub response_error: Option<f64>,
+    /// Whether the inputs are told apart by what excites them, and not by their supposed forms.
+    pub apart: bool,
     /// The forms that the data leave, the one in front first.
     pub weighed: &'a [WeighedForm],
 }
@@ -85,6 +87,14 @@ pub(super) fn findings(judged: &Judged<'_>) -> Vec<Finding> {
             format!(
                 "the delay {tau:.3} s lies at the end of the range {low} to {high} s in which it was sought; widen it"
             ),
+        ));
+    }
+    if !judged.apart {
+        all.push(Finding::doubt(
+            "inputs-together",
+            "no excitation with lines of its own moves the error apart from the other inputs: their responses are told apart by the \
+             forms that are supposed, and a response to the error is none by itself; record a disturbance and a target on \
+             lines of their own, over whole periods",
         ));
     }
     determined(judged, &mut all);

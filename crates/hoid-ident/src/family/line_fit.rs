@@ -3,11 +3,12 @@
 use hoid_model::{FamilyOperator, Form, uncertainty::Estimate};
 
 use super::{
+    channel_lines::ChannelMinimum,
     jackknife::{add_open_part, jackknife},
     lines::LineData,
     response_fit::{ResponseCriterion, ResponseMinimum},
 };
-use crate::{IdentError, SearchOptions, Termination};
+use crate::{IdentError, SearchOptions, Termination, grey_box::objective::Penalty};
 
 /// Runs from which on the covariance is that of the jackknife over them.
 const FEWEST_RUNS: usize = 5;
@@ -33,6 +34,9 @@ pub struct LineFit {
     pub termination: Termination,
     /// Covariance from the variances of the lines.
     pub(super) by_lines: Option<Vec<f64>>,
+    /// Coordinates of channels beside the error, of their own.
+    #[serde(default)]
+    pub(super) of_channels: Vec<f64>,
 }
 
 impl LineFit {
@@ -44,6 +48,40 @@ impl LineFit {
     /// Sum of chi^2 of the held-out runs.
     pub fn held_out_total(&self) -> Option<f64> {
         self.held_out.as_ref().map(|runs| runs.iter().sum())
+    }
+
+    /// The operator of a fit with several inputs.
+    pub(super) fn of_channels(operator: FamilyOperator, found: &ChannelMinimum, penalty: &[Penalty]) -> Self {
+        let (p, q) = (operator.coordinates().len(), found.coordinates.len());
+        let by_lines = found.covariance.as_ref().map(|c| -> Vec<f64> {
+            let pairs = (0..p).flat_map(|i| (0..p).map(move |j| i * q + j));
+            pairs.map(|at| c[at]).collect()
+        });
+        let mut prior_shares = vec![0.0; p];
+        for penalty in penalty {
+            let variance = by_lines.as_ref().map(|c| c[penalty.place * (p + 1)]);
+            prior_shares[penalty.place] = match variance {
+                Some(v) if v > 0.0 => (v * penalty.curvature(&found.coordinates)).min(1.0),
+                _ => 1.0,
+            };
+        }
+        let excess = found.excess();
+        Self {
+            covariance: by_lines.as_ref().map(|c| c.iter().map(|v| v * excess).collect()),
+            prior_shares,
+            chi_squared: found.chi_squared,
+            degrees_of_freedom: found.degrees_of_freedom(),
+            held_out: None,
+            termination: found.minimum.termination,
+            by_lines,
+            of_channels: found.coordinates[p..].to_vec(),
+            operator,
+        }
+    }
+
+    /// The coordinates of the operator and of its channels, as they stand in eta.
+    pub(super) fn elements(&self) -> Vec<f64> {
+        [self.operator.coordinates(), &self.of_channels].concat()
     }
 
     /// The parameters by name, their errors to first order; without one where they are infinite.
@@ -104,6 +142,7 @@ pub(super) fn line_fit(
         held_out: (held_out.len() == runs && runs >= 3).then_some(held_out),
         termination: found.termination,
         by_lines,
+        of_channels: Vec::new(),
     };
     Ok((fit, found))
 }

@@ -17,7 +17,16 @@ use crate::frequency::DescribingFunction;
 /// Degrees of freedom nu_0 of what a variance is drawn towards.
 const PRIOR_FREEDOM: f64 = 8.0;
 /// Runs from which on their scatter has a say in c.
-const FEWEST_RUNS: usize = 3;
+pub(super) const FEWEST_RUNS: usize = 3;
+
+/// A variance by the scatter of so many runs, drawn towards that of the remnant beside the line.
+pub(super) fn moderated(runs: usize, of_runs: Option<f64>, beside: f64, excess: f64) -> f64 {
+    let nu = 2.0 * (runs as f64 - 1.0);
+    match of_runs {
+        Some(v) if runs >= FEWEST_RUNS => (nu * v + PRIOR_FREEDOM * excess * beside) / (nu + PRIOR_FREEDOM),
+        _ => beside,
+    }
+}
 
 /// The lines of one or several runs.
 #[derive(Debug, Clone)]
@@ -31,7 +40,6 @@ impl<'d> LineData<'d> {
         let runs = describing.runs.len();
         let lines = &describing.lines;
         let beside = |i: usize| lines[i].neighbour_error.powi(2);
-        let nu = 2.0 * (runs as f64 - 1.0);
         let mut ratios: Vec<f64> = (0..lines.len())
             .filter_map(|i| Some(lines[i].standard_error?.powi(2) / beside(i)))
             .filter(|r| r.is_finite())
@@ -41,10 +49,8 @@ impl<'d> LineData<'d> {
             Some(median) if runs >= FEWEST_RUNS => median.max(1.0),
             _ => 1.0,
         };
-        let variance = |i: usize| match lines[i].standard_error {
-            Some(s) if runs >= FEWEST_RUNS => (nu * s * s + PRIOR_FREEDOM * excess * beside(i)) / (nu + PRIOR_FREEDOM),
-            _ => beside(i),
-        };
+        let of_runs = |i: usize| lines[i].standard_error.map(|s| s * s);
+        let variance = |i: usize| moderated(runs, of_runs(i), beside(i), excess);
         let point = |i: usize| MeasuredResponse {
             omega_rad_s: lines[i].omega_rad_s,
             response: lines[i].response,

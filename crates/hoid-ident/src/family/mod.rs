@@ -25,6 +25,7 @@
 //! | `options` | [`FamilyEstimator`]: what may be chosen, by fields and by names |
 //! | `estimator` | the searches of all forms |
 //! | `channels` | what a person sees besides the error |
+//! | `channel_lines` | the responses to all of it at the lines |
 //! | `comparison` | what each form is worth beside the others |
 //! | `assembly` | from the searches of the forms that count to the result |
 //! | `estimated` | the operator of a record with its errors |
@@ -58,6 +59,7 @@
 mod agreement;
 mod arx_response;
 mod assembly;
+mod channel_lines;
 mod channels;
 mod choice;
 mod clusters;

@@ -60,6 +60,9 @@ mod simulated_runs;
 #[cfg(test)]
 mod synthetic_records;
 
+pub(crate) use excitation::greatest_common_divisor;
+pub(crate) use window::Window;
+
 pub use describe::{DescribingFunction, Line, RunSummary, describe};
 pub use description::{Description, DescriptionOptions, USUAL_EXCITATIONS, describe_runs};
 pub use doubts::chance_coherence;

@@ -14,7 +14,7 @@ use crate::IdentError;
 
 /// A span of a record.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Window {
+pub(crate) struct Window {
     pub first: usize,
     pub samples: usize,
     /// Periods of the excitation that it holds: the bin of its first harmonic.

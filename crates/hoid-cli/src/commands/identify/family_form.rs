@@ -3,9 +3,7 @@
 use hoid::analysis::{Account, Identified, Setting};
 use hoid::ident::{
     ResponsePoint,
-    family::{
-        ChannelFit, ChannelRole, ClusterKind, FamilyFit, FormFigures, Intersample, LoopMeasures, Parameter,
-    },
+    family::{ChannelFit, ChannelRole, ClusterKind, FamilyFit, FormFigures, Intersample, LoopMeasures, Parameter},
     validation::GoodnessOfFit,
 };
 use hoid::model::{ContinuousTransferFunction, GainUnit, Record, uncertainty::Estimate};
@@ -148,7 +146,10 @@ impl Found<'_> {
             let gain = 10_f64.powf(point.magnitude_db.value / 20.0) * of_element.norm();
             let phase = (point.phase_deg.value + of_element.arg().to_degrees() + 180.0).rem_euclid(360.0) - 180.0;
             let error = |e: Option<f64>| e.map_or_else(String::new, |e| format!(" ± {e:.0}"));
-            let of_gain = point.magnitude_db.standard_error.map(|db| gain * db * std::f64::consts::LN_10 / 20.0);
+            let of_gain = point
+                .magnitude_db
+                .standard_error
+                .map(|db| gain * db * std::f64::consts::LN_10 / 20.0);
             format!(
                 "{} at {} rad/s ({phase:.0}{} deg)",
                 with_error(gain, of_gain),

@@ -1,0 +1,597 @@
+//! Several inputs at the lines of what excites the loop: their responses without a noise model.
+//!
+//! Where a target r and a disturbance d have lines of their own, the coefficients of a run over that of the exciting
+//! signal, `u_k = U_k/X_k` and `x_ik = X_ik/X_k`, are the same in all runs but for the remnant. Their means obey
+//!
+//! `mean u = sum_i Y_i(j omega) mean x_i + n`
+//!
+//! at each line: those of d say what the person does about the error, those of r that and what they do about r besides
+//! (M. M. van Paassen and M. Mulder, *Identification of Human Operator Control Behaviour in Multiple-Loop Tracking Tasks*,
+//! IFAC MMS 1998). Forms are fitted to all lines together, so that nothing is interpolated, by least squares with
+//!
+//! `var n = |u_k - sum_i Y_i x_ik|^2` over the runs, and beside the lines, as [`super::lines`] weighs them.
+//!
+//! The remnant in e, which makes the ratio of two noisy numbers, is averaged over the runs before it is divided by.
+
+use std::sync::Arc;
+
+use hoid_model::{
+    Complex64, FamilyOperator, Form, ModelError, Record, SampleTime, delayed_operator::whole_samples,
+    operator_family::Coordinate,
+};
+use hoid_numerics::statistics::upper_median;
+
+use super::{
+    coordinates::{self, Grid},
+    intersample::Intersample,
+    layout::{ChannelInLayout, FamilyLayout},
+    lines::{FEWEST_RUNS, moderated},
+    prior::OperatorPrior,
+};
+use crate::{
+    SearchOptions,
+    criterion::Workspace,
+    frequency::{Excitation, LineSearch, USUAL_EXCITATIONS, Window, greatest_common_divisor},
+    grey_box::{objective::Penalty, parametrisation::Parametrisation},
+    linalg::least_squares::solve_symmetric,
+    optimize::{Linearisation, Minimum, Objective, minimise},
+};
+
+/// Starts from which the search runs to its end.
+const SEARCHES: usize = 4;
+/// Bins off the lines from which the remnant at a line is taken.
+const NEIGHBOURS: usize = 8;
+/// Rounds in which the variances are brought up to date.
+const ROUNDS: usize = 2;
+
+/// The coefficients of u and of all inputs, the error first.
+#[derive(Debug, Clone)]
+struct Coefficients {
+    u: Complex64,
+    inputs: Vec<Complex64>,
+}
+
+impl Coefficients {
+    /// What the responses leave of u.
+    fn left(&self, responses: &[Complex64]) -> Complex64 {
+        self.inputs
+            .iter()
+            .zip(responses)
+            .fold(self.u, |left, (x, h)| left - x * h)
+    }
+}
+
+/// A line of one exciting signal in all runs that have it.
+#[derive(Debug, Clone)]
+struct Line {
+    exciter: usize,
+    omega_rad_s: f64,
+    /// Over the coefficient of the exciting signal, of each run.
+    runs: Vec<Coefficients>,
+    /// The same of the bins beside the line.
+    beside: Vec<Vec<Coefficients>>,
+    /// Of the means over the runs.
+    variance: f64,
+}
+
+/// The lines of all that excites the loop.
+#[derive(Debug, Clone, Default)]
+pub(super) struct ChannelLines {
+    lines: Vec<Line>,
+    /// Most runs that one line has.
+    pub runs: usize,
+    /// Names of the signals with lines.
+    pub exciters: Vec<String>,
+}
+
+impl ChannelLines {
+    /// The lines of these records: of the channels, and of the excitation that is named or has a usual name. `None` where
+    /// nothing has lines of its own.
+    pub fn of(
+        records: &[Record],
+        channels: &[String],
+        (excitation, period_s): (Option<&str>, Option<f64>),
+    ) -> Option<Self> {
+        let usual = USUAL_EXCITATIONS.into_iter().filter(|_| excitation.is_none());
+        let mut exciters: Vec<String> = channels.to_vec();
+        for name in excitation.into_iter().chain(usual) {
+            let is_signal = records[0].channels().take(2).any(|signal| signal.name == name);
+            if !is_signal && !exciters.iter().any(|known| known == name) {
+                exciters.push(name.to_owned());
+            }
+        }
+        let search = LineSearch {
+            period_s,
+            ..LineSearch::default()
+        };
+        let found: Vec<Vec<Option<Excitation>>> = (records.iter())
+            .map(|record| {
+                let of = |name: &String| Excitation::found_in(record, name, &search).ok();
+                exciters.iter().map(of).collect()
+            })
+            .collect();
+        let mut all = Self {
+            lines: Vec::new(),
+            runs: 0,
+            exciters: Vec::new(),
+        };
+        for (record, of) in records.iter().zip(&found) {
+            all.add(record, of, (channels, &exciters), records.len())?;
+        }
+        all.runs = all.lines.iter().map(|line| line.runs.len()).max()?;
+        let has_lines = |k: &usize| all.lines.iter().any(|line| line.exciter == *k);
+        all.exciters = (0..exciters.len())
+            .filter(has_lines)
+            .map(|k| exciters[k].clone())
+            .collect();
+        Some(all)
+    }
+
+    fn add(
+        &mut self,
+        record: &Record,
+        found: &[Option<Excitation>],
+        (channels, exciters): (&[String], &[String]),
+        records: usize,
+    ) -> Option<()> {
+        let n = record.len();
+        let span_s = n as f64 * record.sample_time().s();
+        // In bins of the whole record.
+        let bins = |of: &Excitation| -> Vec<usize> {
+            let periods = (span_s / of.period_s()).round() as usize;
+            of.harmonics().iter().map(|harmonic| harmonic * periods).collect()
+        };
+        let all: Vec<Vec<usize>> = found
+            .iter()
+            .map(|of| of.as_ref().map(bins).unwrap_or_default())
+            .collect();
+        let periods = found
+            .iter()
+            .flatten()
+            .map(|of| (span_s / of.period_s()).round() as usize);
+        let periods = periods.fold(0, greatest_common_divisor).max(1);
+        let whole = Window {
+            first: 0,
+            samples: n,
+            periods,
+        };
+        let windows = if records < FEWEST_RUNS {
+            whole.single_periods()
+        } else {
+            vec![whole]
+        };
+        for window in windows {
+            let of = |values: &[f64]| window.coefficients(values, 0.0);
+            let u = of(record.output());
+            let mut inputs = vec![of(record.input())];
+            for name in channels {
+                inputs.push(of(record.channel(name)?));
+            }
+            let here = |bin: usize| bin / (periods / window.periods);
+            let is_line = |bin: usize| all.iter().flatten().any(|line| here(*line) == bin);
+            for (exciter, name) in exciters.iter().enumerate() {
+                let own = &all[exciter];
+                if own.is_empty() {
+                    continue;
+                }
+                let excites = of(record.channel(name)?);
+                for &line in own {
+                    let shared = (0..all.len()).any(|other| other != exciter && all[other].contains(&line));
+                    let at = here(line);
+                    if shared || 2 * at >= window.samples {
+                        continue;
+                    }
+                    let over = |bin: usize| Coefficients {
+                        u: u[bin] / excites[at],
+                        inputs: inputs.iter().map(|x| x[bin] / excites[at]).collect(),
+                    };
+                    let mut beside: Vec<usize> = (1..u.len()).filter(|bin| !is_line(*bin)).collect();
+                    beside.sort_by_key(|bin| bin.abs_diff(at));
+                    beside.truncate(NEIGHBOURS);
+                    let beside = beside.into_iter().map(over).collect();
+                    let omega = std::f64::consts::TAU * line as f64 / span_s;
+                    self.put(exciter, omega, over(at), beside);
+                }
+            }
+        }
+        Some(())
+    }
+
+    fn put(&mut self, exciter: usize, omega_rad_s: f64, run: Coefficients, beside: Vec<Coefficients>) {
+        let known = |line: &&mut Line| line.exciter == exciter && (line.omega_rad_s / omega_rad_s - 1.0).abs() < 1e-4;
+        match self.lines.iter_mut().find(known) {
+            Some(line) => {
+                line.runs.push(run);
+                line.beside.push(beside);
+            }
+            None => self.lines.push(Line {
+                exciter,
+                omega_rad_s,
+                runs: vec![run],
+                beside: vec![beside],
+                variance: f64::NAN,
+            }),
+        }
+    }
+
+    /// Variances of the means over the runs, where the inputs have these responses.
+    fn weigh(&mut self, responses: impl Fn(f64) -> Vec<Complex64>) {
+        let of = |line: &Line| {
+            let h = responses(line.omega_rad_s);
+            let n = line.runs.len() as f64;
+            let left: Vec<Complex64> = line.runs.iter().map(|run| run.left(&h)).collect();
+            let mean = left.iter().sum::<Complex64>() / n;
+            let squares: f64 = left.iter().map(|x| (x - mean).norm_sqr()).sum();
+            let of_runs = (n > 1.0).then(|| squares / (n * (n - 1.0)));
+            let power = |bins: &Vec<Coefficients>| {
+                bins.iter().map(|bin| bin.left(&h).norm_sqr()).sum::<f64>() / bins.len().max(1) as f64
+            };
+            let beside = line.beside.iter().map(power).sum::<f64>() / (n * n);
+            (of_runs, beside)
+        };
+        let all: Vec<(Option<f64>, f64)> = self.lines.iter().map(of).collect();
+        let mut ratios: Vec<f64> = (all.iter())
+            .filter_map(|(of_runs, beside)| Some((*of_runs)? / beside))
+            .filter(|r| r.is_finite())
+            .collect();
+        let excess = match upper_median(&mut ratios) {
+            Some(median) if self.runs >= FEWEST_RUNS => median.max(1.0),
+            _ => 1.0,
+        };
+        for (line, (of_runs, beside)) in self.lines.iter_mut().zip(all) {
+            line.variance = moderated(line.runs.len(), of_runs, beside, excess);
+        }
+    }
+}
+
+/// chi^2 of the lines over the coordinates of the operator and of its channels.
+#[derive(Debug, Clone)]
+pub(super) struct ChannelCriterion {
+    lines: Arc<ChannelLines>,
+    layout: FamilyLayout,
+    /// Which of the inputs beside the error each channel of the layout is.
+    places: Vec<usize>,
+    /// How far ahead each of them is taken, s.
+    leads_s: Vec<f64>,
+    limits: Vec<(f64, f64)>,
+    penalty: Vec<Penalty>,
+    /// By how much variances are larger than those of the lines.
+    excess: f64,
+}
+
+/// The operator and its channels through the lines.
+#[derive(Debug, Clone)]
+pub(super) struct ChannelMinimum {
+    /// Coordinates of the operator, then those of the channels of their own.
+    pub coordinates: Vec<f64>,
+    pub chi_squared: f64,
+    /// Two a line.
+    pub equations: usize,
+    pub minimum: Minimum,
+    /// The covariance of the coordinates; zero at a bound.
+    pub covariance: Option<Vec<f64>>,
+}
+
+impl ChannelMinimum {
+    /// Equations that are left.
+    pub fn degrees_of_freedom(&self) -> usize {
+        self.equations.saturating_sub(self.coordinates.len())
+    }
+
+    /// chi^2 of each of them, at least one.
+    pub fn excess(&self) -> f64 {
+        match self.degrees_of_freedom() {
+            0 => 1.0,
+            freedom => (self.chi_squared / freedom as f64).max(1.0),
+        }
+    }
+
+    /// Akaike's criterion.
+    pub fn criterion(&self) -> f64 {
+        self.chi_squared + 2.0 * self.coordinates.len() as f64
+    }
+}
+
+/// A channel with its form, as a fit at the lines has it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct InForm {
+    /// Which of the inputs beside the error.
+    pub index: usize,
+    pub form: Form,
+    pub lead_s: f64,
+    pub delay_range_s: (f64, f64),
+}
+
+/// What all fits at the lines have in common.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct AtChannelLines<'l> {
+    pub lines: &'l Arc<ChannelLines>,
+    pub neuromuscular: bool,
+    pub delay_range_s: (f64, f64),
+    pub sampling: (SampleTime, Intersample),
+    pub prior: &'l OperatorPrior,
+    pub search: &'l SearchOptions,
+}
+
+impl AtChannelLines<'_> {
+    /// The criterion of these forms, with its prior.
+    pub fn criterion(&self, form: Form, channels: &[InForm]) -> ChannelCriterion {
+        let (sample_time, _) = self.sampling;
+        let limits = coordinates::limits(form, self.neuromuscular, self.delay_range_s, sample_time);
+        let of = |channel: &InForm| {
+            let all = coordinates::limits(channel.form, self.neuromuscular, channel.delay_range_s, sample_time);
+            let own = own_places(channel.form, self.neuromuscular);
+            ChannelInLayout {
+                form: channel.form,
+                limits: own.iter().map(|&i| all[i]).collect(),
+                start: own.iter().map(|_| 0.0).collect(),
+                place: 0,
+            }
+        };
+        let layout = FamilyLayout::new((form, self.neuromuscular), (0, 0), 1, &[], &limits, self.sampling)
+            .with_channels(&channels.iter().map(of).collect::<Vec<_>>());
+        ChannelCriterion {
+            lines: Arc::clone(self.lines),
+            limits: layout.limits().to_vec(),
+            penalty: self.prior.penalties(form, self.neuromuscular),
+            places: channels.iter().map(|channel| channel.index).collect(),
+            leads_s: channels.iter().map(|channel| channel.lead_s).collect(),
+            layout,
+            excess: 1.0,
+        }
+    }
+
+    /// The lines with their variances: first those about these responses, then those about the best fit of these forms.
+    pub fn weighed(
+        &self,
+        (form, channels): (Form, &[InForm]),
+        begun: impl Fn(f64) -> Vec<Complex64>,
+    ) -> Arc<ChannelLines> {
+        let mut lines = self.lines.as_ref().clone();
+        lines.weigh(begun);
+        let inputs = channels.iter().map(|c| c.index + 1).max().unwrap_or(0);
+        for _ in 0..ROUNDS {
+            let shared = Arc::new(lines.clone());
+            let at = AtChannelLines {
+                lines: &shared,
+                ..*self
+            };
+            if let Some(found) = at.fit(form, channels) {
+                lines.weigh(|omega| at.responses((form, channels), &found, inputs, omega));
+            }
+        }
+        Arc::new(lines)
+    }
+
+    /// The responses of a fit of these forms to the error and to so many inputs beside it.
+    fn responses(
+        &self,
+        (form, channels): (Form, &[InForm]),
+        found: &ChannelMinimum,
+        inputs: usize,
+        omega: f64,
+    ) -> Vec<Complex64> {
+        let mut all = vec![Complex64::new(0.0, 0.0); inputs + 1];
+        let criterion = self.criterion(form, channels);
+        let Ok(operators) = criterion.operators(&found.coordinates) else {
+            return all;
+        };
+        let (sample_time, intersample) = self.sampling;
+        let hold = intersample.response(omega, sample_time);
+        let places = std::iter::once((0, 0.0)).chain(channels.iter().map(|c| (c.index + 1, c.lead_s)));
+        for (operator, (place, lead_s)) in operators.iter().zip(places) {
+            all[place] = operator.response(omega) * hold * Complex64::from_polar(1.0, omega * lead_s);
+        }
+        all
+    }
+
+    /// The best search from the best points of a grid.
+    pub fn fit(&self, form: Form, channels: &[InForm]) -> Option<ChannelMinimum> {
+        let criterion = self.criterion(form, channels);
+        let mut starts: Vec<(f64, Vec<f64>)> = (criterion.grid().into_iter())
+            .filter_map(|mut start| Some((criterion.best_gains(&mut start)?, start)))
+            .collect();
+        starts.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let mut best: Option<Minimum> = None;
+        for (_, start) in starts.into_iter().take(SEARCHES) {
+            let known = best.as_ref().map(|b| b.at.sum_of_squares);
+            if let Some(found) = minimise(&criterion, start, self.search, None, &mut Workspace::default())
+                && known.is_none_or(|known| found.at.sum_of_squares < known)
+            {
+                best = Some(found);
+            }
+        }
+        criterion.result(best?)
+    }
+}
+
+/// Places of the coordinates that a channel has for itself.
+pub(super) fn own_places(form: Form, neuromuscular: bool) -> Vec<usize> {
+    let all = form.coordinates(neuromuscular);
+    let own = |i: &usize| !matches!(all[*i], Coordinate::LogOmega | Coordinate::LogZeta);
+    (0..all.len()).filter(own).collect()
+}
+
+impl ChannelCriterion {
+    /// Most runs that one line has.
+    pub fn runs(&self) -> usize {
+        self.lines.runs
+    }
+
+    /// The prior of the operator.
+    pub fn penalty(&self) -> &[Penalty] {
+        &self.penalty
+    }
+
+    /// The operator of the error at x.
+    ///
+    /// # Errors
+    /// Those of the operator.
+    pub fn operator(&self, x: &[f64]) -> Result<FamilyOperator, ModelError> {
+        self.layout.operator(x, 0)
+    }
+
+    /// The same without a prior, and with variances that are larger by this factor.
+    pub fn of_lines_alone(mut self, excess: f64) -> Self {
+        self.penalty.clear();
+        self.excess = excess;
+        self
+    }
+
+    /// Points from which searches begin.
+    fn grid(&self) -> Vec<Vec<f64>> {
+        let (form, muscles) = (self.layout.form, self.layout.neuromuscular);
+        let of_operator = &self.limits[..self.layout.operator_elements()];
+        let mut grid = coordinates::start_grid(form, muscles, of_operator, Grid::Usual);
+        for channel in &self.layout.channels {
+            let coordinates = channel.form.coordinates(muscles);
+            let mut whole = vec![(0.0, 0.0); coordinates.len()];
+            let own = own_places(channel.form, muscles);
+            own.iter()
+                .zip(&channel.limits)
+                .for_each(|(&i, limit)| whole[i] = *limit);
+            let all = coordinates::start_grid(channel.form, muscles, &whole, Grid::Usual);
+            let mut points: Vec<Vec<f64>> = (all.iter()).map(|x| own.iter().map(|&i| x[i]).collect()).collect();
+            points.dedup();
+            grid = grid
+                .into_iter()
+                .flat_map(|head| points.iter().map(move |tail| [head.as_slice(), tail].concat()))
+                .collect();
+        }
+        grid
+    }
+
+    /// Operators at x: that of the error, then those of the channels.
+    fn operators(&self, x: &[f64]) -> Result<Vec<FamilyOperator>, ModelError> {
+        let mut all = vec![self.layout.operator(x, 0)?];
+        for channel in &self.layout.channels {
+            all.push(self.layout.channel(x, channel, 0)?);
+        }
+        Ok(all)
+    }
+
+    /// Of each operator, at one line: the sum of its input over the runs, turned by what is shown and held.
+    fn inputs(&self, line: &Line) -> (Complex64, Vec<Complex64>) {
+        let n = line.runs.len() as f64;
+        let omega = line.omega_rad_s;
+        let hold = self.layout.intersample.response(omega, self.layout.sample_time);
+        let mean = |i: usize| line.runs.iter().map(|run| run.inputs[i]).sum::<Complex64>() / n * hold;
+        let u = line.runs.iter().map(|run| run.u).sum::<Complex64>() / n;
+        let of_channels = (self.places.iter().zip(&self.leads_s))
+            .map(|(&place, lead_s)| mean(place + 1) * Complex64::from_polar(1.0, omega * lead_s));
+        (u, std::iter::once(mean(0)).chain(of_channels).collect())
+    }
+
+    /// Sets the gains that are best for the other coordinates, in which the model is linear; the criterion there.
+    fn best_gains(&self, x: &mut [f64]) -> Option<f64> {
+        let places: Vec<usize> = std::iter::once(0)
+            .chain(self.layout.channels.iter().map(|c| c.place))
+            .collect();
+        places.iter().for_each(|&place| x[place] = 1.0);
+        let operators = self.operators(x).ok()?;
+        let mut total = Linearisation::empty(places.len());
+        for line in &self.lines.lines {
+            let (u, inputs) = self.inputs(line);
+            let slopes: Vec<Complex64> = (operators.iter().zip(&inputs))
+                .map(|(operator, input)| operator.response(line.omega_rad_s) * input)
+                .collect();
+            total.add_complex(2.0 / line.variance, u, &slopes);
+        }
+        let gains = solve_symmetric(&total.gram, &total.descent)?;
+        places.iter().zip(gains).for_each(|(&place, gain)| x[place] = gain);
+        let value = self.linearise(x, &mut Workspace::default()).sum_of_squares;
+        value.is_finite().then_some(value)
+    }
+
+    fn result(&self, minimum: Minimum) -> Option<ChannelMinimum> {
+        let x = minimum.theta.clone();
+        let p = x.len();
+        let free: Vec<usize> = (0..p)
+            .filter(|&i| self.limits[i].0 < x[i] && x[i] < self.limits[i].1)
+            .collect();
+        let part: Vec<f64> = (free.iter())
+            .flat_map(|&i| free.iter().map(move |&j| (i, j)))
+            .map(|(i, j)| minimum.at.gram[i * p + j])
+            .collect();
+        let covariance = || {
+            let mut covariance = vec![0.0; p * p];
+            for (k, &i) in free.iter().enumerate() {
+                let mut unit = vec![0.0; free.len()];
+                unit[k] = 1.0;
+                let column = solve_symmetric(&part, &unit)?;
+                free.iter().zip(column).for_each(|(&j, v)| covariance[j * p + i] = v);
+            }
+            Some(covariance)
+        };
+        let alone = self.clone().of_lines_alone(1.0);
+        let chi_squared = alone.linearise(&x, &mut Workspace::default()).sum_of_squares;
+        chi_squared.is_finite().then(|| ChannelMinimum {
+            chi_squared,
+            equations: 2 * self.lines.lines.len(),
+            covariance: covariance(),
+            coordinates: x,
+            minimum,
+        })
+    }
+}
+
+impl Objective for ChannelCriterion {
+    fn is_feasible(&self, x: &[f64]) -> bool {
+        x.iter().all(|v| v.is_finite())
+            && self.operators(x).is_ok_and(|all| {
+                let held =
+                    |operator: &FamilyOperator| whole_samples(operator.tau_e_s(), self.layout.sample_time).is_ok();
+                all.iter().all(held)
+            })
+    }
+
+    fn linearise(&self, x: &[f64], _: &mut Workspace) -> Linearisation {
+        let mut total = Linearisation::empty(x.len());
+        let Ok(operators) = self.operators(x) else {
+            total.sum_of_squares = f64::NAN;
+            return total;
+        };
+        let channels = self
+            .layout
+            .channels
+            .iter()
+            .map(|channel| self.layout.places_of(channel, 0));
+        let places: Vec<Vec<usize>> = std::iter::once((0..self.layout.coordinates()).collect())
+            .chain(channels)
+            .collect();
+        for line in &self.lines.lines {
+            let (mut off, inputs) = self.inputs(line);
+            let mut slopes = vec![Complex64::new(0.0, 0.0); x.len()];
+            for ((operator, input), places) in operators.iter().zip(inputs).zip(&places) {
+                let model = operator.response_and_gradient(line.omega_rad_s);
+                off -= model.value * input;
+                for (&place, g) in places.iter().zip(&model.gradient) {
+                    slopes[place] += g * input;
+                }
+            }
+            total.add_complex(2.0 / (line.variance * self.excess), off, &slopes);
+        }
+        for penalty in &self.penalty {
+            penalty.add_to(x, &mut total);
+        }
+        total
+    }
+
+    fn output_power(&self) -> f64 {
+        let of = |line: &Line| 2.0 * self.inputs(line).0.norm_sqr() / (line.variance * self.excess);
+        self.lines.lines.iter().map(of).sum()
+    }
+
+    fn limits(&self) -> Option<&[(f64, f64)]> {
+        Some(&self.limits)
+    }
+}
+
+/// Whether every input beside the error has lines of its own, and something else has lines too: then no form is needed
+/// to tell the responses apart.
+pub(super) fn tells_apart(lines: Option<&ChannelLines>, channels: &[String]) -> bool {
+    lines.is_some_and(|lines| {
+        let has = |name: &String| lines.exciters.contains(name);
+        channels.iter().all(has) && lines.exciters.len() > channels.len()
+    })
+}
