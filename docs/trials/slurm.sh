@@ -1,5 +1,5 @@
 #!/usr/bin/env bash
-# The page docs/src/guides/cluster.md on a real Slurm of one node: its code blocks as they stand, one task killed and one put back into the
+# The page docs/src/reference/cluster.md on a real Slurm of one node: its code blocks as they stand, one task killed and one put back into the
 # queue while they run, and the tables compared with those of one machine, byte for byte.
 #
 #   sudo docs/trials/slurm.sh PATH/TO/hoid [REPLICATIONS]
@@ -8,7 +8,7 @@
 set -euo pipefail
 hoid="$(realpath "$1")"
 replications="${2:-20}"
-page="$(cd "$(dirname "$0")/.." && pwd)/src/guides/cluster.md"
+page="$(cd "$(dirname "$0")/.." && pwd)/src/reference/cluster.md"
 work="$(mktemp -d)"
 PATH="$(dirname "$hoid"):$PATH"
 export PATH

@@ -1,4 +1,4 @@
-//! The generated passages of pages of the book.
+//! The generated passages of pages of the book and of `research/notes`.
 
 use std::{fs, path::Path};
 

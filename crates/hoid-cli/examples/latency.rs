@@ -1,5 +1,5 @@
 //! How long `hoid stream` takes to answer a sample, and what happens when readers stop, either side begins again,
-//! clocks jump and datagrams are hostile. The numbers of the page "In your simulator".
+//! clocks jump and datagrams are hostile. The numbers of `research/notes/latency.md`.
 //!
 //! `cargo xtask slow latency [--seconds N] [--seed N] [--program FILE] [--python FILE]`: each way and rate for 600 s, unless
 //! told otherwise. Over LabStreamingLayer where the interpreter has pyhoid and pylsl, as that of `cargo xtask places`. It

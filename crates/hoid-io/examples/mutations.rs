@@ -1,5 +1,5 @@
 //! A million damaged files, given to all readers in process: no panic, none that takes more than a
-//! second, at most 300 MB. The numbers of the page "Damaged inputs".
+//! second, at most 300 MB. The numbers of `research/notes/mutations.md`.
 //!
 //! `cargo xtask slow mutations [--inputs N] [--first N] [--jobs N] [--seed N] [--memory MB] [--keep DIRECTORY]`.
 //!

@@ -1,5 +1,5 @@
 //! A million messages to the lab, files of sessions and numbers of saved trackers, each changed: no panic, caught or not.
-//! The numbers of the page "Damaged inputs and kills".
+//! The numbers of `research/notes/mutations.md`.
 //!
 //! `cargo xtask slow hostile [CASES] [FIRST] [SEED]`; built with overflow checks on, as the tests are.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]

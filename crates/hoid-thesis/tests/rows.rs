@@ -51,7 +51,7 @@ fn quoted(cell: &str) -> Vec<String> {
 #[test]
 fn the_page_of_rows_is_true() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
-    let page = std::fs::read_to_string(root.join("docs/src/appendix/rows-of-the-text.md")).unwrap();
+    let page = std::fs::read_to_string(root.join("docs/src/thesis/rows.md")).unwrap();
     let [tables, figures, formulas, proposals] = ["Tables", "Figures", "Formulas", "Proposals"].map(|h| rows(&page, h));
 
     let total = |rows: &[Vec<&str>]| rows.iter().map(|row| count(row[0])).sum::<usize>();

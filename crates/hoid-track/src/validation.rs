@@ -234,7 +234,7 @@ pub struct CovarianceUpdates {
     pub power: f64,
 }
 
-/// Set on runs of their own (the page "The survey's methods" of the book).
+/// Set on runs of their own (`research/notes/survey-methods.md`).
 impl Default for CovarianceUpdates {
     fn default() -> Self {
         Self {

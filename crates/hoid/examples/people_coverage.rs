@@ -1,4 +1,4 @@
-//! Do the error bars of operators of people hold? The numbers of the page "Error bars of people".
+//! Do the error bars of operators of people hold? The numbers of `research/notes/people-coverage.md`.
 //!
 //! `cargo xtask slow people-coverage [PEOPLE] [FIRST] [--given] [--lines] [--no-lines] [--rows FILE]`:
 //! 2000 people by default, from the first number on. `--given` leaves out the fits that choose the

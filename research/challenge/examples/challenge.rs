@@ -4,7 +4,7 @@
 //! [--part I/N] [--out DIRECTORY] [--page FILE --measured TEXT] [--list]`: 4 runs of every case, all
 //! contestants, the open seeds, and lines of JSON in `challenge-results/` by default. What is there is
 //! not computed again. A case is named by its name, its beginning (`none-`) or its theme. `--page`
-//! writes the page of the book; `--list` tells the cases alone.
+//! writes `research/notes/challenge.md`; `--list` tells the cases alone.
 #![allow(clippy::print_stdout, clippy::print_stderr)]
 
 use std::{path::PathBuf, process::ExitCode};

@@ -1,4 +1,4 @@
-//! The page of the challenge for the book: what each case is, and the tables.
+//! The page `research/notes/challenge.md`: what each case is, and the tables.
 
 use std::fmt::Write as _;
 

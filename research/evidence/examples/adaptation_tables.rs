@@ -1,4 +1,4 @@
-//! The tables of the page "A person who changes, compared" of the book, from the results of the
+//! The tables of `research/notes/comparison-tables.md`, from the results of the
 //! study, as they stand there:
 //!
 //! `hoid study run adaptation --out adaptation` and

@@ -1,4 +1,4 @@
-//! The numbers of the page "Evidence" of the book that take too long for a test.
+//! The numbers of `research/notes/evidence-tables.md` that take too long for a test.
 //!
 //! `cargo run --release -p hoid-evidence --example evidence -- coverage|efficiency|starts|delay [RUNS]`
 //!

@@ -1,5 +1,5 @@
-//! The experiment of section VI with virtual people: the tables of the page of that name of the
-//! book, and its figures into a directory.
+//! The experiment of section VI with virtual people: the tables of `research/notes/virtual-experiment.md`,
+//! and its figures into a directory.
 //!
 //! `cargo run --release -p hoid-evidence --example experiment -- experiment > experiment.md`
 #![allow(clippy::unwrap_used, clippy::print_stdout)]

@@ -1,4 +1,4 @@
-//! The numbers of the page "A person who changes" of the book that take too long for a test.
+//! The numbers of `research/notes/multiple-model-evidence.md` that take too long for a test.
 //!
 //! `cargo run --release -p hoid-evidence --example multiple_model_evidence -- detection|tune|set|cost [RUNS]`
 //! or `-- joined FIRST.csv SECOND.csv ..`, pairs of recordings with the columns t, r, u and y that

@@ -1,4 +1,4 @@
-//! The numbers of recursive identification on the page "Evidence" of the book that take too long
+//! The numbers of recursive identification in `research/notes/evidence-tables.md` that take too long
 //! for a test.
 //!
 //! `cargo run --release -p hoid-evidence --example recursive_evidence -- table|divergence [RUNS]`

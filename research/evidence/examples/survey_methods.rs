@@ -1,4 +1,4 @@
-//! The tables of the page "The survey's methods" of the book:
+//! The tables of `research/notes/survey-methods.md`:
 //!
 //! `cargo run --release -p hoid-evidence --example survey_methods > survey-methods.md`
 //!

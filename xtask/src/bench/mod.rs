@@ -3,7 +3,7 @@
 //! Ours are the example `tasks` of the crate `hoid`, the peers the scripts in
 //! `crates/hoid/benches/peers`. Both print one line of JSON a task ([`lines`]). They take turns,
 //! and of the medians of the rounds the smallest counts, so that what else the machine does falls
-//! on both. The tables go between the markers of a page of the book ([`crate::page`]).
+//! on both. The tables go between the markers of `research/notes/speed-peers.md` ([`crate::page`]).
 
 mod growth;
 mod instructions;

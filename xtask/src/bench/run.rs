@@ -17,7 +17,7 @@ use crate::{
     process::{cargo_command, output, run},
 };
 
-const PAGE: &str = "reference/speed-peers.md";
+const PAGE: &str = "../../research/notes/speed-peers.md";
 
 const PEERS: &str = "crates/hoid/benches/peers";
 /// Belongs to the example `evidence` and prints no lines.

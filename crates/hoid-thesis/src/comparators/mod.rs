@@ -4,7 +4,7 @@
 //!
 //! A comparator follows a record and says, at times that are asked for, what the operator's
 //! response is at some frequencies, and its parameters where it has them. Each is small, after the
-//! source that it names, tuned on runs of its own (the page "The survey's methods" of the book says
+//! source that it names, tuned on runs of its own (`research/notes/survey-methods.md` says
 //! how), and reached by the plan of a [survey](crate::survey), not by `track --method`: these are
 //! here to be compared with.
 //!

@@ -20,7 +20,7 @@
 //! | `plan` | [`SurveyPlan`] |
 //! | [`measure`] | errors of what a method found in one run |
 //! | `run` | [`survey()`]: runs and methods |
-//! | `table` | the tables of the page "The survey's methods" of the book |
+//! | `table` | the tables of `research/notes/survey-methods.md` |
 
 pub mod measure;
 mod plan;
@@ -31,6 +31,6 @@ pub use plan::SurveyPlan;
 pub use run::{MethodErrors, survey};
 pub use table::survey_tables;
 
-/// The comparators of the page "The survey's methods" of the book; its study is the named plan
+/// The comparators of `research/notes/survey-methods.md`; its study is the named plan
 /// [`SURVEY`](crate::plans::SURVEY).
 pub const COMPARATORS: &str = include_str!("../../plans/survey-comparators.toml");

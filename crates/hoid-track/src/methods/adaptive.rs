@@ -71,7 +71,7 @@ impl RecursiveMethod for AdaptiveOptions {
         About {
             name: "adaptive",
             help: "gains in a basis that people share, with a noise model of its own; starts without a fit",
-            source: "McRuer and Jex 1967; Magill 1965; Chow 1960; White 1980; the book, page Recursive methods",
+            source: "McRuer and Jex 1967; Magill 1965; Chow 1960; White 1980; the book, page The default tracker",
             structures: &[Structure::BoxJenkins, Structure::OutputError, Structure::General],
             defaults: &[],
         }
