@@ -7,7 +7,7 @@ use std::f64::consts::TAU;
 use hoid_model::{
     Complex64, ContinuousTransferFunction, FamilyOperator, FamilyScenario, FamilyState, Form, SampleTime,
     family_scenario::{
-        Excitation, Followed, Intermittence, MultiSine, PartStrength, Pulses, RemnantPart, RemnantShape,
+        Excitation, Feedforward, Followed, Intermittence, MultiSine, PartStrength, Pulses, RemnantPart, RemnantShape,
         SignalDependence, Stick,
     },
     operator_family::Coordinate,
@@ -543,4 +543,50 @@ fn what_has_no_run_is_refused() {
     ] {
         refused(change);
     }
+}
+
+#[test]
+fn a_target_that_is_seen_moves_the_control_before_there_is_an_error() {
+    // e = f - y and y = P u, so that at each line of f in the steady state U = Y E + F R e^{j omega preview}.
+    let mut scenario = usual();
+    scenario.disturbance = Excitation::default();
+    scenario.target = MultiSine::default().excitation().unwrap();
+    scenario.target.random_phases = false;
+    scenario.measurement_s = 20.0;
+    scenario.run_in_s = 60.0;
+    let muscles = [12.0_f64.ln(), 0.4_f64.ln()];
+    let seen = FamilyOperator::new(Form::Derivative, true, &[0.6, muscles[0], muscles[1], 0.21]).unwrap();
+    let preview_s = 0.3;
+    scenario.feedforward = Some(Feedforward {
+        operator: seen.clone(),
+        preview_s,
+    });
+    let record = FamilySimulator::new(&scenario).unwrap().run(seed(0), false).unwrap();
+    let ts = record.sample_time();
+    let coefficient = |values: &[f64], omega: f64| -> Complex64 {
+        let turned = |(k, v): (usize, &f64)| Complex64::from_polar(*v, -omega * k as f64 * ts.s());
+        values.iter().enumerate().map(turned).sum()
+    };
+    for line in scenario.target.function.sinusoids() {
+        let omega = line.omega_rad_s;
+        let of = |name: &str| coefficient(record.channel(name).unwrap(), omega);
+        let held = |operator: &FamilyOperator| {
+            let held = operator.hold(ts).unwrap();
+            let back = Complex64::from_polar(1.0, -omega * ts.s());
+            let f = [&[1.0][..], &held.f].concat();
+            polynomial::value(&held.b, back) / polynomial::value(&f, back) * back.powi(held.nk as i32)
+        };
+        let ahead = Complex64::from_polar(1.0, omega * preview_s);
+        let expected = held(&scenario.initial.operator) * of("e") + held(&seen) * ahead * of("f_t");
+        assert!(
+            (of("u") / expected - 1.0).norm() < 1e-6,
+            "{omega} {} {expected}",
+            of("u")
+        );
+    }
+    scenario.feedforward = Some(Feedforward {
+        operator: seen,
+        preview_s: 0.3001,
+    });
+    assert!(FamilySimulator::new(&scenario).is_err());
 }

@@ -15,6 +15,7 @@ from . import _options, _pyhoid
 from ._options import Order, Progress
 from ._prior import prior_text
 from ._settings import BATCH_SETTINGS
+from .errors import OptionError
 from .fit import Fit
 from .operator_fit import OperatorFit
 from .record import Record
@@ -45,6 +46,8 @@ if TYPE_CHECKING:
         faults: Faults
         decimate: int | str
         progress: Progress
+        inputs: Sequence[str] | None
+        roles: Mapping[str, str] | None
 
 
 @overload
@@ -84,6 +87,8 @@ def identify(
     faults: Faults = "bridge",
     decimate: int | str = "auto",
     progress: Progress = False,
+    inputs: Sequence[str] | None = None,
+    roles: Mapping[str, str] | None = None,
     **settings: Unpack[BatchSettings],
 ) -> OperatorFit | Fit | TimeVaryingFit:
     """Identify the operator of a person, or a model of polynomials, from one or several records.
@@ -124,6 +129,12 @@ def identify(
     progress : bool or callable
         True shows on standard error how far a search is; a callable gets the number of
         candidates done and the number of all.
+    inputs : sequence of str, optional
+        What the person sees, of ``"operator"``: the error first, then channels of the records, as
+        ``["e", "r"]``. The responses to all of them are fitted together: ``fit.channels``.
+    roles : dict of str to str, optional
+        What each further input is: ``"feedforward"`` (the default; ``"feedforward:0.5"`` with 0.5 s
+        of its future shown), ``"motion"`` or ``"output"``; ``"feedforward/derivative"`` fits one form.
     **settings
         {settings}
 
@@ -159,6 +170,8 @@ def identify(
     ]
     several = tuple(_options.as_records(records))
     given: dict[str, Any] = dict(settings)
+    if inputs is not None or roles is not None:
+        given["role"] = [*given.get("role", ()), *_roles(several[0], inputs, roles)]
     found, notes = _pyhoid.identify(
         several,
         structure=structure,
@@ -229,6 +242,28 @@ def identify_operator(
     """
     found: OperatorFit = identify(records, "operator", **options)
     return found
+
+
+def _roles(record: Record, inputs: Sequence[str] | None, roles: Mapping[str, str] | None) -> list[str]:
+    """The inputs beside the error, each with its role, as the library reads them.
+
+    >>> _roles(record, ["e", "r"], {"r": "feedforward:0.5"})
+    ['r=feedforward:0.5']
+    """
+    named = dict(roles or {})
+    error = record.input_name
+    names = list(inputs) if inputs is not None else [error, *(name for name in named if name != error)]
+    if isinstance(inputs, str) or not names or names[0] not in (error, "e"):
+        raise OptionError(
+            f"inputs: the first is the error, found {inputs!r}, expected [{error!r}, ...]"
+            " (name another column when the record is read)"
+        )
+    if named.pop(names[0], "feedback") != "feedback":
+        raise OptionError(f"roles: {names[0]} is the feedback")
+    unknown = sorted(set(named) - set(names[1:]))
+    if unknown:
+        raise OptionError(f"roles: {unknown[0]} is not one of the inputs {names}")
+    return [f"{name}={named.get(name, 'feedforward')}" for name in names[1:]]
 
 
 def _texts(settings: Mapping[str, Any]) -> dict[str, str]:

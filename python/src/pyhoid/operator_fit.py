@@ -249,6 +249,21 @@ class OperatorFit(Model, Result):
         return estimates(self._native.margins(_options.controlled_element(num, den)))
 
     @property
+    def channels(self) -> list[dict[str, Any]]:
+        """The responses to several inputs, that to the error first; empty for one input.
+
+        Each has input, role, form, parameters (name, value, standard_error, interval, determined, ...)
+        and response (gain and phase with errors over frequency). Those beside the error have preview (s),
+        p_value (of the best form by chance) and forms (those that were compared; form None is no
+        response), and form None where no response was found.
+
+        >>> [(c["input"], c["role"], c["form"]) for c in fit.channels]
+        [('e', 'feedback', 'gain'), ('r', 'feedforward', 'derivative')]
+        """
+        found: list[dict[str, Any]] = json.loads(self.to_json()).get("channels", [])
+        return found
+
+    @property
     def quality(self) -> dict[str, float]:
         """VAF and NRMSE fit (both in %) of simulation and one-step prediction, over its records."""
         figures = json.loads(self.to_json())["fit"]

@@ -4,7 +4,7 @@
 use hoid_ident::{
     SearchOptions,
     family::{FamilyEstimator, FamilyFit, Intersample},
-    judgement::second_opinion,
+    judgement::{other_inputs, second_opinion},
     settings::MethodSpec,
 };
 use hoid_model::{Detrend, FaultHandling, Structure, Verdict};
@@ -91,6 +91,7 @@ impl BatchEstimator for FamilyEstimator {
         let mut verdict = fit.verdict.clone();
         if with.faults != FaultHandling::Keep {
             verdict = verdict.and(second_opinion::of_family(&estimator, &fit, &data.records, element));
+            verdict = verdict.and(other_inputs::of_family(&estimator, &fit, &data.records));
         }
         if let Some(element) = element {
             verdict = verdict.and(fit.loop_finding(0, element));

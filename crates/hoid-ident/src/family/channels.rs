@@ -905,7 +905,7 @@ mod tests {
     };
 
     use super::*;
-    use crate::family::FamilyEstimator;
+    use crate::{family::FamilyEstimator, judgement::other_inputs};
 
     const TS: f64 = 0.02;
 
@@ -1040,13 +1040,19 @@ mod tests {
             "{:?}",
             alone.channels[0]
         );
-        // With one input the response to e is another one.
+        // With one input the response to e is another one, and that is said.
         let one = FamilyEstimator {
             channels: Vec::new(),
             forms: vec![Form::Gain],
             ..estimator()
         };
-        let one = one.fit(std::slice::from_ref(&record)).unwrap();
+        let one_input = one.fit(std::slice::from_ref(&record)).unwrap();
+        let said = other_inputs::of_family(&one, &one_input, std::slice::from_ref(&record));
+        assert!(
+            said.iter().any(|f| f.kind == "other-input" && f.words.contains("to r")),
+            "{said:?}"
+        );
+        let one = one_input;
         assert!(within(&one.operators[0].parameters, "K", 0.6).abs() > 3.0);
     }
 
@@ -1082,9 +1088,16 @@ mod tests {
         let (operator, _) = operators();
         for seed in 0..4 {
             let record = run(&operator, None, 0, seed);
-            let fit = estimator().fit(&[record]).unwrap();
+            let fit = estimator().fit(std::slice::from_ref(&record)).unwrap();
             assert!(fit.channels[0].response.is_none(), "{:?}", fit.channels[0]);
             assert!(fit.channels[0].p_value >= BY_CHANCE);
+            let one = FamilyEstimator {
+                channels: Vec::new(),
+                ..estimator()
+            };
+            let records = [record];
+            let said = other_inputs::of_family(&one, &one.fit(&records).unwrap(), &records);
+            assert!(said.is_empty(), "{said:?}");
         }
     }
 

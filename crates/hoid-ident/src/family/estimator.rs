@@ -8,8 +8,8 @@ use hoid_model::{Detrend, Form, Record, Structure};
 use super::{
     arx_response::ArxResponse,
     assembly::{AtLines, Beside, Chosen},
-    channel_lines::AtChannelLines,
-    channels::Seen,
+    channel_lines::{AtChannelLines, ChannelLines, InForm},
+    channels::{ChannelFit, Seen, SeenChannel},
     comparison::{Comparison, Tried},
     coordinates::Grid,
     intersample::Intersample,
@@ -45,6 +45,20 @@ struct Start {
     coordinates: Vec<Vec<f64>>,
 }
 
+/// Where the searches of all forms begin.
+struct Begun<'a> {
+    prediction: Prediction<'a>,
+    starts: Vec<Start>,
+    noise: NoiseOrders,
+    /// The channels beside the error, as they were compared.
+    channels: Vec<ChannelFit>,
+    channel_lines: Option<Arc<ChannelLines>>,
+    /// The channels with a response, at the lines.
+    in_form: Vec<InForm>,
+    /// Why no line has a say.
+    no_lines: Option<String>,
+}
+
 impl FamilyEstimator {
     /// Fits all records together.
     ///
@@ -74,98 +88,25 @@ impl FamilyEstimator {
         records: &[Record],
         describing: Option<Result<DescribingFunction, IdentError>>,
     ) -> Result<FamilyFit, IdentError> {
-        informative_data::common_sample_time(records)?;
-        let records: Vec<Record> = records.iter().map(|r| r.clone().detrended(self.detrend)).collect();
-        let (records, seen) = Seen::of(records, &self.channels, self.detrend)?;
-        let forms = self.sorted_forms()?;
-        let mut prediction = self.prediction(self.intersample, &records, &forms)?;
-        if self.initial_state != InitialState::Zero && !seen.is_empty() {
-            let sampling = (prediction.sample_time, prediction.intersample);
-            let of_channels = seen.first_regressed_sample(self.neuromuscular, sampling) + self.nd.end();
-            prediction.first = prediction.first.max(of_channels);
-        }
-        self.check(&records, prediction.first)?;
-
+        let (records, seen) = self.prepared(records)?;
         // The ratio of u and e at a line is a sum of responses where more is seen than e.
-        let (describing, mut no_lines) = match describing.filter(|_| seen.is_empty()) {
+        let (describing, no_lines) = match describing.filter(|_| seen.is_empty()) {
             None => (None, None),
             Some(Ok(found)) => (Some(found), None),
             Some(Err(error)) => (None, Some(error.to_string())),
         };
-        let lines = describing.as_ref().map(LineData::new);
-        // It gives starts alone: the lines do as well.
-        let mut begun = Vec::new();
-        let mut channel_lines = None;
-        let at_lines = AtChannelLines {
-            lines: &Arc::default(),
-            neuromuscular: self.neuromuscular,
-            delay_range_s: prediction.delay_range_s,
-            sampling: (prediction.sample_time, prediction.intersample),
-            prior: &self.prior,
-            search: &self.search,
-        };
-        let response = if seen.is_empty() {
-            match ArxResponse::of(&records) {
-                Err(error) if lines.is_none() => return Err(error),
-                found => found.map_or(Vec::new(), |found| found.points),
-            }
-        } else {
-            let mut responses = seen.responses(&records)?;
-            let sampling = (prediction.sample_time, prediction.intersample);
-            begun = seen.begun(&responses, self.neuromuscular, sampling, &self.search)?;
-            prediction.channels = begun.iter().filter_map(|forms| forms.first().cloned()).collect();
-            let lines = seen.lines(self.excitation.as_deref(), self.period_s);
-            channel_lines = lines.map(|lines| {
-                let at = AtChannelLines {
-                    lines: &lines,
-                    ..at_lines
-                };
-                seen.weighed(&at, &begun, &responses)
-            });
-            responses.swap_remove(0)
-        };
         let mut workspace = Workspace::of_thread();
-        let mut starts = Vec::new();
-        for &form in &forms {
-            starts.push(self.start(form, lines.as_ref(), (&response, Grid::Usual), &prediction)?);
-        }
-        let at_lines = (channel_lines.as_ref()).map(|lines| AtChannelLines { lines, ..at_lines });
-        let (mut channels, mut in_form) = (Vec::new(), Vec::new());
-        if let Some(at) = &at_lines {
-            (channels, prediction.channels, in_form) = seen.choose_at_lines(at, &forms, std::mem::take(&mut begun))?;
-            for start in &mut starts {
-                let Some(found) = at.fit(start.form, &in_form) else {
-                    continue;
-                };
-                let criterion = at.criterion(start.form, &in_form);
-                let operator = criterion.operator(&found.coordinates)?;
-                start.coordinates.insert(0, operator.coordinates().to_vec());
-                start.lines = Some(LineFit::of_channels(operator, &found, criterion.penalty()));
-            }
-        }
-        let little_noise = match seen.is_empty() {
-            true => self.with_little_noise(&prediction, &records, &mut starts, &mut workspace)?,
-            false => None,
-        };
-        let noise = match little_noise {
-            Some(found) => {
-                // They hold the leakage of the record and of its aliases more than such noise.
-                starts.iter_mut().for_each(|start| start.lines = None);
-                no_lines = no_lines.or_else(|| lines.map(|_| TOO_LITTLE_NOISE.to_owned()));
-                prediction = found;
-                prediction.noise_free().map(|_| (*self.nc.start(), *self.nd.start()))
-            }
-            None => None,
-        };
-        let noise = noise.map_or_else(|| self.noise_orders(&prediction, &starts, &mut workspace), Ok)?;
-        if !seen.is_empty() && at_lines.is_none() {
-            let least = self.least_left(&prediction, &starts, noise.1, &mut workspace)?;
-            let of = (
-                (starts[least].form, self.neuromuscular),
-                starts[least].coordinates.as_slice(),
-            );
-            channels = seen.choose(&mut prediction, begun, of, noise, &mut workspace)?;
-        }
+        let Begun {
+            prediction,
+            starts,
+            noise,
+            channels,
+            channel_lines,
+            in_form,
+            no_lines: why,
+        } = self.begin(&records, &seen, describing.as_ref(), &mut workspace)?;
+        let no_lines = no_lines.or(why);
+        let at_lines = (channel_lines.as_ref()).map(|lines| self.at_lines(lines, &prediction));
         let count = starts.len();
         let mut tried: Vec<Tried<'_>> = Vec::with_capacity(count);
         for start in starts {
@@ -219,6 +160,127 @@ impl FamilyEstimator {
             highest_order: *self.nd.end(),
         };
         chosen.result(&mut workspace)
+    }
+
+    /// Whether u responds to a channel besides the error, by the forms of this estimator.
+    ///
+    /// # Errors
+    /// As [`FamilyEstimator::fit`].
+    pub fn responds_to(&self, records: &[Record], channel: SeenChannel) -> Result<ChannelFit, IdentError> {
+        let with_channel = Self {
+            channels: vec![channel],
+            ..self.clone()
+        };
+        let (records, seen) = with_channel.prepared(records)?;
+        let mut workspace = Workspace::of_thread();
+        let mut begun = with_channel.begin(&records, &seen, None, &mut workspace)?;
+        begun.channels.pop().ok_or(IdentError::NoFiniteLoss)
+    }
+
+    /// The records without what is taken out of e and u, and what is seen besides.
+    fn prepared(&self, records: &[Record]) -> Result<(Vec<Record>, Seen<'_>), IdentError> {
+        informative_data::common_sample_time(records)?;
+        let records: Vec<Record> = records.iter().map(|r| r.clone().detrended(self.detrend)).collect();
+        Seen::of(records, &self.channels, self.detrend)
+    }
+
+    /// What fits at the lines of several inputs have in common.
+    fn at_lines<'l>(&'l self, lines: &'l Arc<ChannelLines>, prediction: &Prediction<'_>) -> AtChannelLines<'l> {
+        AtChannelLines {
+            lines,
+            neuromuscular: self.neuromuscular,
+            delay_range_s: prediction.delay_range_s,
+            sampling: (prediction.sample_time, prediction.intersample),
+            prior: &self.prior,
+            search: &self.search,
+        }
+    }
+
+    /// Where the searches of all forms begin: their starts, the orders of the noise, the channels beside the error that have
+    /// a response.
+    fn begin<'a>(
+        &self,
+        records: &'a [Record],
+        seen: &'a Seen<'_>,
+        describing: Option<&DescribingFunction>,
+        workspace: &mut Workspace,
+    ) -> Result<Begun<'a>, IdentError> {
+        let forms = self.sorted_forms()?;
+        let mut prediction = self.prediction(self.intersample, records, &forms)?;
+        if self.initial_state != InitialState::Zero && !seen.is_empty() {
+            let sampling = (prediction.sample_time, prediction.intersample);
+            let of_channels = seen.first_regressed_sample(self.neuromuscular, sampling) + self.nd.end();
+            prediction.first = prediction.first.max(of_channels);
+        }
+        self.check(records, prediction.first)?;
+        let lines = describing.map(LineData::new);
+        let mut begun = Vec::new();
+        let mut channel_lines = None;
+        // It gives starts alone: the lines do as well.
+        let response = if seen.is_empty() {
+            match ArxResponse::of(records) {
+                Err(error) if lines.is_none() => return Err(error),
+                found => found.map_or(Vec::new(), |found| found.points),
+            }
+        } else {
+            let mut responses = seen.responses(records)?;
+            let sampling = (prediction.sample_time, prediction.intersample);
+            begun = seen.begun(&responses, self.neuromuscular, sampling, &self.search)?;
+            prediction.channels = begun.iter().filter_map(|forms| forms.first().cloned()).collect();
+            let found = seen.lines(self.excitation.as_deref(), self.period_s);
+            channel_lines = found.map(|lines| seen.weighed(&self.at_lines(&lines, &prediction), &begun, &responses));
+            responses.swap_remove(0)
+        };
+        let mut starts = Vec::new();
+        for &form in &forms {
+            starts.push(self.start(form, lines.as_ref(), (&response, Grid::Usual), &prediction)?);
+        }
+        let (mut channels, mut in_form) = (Vec::new(), Vec::new());
+        if let Some(lines) = &channel_lines {
+            let at = self.at_lines(lines, &prediction);
+            let (compared, in_use, forms_in_use) = seen.choose_at_lines(&at, &forms, std::mem::take(&mut begun))?;
+            for start in &mut starts {
+                let Some(found) = at.fit(start.form, &forms_in_use) else {
+                    continue;
+                };
+                let criterion = at.criterion(start.form, &forms_in_use);
+                let operator = criterion.operator(&found.coordinates)?;
+                start.coordinates.insert(0, operator.coordinates().to_vec());
+                start.lines = Some(LineFit::of_channels(operator, &found, criterion.penalty()));
+            }
+            (channels, prediction.channels, in_form) = (compared, in_use, forms_in_use);
+        }
+        let little_noise = match seen.is_empty() {
+            true => self.with_little_noise(&prediction, records, &mut starts, workspace)?,
+            false => None,
+        };
+        let mut no_lines = None;
+        let noise = match little_noise {
+            Some(found) => {
+                // They hold the leakage of the record and of its aliases more than such noise.
+                starts.iter_mut().for_each(|start| start.lines = None);
+                no_lines = lines.map(|_| TOO_LITTLE_NOISE.to_owned());
+                prediction = found;
+                prediction.noise_free().map(|_| (*self.nc.start(), *self.nd.start()))
+            }
+            None => None,
+        };
+        let noise = noise.map_or_else(|| self.noise_orders(&prediction, &starts, workspace), Ok)?;
+        if !seen.is_empty() && channel_lines.is_none() {
+            let least = self.least_left(&prediction, &starts, noise.1, workspace)?;
+            let form = (starts[least].form, self.neuromuscular);
+            let from = starts[least].coordinates.as_slice();
+            channels = seen.choose(&mut prediction, begun, (form, from), noise, workspace)?;
+        }
+        Ok(Begun {
+            prediction,
+            starts,
+            noise,
+            channels,
+            channel_lines,
+            in_form,
+            no_lines,
+        })
     }
 
     fn sorted_forms(&self) -> Result<Vec<Form>, IdentError> {

@@ -92,9 +92,8 @@ pub(super) fn findings(judged: &Judged<'_>) -> Vec<Finding> {
     if !judged.apart {
         all.push(Finding::doubt(
             "inputs-together",
-            "no excitation with lines of its own moves the error apart from the other inputs: their responses are told apart by the \
-             forms that are supposed, and a response to the error is none by itself; record a disturbance and a target on \
-             lines of their own, over whole periods",
+            "no excitation on lines of its own separates the error from the other inputs: both responses depend on the assumed forms; \
+             record a target and a disturbance on separate lines, over whole periods",
         ));
     }
     determined(judged, &mut all);

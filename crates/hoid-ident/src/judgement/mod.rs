@@ -14,6 +14,7 @@
 //! | `not-constant` | parameters that change within the records, or from one to the next |
 //! | `residuals-not-white`, `structure`, `leverage` | sizes in the residuals |
 //! | `no-response` | nothing that could not be chance |
+//! | `other-input`, `inputs-together` | what is seen besides the error |
 //! | `exact-fit`, `no-change`, `change-point` | worth knowing; the result stands |
 //!
 //! | file | what it holds |
@@ -26,6 +27,7 @@
 //! | `operator` | gains, poles and delay of an operator |
 //! | `operator_step` | what a stretch of data says against an operator |
 //! | `second_opinion` | fits to records that no single sample can carry |
+//! | `other_inputs` | whether u responds to a recorded target besides e |
 //! | `whitened` | least squares behind an autoregression, for those that need one |
 //! | `fit`, `grey_box`, `sigmoid` | the verdict of each kind of fit |
 
@@ -37,6 +39,7 @@ mod left_response;
 mod no_response;
 mod operator;
 mod operator_step;
+pub mod other_inputs;
 pub(crate) mod residuals;
 pub mod second_opinion;
 mod sigmoid;

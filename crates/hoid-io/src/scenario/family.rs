@@ -3,7 +3,7 @@
 use hoid_model::{
     ContinuousTransferFunction, FamilyOperator, FamilyScenario, FamilyState, Form, ModelError, SampleTime,
     family_scenario::{
-        Excitation, Followed, Intermittence, MultiSine, PartStrength, Pulses, RemnantPart, RemnantShape,
+        Excitation, Feedforward, Followed, Intermittence, MultiSine, PartStrength, Pulses, RemnantPart, RemnantShape,
         SignalDependence, Stick,
     },
     forcing::{ForcingFunction, Sinusoid},
@@ -15,16 +15,15 @@ use toml::Spanned;
 
 use super::condition::MOST_LINES;
 use super::error::ScenarioFileError;
-use super::family_keys::{ExcitationTable, FamilyFile, FamilyStateTable, FollowsKey, PartTable, ShapeKey};
+use super::family_keys::{
+    ExcitationTable, FamilyFile, FamilyStateTable, FeedforwardTable, FollowsKey, PartTable, ShapeKey,
+};
 use super::keys::RealisationKey;
 use super::values::{Limits, Source};
 
 impl Source<'_> {
     pub(super) fn family_scenario(&self, file: FamilyFile, name: &str) -> Result<FamilyScenario, ScenarioFileError> {
-        let form: Form = file.form.get_ref().parse().map_err(|error: hoid_model::UnknownName| {
-            let expected = error.to_string();
-            self.value("form", file.form.span().start, file.form.get_ref(), &expected)
-        })?;
+        let form = self.form("form", &file.form)?;
         let rate = self.limited("sampling_rate_hz", file.sampling_rate_hz, Limits::RATE_HZ)?;
         let sample_time = match (
             self.limited("sample_time_s", file.sample_time_s, Limits::SAMPLE_TIME_S)?,
@@ -68,6 +67,12 @@ impl Source<'_> {
         if let Some(table) = file.target {
             scenario.target = self.excitation("target", table)?;
         }
+        if let Some(table) = file.feedforward {
+            if scenario.target.function.sinusoids().is_empty() {
+                return Err(self.keys("[feedforward] is given, but no [target] that is seen"));
+            }
+            scenario.feedforward = Some(self.feedforward(table, &scenario)?);
+        }
         if let Some(table) = file.disturbance {
             scenario.disturbance = self.excitation("disturbance", table)?;
         }
@@ -90,6 +95,25 @@ impl Source<'_> {
         table: &str,
         given: &FamilyStateTable,
     ) -> Result<FamilyState, ScenarioFileError> {
+        let operator = self.operator(form, neuromuscular, table, given)?;
+        let Some(element) = &given.controlled_element else {
+            return Err(self.keys(&format!(
+                "[{table}] lacks controlled_element, such as controlled_element = \"1/s\" or \"90/(s(s+6))\""
+            )));
+        };
+        Ok(FamilyState {
+            operator,
+            controlled_element: self.element(&format!("{table}.controlled_element"), element)?,
+        })
+    }
+
+    fn operator(
+        &self,
+        form: Form,
+        neuromuscular: bool,
+        table: &str,
+        given: &FamilyStateTable,
+    ) -> Result<FamilyOperator, ScenarioFileError> {
         for (key, value) in given.numbers() {
             // An infinite lag is an integrator.
             if let Some(value) = value.filter(|value| !(key == "T_I_s" && value.is_infinite())) {
@@ -124,6 +148,7 @@ impl Source<'_> {
                     }
                 },
                 Coordinate::Gain if form == Form::QuadraticIntegral => (&["K_I"], need("K_I", given.k_i)?),
+                Coordinate::Gain if form.is_derivative() => (&["K_d_s"], need("K_d_s", given.k_d_s)?),
                 Coordinate::Gain => (&["K"], need("K", given.k)?),
                 Coordinate::Lead => (&["T_L_s"], need("T_L_s", given.t_l_s)?),
                 Coordinate::LagRate => (&["T_I_s"], 1.0 / positive("T_I_s", given.t_i_s)?),
@@ -151,14 +176,49 @@ impl Source<'_> {
                 used.join(", ")
             )));
         }
-        let Some(element) = &given.controlled_element else {
+        FamilyOperator::new(form, neuromuscular, &coordinates).map_err(|error| self.model(error))
+    }
+
+    fn form(&self, key: &str, given: &Spanned<String>) -> Result<Form, ScenarioFileError> {
+        let form = given.get_ref().parse();
+        form.map_err(|error: hoid_model::UnknownName| {
+            self.value(key, given.span().start, given.get_ref(), &error.to_string())
+        })
+    }
+
+    /// The response to a target, through the neuromuscular system of the operator.
+    fn feedforward(
+        &self,
+        given: FeedforwardTable,
+        scenario: &FamilyScenario,
+    ) -> Result<Feedforward, ScenarioFileError> {
+        let of = &scenario.initial.operator;
+        self.checked("feedforward.tau_f_s", given.tau_f_s, Limits::LEAD_S)?;
+        let preview_s = self.whole("feedforward.preview_s", given.preview_s, 0.0, scenario.sample_time, 0.0)?;
+        let delay_s = given.tau_f_s + preview_s;
+        // Rounding of a sum is none of the user's.
+        let delay_s = if delay_s.abs() < 1e-12 { 0.0 } else { delay_s };
+        if !(delay_s >= 0.0) {
             return Err(self.keys(&format!(
-                "[{table}] lacks controlled_element, such as controlled_element = \"1/s\" or \"90/(s(s+6))\""
+                "feedforward.tau_f_s is {}, expected no less than {}: nobody answers to what is not shown",
+                given.tau_f_s, -preview_s
             )));
+        }
+        let table = FamilyStateTable {
+            k: given.k,
+            k_over_t_i: given.k_over_t_i,
+            k_d_s: given.k_d_s,
+            t_l_s: given.t_l_s,
+            t_i_s: given.t_i_s,
+            omega_nm_rad_s: of.neuromuscular().map(|(omega, _)| omega),
+            zeta_nm: of.neuromuscular().map(|(_, zeta)| zeta),
+            tau_e_s: Some(delay_s),
+            ..FamilyStateTable::default()
         };
-        Ok(FamilyState {
-            operator: FamilyOperator::new(form, neuromuscular, &coordinates).map_err(|error| self.model(error))?,
-            controlled_element: self.element(&format!("{table}.controlled_element"), element)?,
+        let form = self.form("feedforward.form", &given.form)?;
+        Ok(Feedforward {
+            operator: self.operator(form, of.has_neuromuscular(), "feedforward", &table)?,
+            preview_s,
         })
     }
 
@@ -191,12 +251,20 @@ impl Source<'_> {
                 period_s: given.period_s.unwrap_or(usual.period_s),
                 largest: given.largest_multiple.unwrap_or(usual.largest),
                 rms: given.rms.unwrap_or(usual.rms),
+                interleaved: match &given.interleaved {
+                    None => usual.interleaved,
+                    Some(word) => word.get_ref().parse().map_err(|error: hoid_model::UnknownName| {
+                        let key = format!("{name}.interleaved");
+                        self.value(&key, word.span().start, word.get_ref(), &error.to_string())
+                    })?,
+                },
             };
             let mut excitation = sum.excitation().map_err(|error| self.model(error))?;
             excitation.random_phases = given.random_phases.unwrap_or(true);
             return Ok(excitation);
         };
-        if given.period_s.is_some() || given.largest_multiple.is_some() || given.rms.is_some() {
+        let of_primes = given.interleaved.is_some() || given.largest_multiple.is_some();
+        if given.period_s.is_some() || of_primes || given.rms.is_some() {
             return Err(self.keys(&format!(
                 "[{name}] has lines of its own and keys of a multi-sine: give one of both"
             )));
@@ -341,7 +409,7 @@ impl Source<'_> {
 /// What a number of an operator may be.
 fn limits_of(key: &str) -> Limits {
     match key {
-        "T_L_s" | "T_I_s" | "c_1_s" | "c_2_s2" | "tau_e_s" => Limits::LEAD_S,
+        "T_L_s" | "T_I_s" | "c_1_s" | "c_2_s2" | "tau_e_s" | "K_d_s" => Limits::LEAD_S,
         "omega_nm_rad_s" => Limits::FREQUENCY_RAD_S,
         "zeta_nm" => Limits::DAMPING,
         _ => Limits::GAIN,
@@ -349,11 +417,12 @@ fn limits_of(key: &str) -> Limits {
 }
 
 impl FamilyStateTable {
-    fn numbers(&self) -> [(&'static str, Option<f64>); 11] {
+    fn numbers(&self) -> [(&'static str, Option<f64>); 12] {
         [
             ("K", self.k),
             ("K_over_T_I", self.k_over_t_i),
             ("K_I", self.k_i),
+            ("K_d_s", self.k_d_s),
             ("T_L_s", self.t_l_s),
             ("T_I_s", self.t_i_s),
             ("c_1_s", self.c_1_s),
@@ -373,6 +442,7 @@ impl FamilyStateTable {
             k: gain(self.k, base.k),
             k_over_t_i: gain(self.k_over_t_i, base.k_over_t_i),
             k_i: self.k_i.or(base.k_i),
+            k_d_s: self.k_d_s.or(base.k_d_s),
             t_l_s: self.t_l_s.or(base.t_l_s),
             t_i_s: self.t_i_s.or(base.t_i_s),
             c_1_s: self.c_1_s.or(base.c_1_s),

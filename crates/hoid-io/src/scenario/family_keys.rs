@@ -29,6 +29,8 @@ pub(super) struct FamilyFile {
     pub(super) last: Option<FamilyStateTable>,
     pub(super) schedule: Option<ScheduleTable>,
     pub(super) target: Option<ExcitationTable>,
+    /// What the person does about a target that they see.
+    pub(super) feedforward: Option<FeedforwardTable>,
     pub(super) disturbance: Option<ExcitationTable>,
     #[serde(default)]
     pub(super) remnant: Vec<PartTable>,
@@ -49,6 +51,8 @@ pub(super) struct FamilyStateTable {
     pub(super) k_over_t_i: Option<f64>,
     #[serde(rename = "K_I")]
     pub(super) k_i: Option<f64>,
+    #[serde(rename = "K_d_s")]
+    pub(super) k_d_s: Option<f64>,
     #[serde(rename = "T_L_s")]
     pub(super) t_l_s: Option<f64>,
     /// `inf` is a pure integration.
@@ -65,6 +69,31 @@ pub(super) struct FamilyStateTable {
     pub(super) controlled_element: Option<Spanned<String>>,
 }
 
+/// The neuromuscular system is that of the operator.
+#[derive(Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub(super) struct FeedforwardTable {
+    /// `gain`, `lead`, `lag`, `derivative`, `derivative-lead` ...
+    #[schemars(with = "String")]
+    pub(super) form: Spanned<String>,
+    #[serde(rename = "K")]
+    pub(super) k: Option<f64>,
+    #[serde(rename = "K_over_T_I")]
+    pub(super) k_over_t_i: Option<f64>,
+    #[serde(rename = "K_d_s")]
+    pub(super) k_d_s: Option<f64>,
+    #[serde(rename = "T_L_s")]
+    pub(super) t_l_s: Option<f64>,
+    #[serde(rename = "T_I_s")]
+    pub(super) t_i_s: Option<f64>,
+    /// Delay to what happens now; not below `-preview_s`.
+    #[serde(default)]
+    pub(super) tau_f_s: f64,
+    /// How much of the future of the target is shown. Default: nothing.
+    #[schemars(with = "Option<f64>")]
+    pub(super) preview_s: Option<Number>,
+}
+
 /// A multi-sine at primes, or lines of one's own.
 #[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -73,6 +102,9 @@ pub(super) struct ExcitationTable {
     pub(super) largest_multiple: Option<u32>,
     pub(super) rms: Option<f64>,
     pub(super) lines: Option<Vec<LineTable>>,
+    /// Which of the primes: `all`, or every other one, `even` or `odd`, so that target and disturbance do not meet.
+    #[schemars(with = "Option<String>")]
+    pub(super) interleaved: Option<Spanned<String>>,
     /// Whether each run draws its phases. Default: true without lines.
     pub(super) random_phases: Option<bool>,
 }

@@ -137,3 +137,29 @@ fn what_does_not_fit_is_refused_with_its_remedy() {
     ));
     assert!(family_scenario_schema().contains("K_over_T_I"));
 }
+
+const PURSUIT: &str = include_str!("../../../../fixtures/scenario/pursuit.toml");
+
+#[test]
+fn a_target_that_is_seen_is_read() {
+    let scenario = parse(PURSUIT).unwrap();
+    let seen = scenario.feedforward.as_ref().unwrap();
+    let muscles = [11.0_f64.ln(), 0.3_f64.ln()];
+    assert_eq!((seen.operator.form(), seen.preview_s), (Form::Derivative, 0.25));
+    let expected = [0.7, muscles[0], muscles[1], 0.2];
+    for (found, expected) in seen.operator.coordinates().iter().zip(expected) {
+        assert!((found - expected).abs() < 1e-15, "{seen:?}");
+    }
+    let lines = |excitation: &hoid_model::family_scenario::Excitation| excitation.function.sinusoids().len();
+    assert_eq!((lines(&scenario.target), lines(&scenario.disturbance)), (5, 6));
+    for (from, to, expected) in [
+        ("tau_f_s = -0.05", "tau_f_s = -0.3", "not shown"),
+        ("form = \"derivative\"", "form = \"bent\"", "form of the operator"),
+        ("K_d_s = 0.7", "K = 0.7", "K_d_s"),
+        ("interleaved = \"even\"", "interleaved = \"some\"", "even"),
+        ("[target]\ninterleaved = \"even\"", "", "no [target]"),
+    ] {
+        let error = parse(&PURSUIT.replace(from, to)).unwrap_err().to_string();
+        assert!(error.contains(expected), "{to}: {error}");
+    }
+}

@@ -1,7 +1,7 @@
 //! Tasks of people: any operator of the family around any proper controlled element, with a remnant
 //! of several parts and a stick that drifts.
 //!
-//! `e = f - y`, `u = Y e + n`, `y = P (u + d)`: a target f, a disturbance d at the input of the
+//! `e = f - y`, `u = Y e + F f + n`, `y = P (u + d)`: a target f, which the person may see (F, [`Feedforward`]), a disturbance d at the input of the
 //! controlled element P. What changes goes along the sigmoid of eq. 5 as in
 //! [`Scenario`](crate::scenario::Scenario), which is the task of the reference text and stays apart:
 //! its operator is the lead, its element `K_c/(s(s + omega_b))`.
@@ -18,7 +18,7 @@ mod remnant;
 mod scenario;
 mod state;
 
-pub use multi_sine::{Excitation, MultiSine};
+pub use multi_sine::{Excitation, Interleaved, MultiSine};
 pub use remnant::{Followed, Intermittence, PartStrength, Pulses, RemnantPart, RemnantShape, SignalDependence, Stick};
-pub use scenario::{FamilyScenario, ResolvedFamilyScenario};
+pub use scenario::{FamilyScenario, Feedforward, ResolvedFamilyScenario};
 pub use state::FamilyState;

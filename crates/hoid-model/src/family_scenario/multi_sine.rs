@@ -32,7 +32,23 @@ pub struct MultiSine {
     pub largest: u32,
     /// Root mean square. Default 1.
     pub rms: f64,
+    /// Which of the primes it has. Default all.
+    pub interleaved: Interleaved,
 }
+
+/// Lines of a target and of a disturbance that do not meet: every other prime for each.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Interleaved {
+    /// All primes.
+    #[default]
+    All,
+    /// The second, fourth, ... of them: 3, 7, 13 ...
+    Even,
+    /// The first, third, ... of them: 2, 5, 11 ...
+    Odd,
+}
+
+crate::named_choice!(Interleaved, "lines of a multi-sine", 3, { All => "all", Even => "even", Odd => "odd" });
 
 impl Default for MultiSine {
     fn default() -> Self {
@@ -40,15 +56,21 @@ impl Default for MultiSine {
             period_s: 20.0,
             largest: 31,
             rms: 1.0,
+            interleaved: Interleaved::All,
         }
     }
 }
 
 impl MultiSine {
-    /// The primes up to the largest multiple.
+    /// The primes up to the largest multiple that it has.
     pub fn multiples(&self) -> Vec<u32> {
         let is_prime = |n: &u32| (2..).take_while(|d| d * d <= *n).all(|d| !n.is_multiple_of(d));
-        (2..=self.largest).filter(is_prime).collect()
+        let (from, step) = match self.interleaved {
+            Interleaved::All => (0, 1),
+            Interleaved::Even => (1, 2),
+            Interleaved::Odd => (0, 2),
+        };
+        (2..=self.largest).filter(is_prime).skip(from).step_by(step).collect()
     }
 
     /// The excitation, its phases drawn anew in each run.
@@ -70,9 +92,13 @@ impl MultiSine {
         if !(self.rms.is_finite() && self.rms >= 0.0) {
             return refuse("rms of a multi-sine", self.rms, "a finite number, zero or more");
         }
-        if !(2..=10_000).contains(&self.largest) {
+        if !(2..=10_000).contains(&self.largest) || self.multiples().is_empty() {
             let found = f64::from(self.largest);
-            return refuse("largest multiple of a multi-sine", found, "2 to 10000");
+            return refuse(
+                "largest multiple of a multi-sine",
+                found,
+                "2 to 10000, and a prime that it has",
+            );
         }
         let multiples = self.multiples();
         let power: f64 = multiples.iter().map(|p| f64::from(*p).powi(-2) / 2.0).sum();
@@ -102,6 +128,20 @@ mod tests {
         let lines = excitation.function.sinusoids();
         assert!((lines[0].omega_rad_s - 0.2 * std::f64::consts::PI).abs() < 1e-14);
         assert!((lines[10].amplitude_deg * 31.0 - lines[0].amplitude_deg * 2.0).abs() < 1e-14);
+    }
+
+    #[test]
+    fn interleaved_lines_do_not_meet() {
+        let of = |interleaved| MultiSine {
+            interleaved,
+            ..MultiSine::default()
+        };
+        let (even, odd) = (of(Interleaved::Even), of(Interleaved::Odd));
+        assert_eq!(even.multiples(), [3, 7, 13, 19, 29]);
+        assert_eq!(odd.multiples(), [2, 5, 11, 17, 23, 31]);
+        assert!((even.excitation().unwrap().function.rms_deg() - 1.0).abs() < 1e-14);
+        let none = MultiSine { largest: 2, ..even };
+        assert!(none.excitation().is_err());
     }
 
     #[test]

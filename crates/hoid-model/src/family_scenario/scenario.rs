@@ -6,10 +6,12 @@ use super::{
     state::FamilyState,
 };
 use crate::{
-    ModelError, SampleTime, delayed_operator::whole_samples, operator_family::Coordinate, scenario::Realisation,
-    schedule::Schedule,
+    FamilyOperator, ModelError, SampleTime, delayed_operator::whole_samples, operator_family::Coordinate,
+    scenario::Realisation, schedule::Schedule,
 };
 
+/// Longest future that is shown, s.
+const LONGEST_PREVIEW_S: f64 = 60.0;
 /// Longest run, in samples.
 const MOST_SAMPLES: usize = 100_000_000;
 
@@ -26,6 +28,8 @@ pub struct FamilyScenario {
     pub schedule: Schedule,
     /// Target f.
     pub target: Excitation,
+    /// The response to a target that is seen, in u; `None` for a display of the error alone.
+    pub feedforward: Option<Feedforward>,
     /// Disturbance d at the input of the controlled element, held over each sample.
     pub disturbance: Excitation,
     /// Independent parts of the remnant.
@@ -40,6 +44,15 @@ pub struct FamilyScenario {
     pub run_in_s: f64,
     /// Where the leading gain of the controlled element stands.
     pub realisation: Realisation,
+}
+
+/// What a person does about a target that they see.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Feedforward {
+    /// The response; its delay is that to what is shown last.
+    pub operator: FamilyOperator,
+    /// How much of the future is shown, s.
+    pub preview_s: f64,
 }
 
 /// A scenario that has been checked.
@@ -61,6 +74,7 @@ impl FamilyScenario {
             initial: state,
             schedule: Schedule::Constant,
             target: Excitation::default(),
+            feedforward: None,
             disturbance: Excitation::default(),
             remnant: Vec::new(),
             stick: Stick::default(),
@@ -124,6 +138,13 @@ impl FamilyScenario {
                 let late = tau - whole as f64;
                 (whole, if late < 1e-9 { 0.0 } else { late })
             };
+        }
+        if let Some(seen) = &self.feedforward {
+            whole("future of the target that is shown in s", seen.preview_s)?;
+            if seen.preview_s > LONGEST_PREVIEW_S {
+                let quantity = "future of the target that is shown in s";
+                return Err(wrong(quantity, seen.preview_s, "60 s at most"));
+            }
         }
         self.remnant.iter().try_for_each(RemnantPart::check)?;
         self.stick.check()?;
@@ -204,7 +225,7 @@ impl ResolvedFamilyScenario {
         }
         let operator = &state.operator;
         Ok(FamilyState {
-            operator: crate::FamilyOperator::new(operator.form(), operator.has_neuromuscular(), &coordinates)?,
+            operator: FamilyOperator::new(operator.form(), operator.has_neuromuscular(), &coordinates)?,
             ..state
         })
     }

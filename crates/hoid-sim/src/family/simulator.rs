@@ -8,6 +8,7 @@
 
 use std::f64::consts::TAU;
 
+use hoid_core::filter::{divide_in_place, fir};
 use hoid_model::{
     Channel, Record,
     family_scenario::{Excitation, FamilyScenario, FamilyState, ResolvedFamilyScenario, Stick},
@@ -166,6 +167,7 @@ impl FamilySimulator {
             d: phased(&scenario.disturbance, run, DISTURBANCE_PHASES)?.samples(start_s, ts, samples),
             ..FamilySignals::default()
         };
+        let seen = self.response_to_target(run)?;
         let mut remnant = RemnantRun::new(&self.scenario, &self.remnants, run);
         let mut state = LoopState::at_rest(self.held(0), self.longest_delay());
         for k in 0..samples {
@@ -173,7 +175,8 @@ impl FamilySimulator {
             let inputs = Inputs {
                 target: signals.f[k],
                 disturbance: signals.d[k],
-                remnant: n,
+                // What the person does about the target depends on nothing in the loop.
+                remnant: n + seen.get(k).copied().unwrap_or(0.0),
             };
             let now = self.held(k).step(&mut state, inputs);
             remnant.follow(&self.scenario, &self.remnants, k, now.u);
@@ -192,6 +195,22 @@ impl FamilySimulator {
             }
         }
         Ok(signals)
+    }
+
+    /// The response to a target that is seen, from rest; empty where it is not.
+    fn response_to_target(&self, run: RunSeed) -> Result<Vec<f64>, SimError> {
+        let scenario = self.scenario.scenario();
+        let Some(seen) = &scenario.feedforward else {
+            return Ok(Vec::new());
+        };
+        let (ts, samples) = (scenario.sample_time, self.samples());
+        let shown_s = self.scenario.time_s(0) + seen.preview_s;
+        let shown = phased(&scenario.target, run, TARGET_PHASES)?.samples(shown_s, ts, samples);
+        let held = seen.operator.hold(ts)?;
+        let mut response = vec![0.0; samples];
+        fir(&held.b, held.nk, &shown, &mut response);
+        divide_in_place(&held.f, &mut response);
+        Ok(response)
     }
 
     /// One run as a record of the measurement (or from the start of the run-in): e, u, d, y, n, and

@@ -1,0 +1,165 @@
+//! `hoid identify` of a person who sees a target besides the error.
+#![allow(clippy::unwrap_used)]
+
+mod common;
+
+use std::{fs, path::Path};
+
+use common::{bad, good, json};
+use serde_json::Value;
+use tempfile::TempDir;
+
+const PURSUIT: &str = include_str!("../../../fixtures/scenario/pursuit.toml");
+
+/// Runs of the scenario, as a display shows it: the target f_t is seen.
+fn runs(at: &Path, scenario: &str, n: usize) -> Vec<String> {
+    fs::write(at.join("task.toml"), scenario).unwrap();
+    let of = |seed: usize| {
+        let name = format!("run{seed}.csv");
+        let seed = seed.to_string();
+        good(
+            at,
+            &["simulate", "--scenario", "task.toml", "--seed", &seed, "--out", &name],
+        );
+        name
+    };
+    (1..=n).map(of).collect()
+}
+
+fn of<'v>(parameters: &'v Value, name: &str) -> &'v Value {
+    let all = parameters.as_array().unwrap();
+    all.iter().find(|p| p["name"] == name).unwrap()
+}
+
+/// Standard errors by which an estimate is off.
+fn off(estimate: &Value, truth: f64) -> f64 {
+    (estimate["value"].as_f64().unwrap() - truth) / estimate["standard_error"].as_f64().unwrap()
+}
+
+fn kinds(found: &Value) -> Vec<String> {
+    let all = found["verdict"]["findings"].as_array().cloned().unwrap_or_default();
+    all.iter()
+        .filter_map(|f| Some(f["kind"].as_str()?.to_owned()))
+        .collect()
+}
+
+#[test]
+fn both_responses_are_found_and_one_input_is_told_off() {
+    let at = TempDir::new().unwrap();
+    let runs = runs(at.path(), PURSUIT, 3);
+    let files: Vec<&str> = runs.iter().map(String::as_str).collect();
+    let element = ["--controlled-element", "1/s", "--intersample", "zoh", "--json"];
+    let two = [
+        &["identify"][..],
+        &files,
+        &["--input", "e", "--input", "f_t", "--role", "f_t=feedforward:0.25"],
+        &element,
+    ];
+    let two = json(at.path(), &two.concat());
+    let channels = two["channels"].as_array().unwrap();
+    assert_eq!(
+        (channels[0]["role"].as_str(), channels[1]["role"].as_str()),
+        (Some("feedback"), Some("feedforward"))
+    );
+    assert_eq!(channels[1]["form"], "derivative", "{:?}", channels[1]);
+    for (parameters, name, truth) in [
+        (&channels[0]["parameters"], "K", 2.2),
+        (&channels[0]["parameters"], "tau_e", 0.2),
+        (&channels[1]["parameters"], "K_d", 0.7),
+        (&channels[1]["parameters"], "tau_f", -0.05),
+    ] {
+        let off = off(of(parameters, name), truth);
+        assert!(off.abs() < 3.5, "{name} is off by {off} errors");
+    }
+    // By hand: |2.2/omega| = 1 but for the neuromuscular system.
+    let crossover = &two["open_loop"]["crossover_rad_s"];
+    assert!(off(crossover, 2.236).abs() < 3.5, "{crossover}");
+
+    let one = json(at.path(), &[&["identify"][..], &files, &element].concat());
+    assert_eq!(one["verdict"]["level"], "doubtful");
+    assert!(
+        one["verdict"]["reasons"].to_string().contains("responds to f_t"),
+        "{:?}",
+        one["verdict"]
+    );
+    assert!(one.get("channels").is_none());
+
+    let text = good(
+        at.path(),
+        &[
+            &["identify"][..],
+            &files,
+            &["--role", "f_t=feedforward:0.25", "--controlled-element", "1/s"],
+        ]
+        .concat(),
+    );
+    for words in [
+        "Response to f_t (feedforward): derivative",
+        "K_d (s)",
+        "tau_f (s)",
+        "F·M of f_t",
+    ] {
+        assert!(text.contains(words), "{words}: {text}");
+    }
+}
+
+#[test]
+fn a_target_that_is_not_seen_has_no_response() {
+    let at = TempDir::new().unwrap();
+    let start = PURSUIT.find("[feedforward]").unwrap();
+    let end = PURSUIT.find("[disturbance]").unwrap();
+    let compensatory = format!("{}{}", &PURSUIT[..start], &PURSUIT[end..]);
+    let runs = runs(at.path(), &compensatory, 2);
+    let files: Vec<&str> = runs.iter().map(String::as_str).collect();
+    let one = json(at.path(), &[&["identify"][..], &files, &["--json"]].concat());
+    assert!(!kinds(&one).contains(&"other-input".to_owned()), "{:?}", one["verdict"]);
+    let text = good(
+        at.path(),
+        &[&["identify"][..], &files, &["--input", "e", "--input", "f_t"]].concat(),
+    );
+    assert!(text.contains("No response to f_t (feedforward) was found"), "{text}");
+}
+
+#[test]
+fn a_target_alone_leaves_a_doubt() {
+    let at = TempDir::new().unwrap();
+    let alone = PURSUIT.replace("interleaved = \"odd\"", "interleaved = \"odd\"\nrms = 0");
+    let runs = runs(at.path(), &alone, 1);
+    let two = json(
+        at.path(),
+        &["identify", &runs[0], "--role", "f_t=feedforward:0.25", "--json"],
+    );
+    let found = two["channels"][1]["form"].is_string();
+    assert!(
+        !found || two["verdict"]["level"] != "trustworthy",
+        "{:?}",
+        two["verdict"]
+    );
+}
+
+#[test]
+fn inputs_without_a_meaning_are_refused_with_the_remedy() {
+    let at = TempDir::new().unwrap();
+    let runs = runs(at.path(), PURSUIT, 1);
+    let run = runs[0].as_str();
+    for (options, expected) in [
+        (&["identify", run, "--input", "e", "--input", "q"][..], "no channel q"),
+        (&["identify", run, "--role", "y=output,f_t=feedforward"], "drop one of"),
+        (&["identify", run, "--role", "f_t=sight"], "feedforward"),
+        (
+            &["identify", run, "--input", "e", "--role", "f_t=feedback"],
+            "the feedback is the first --input",
+        ),
+        (
+            &["identify", run, "--structure", "bj", "--role", "f_t=feedforward"],
+            "--role belongs to",
+        ),
+        (
+            &["track", run, "--input", "e", "--input", "f_t"],
+            "one --input is read here",
+        ),
+    ] {
+        let (_, message) = bad(at.path(), options);
+        assert!(message.contains(expected), "{options:?}: {message}");
+    }
+}
