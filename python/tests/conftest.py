@@ -40,6 +40,28 @@ def fit(c1: pyhoid.Record) -> pyhoid.Fit:
     return pyhoid.identify(c1, "bj", nb=2, nd=1, nf=2, nk=29)
 
 
+@pytest.fixture
+def group_results(tmp_path: Path) -> Path:
+    """Results of a group of four people in two conditions."""
+    people = [
+        {
+            "subject": subject,
+            "condition": condition,
+            "run": "all",
+            "runs": 5,
+            "form": "lead",
+            "parameters": {"tau_e": {"value": 0.6 / crossover, "standard_error": 0.01}},
+            "open_loop": {"crossover_rad_s": {"value": crossover, "standard_error": 0.1}},
+            "verdict": {"level": "trustworthy", "reasons": []},
+        }
+        for subject, fo, so in [("P03", 2.0, 1.2), ("P05", 4.0, 3.3), ("P09", 3.0, 2.6), ("P11", 3.1, 2.2)]
+        for condition, crossover in [("fo", fo), ("so", so)]
+    ]
+    path = tmp_path / "results.json"
+    path.write_text(json.dumps({"group": "pilots", "people": people}))
+    return path
+
+
 class CommandLine:
     """The binary of the same sources; `cargo xtask test` names it in HOID_BINARY."""
 

@@ -271,9 +271,10 @@ def test_files(tmp_path: Path, c1: pyhoid.Record) -> None:
         prepared.sample_time == 0.02 and prepared.units["u"] == "rad" and len(prepared.steps) == 4
     )
     assert abs(prepared.u.mean()) < 1e-12
-    named = pyhoid.read(tmp_path / "a.csv", unit={"e": "deg", "u": "V"})
+    (tmp_path / "plain.csv").write_text("t,e,u\n0,1,2\n0.1,3,4\n")
+    named = pyhoid.read(tmp_path / "plain.csv", unit={"e": "deg", "u": "V"})
     assert (named.units["e"], named.units["u"]) == ("deg", "V")
-    np.testing.assert_array_equal(named.u, c1.u)
+    np.testing.assert_array_equal(named.u, [2.0, 4.0])
     trace = pyhoid.track(c1, "rls", nk=29, every=100)
     trace.write(tmp_path / "trace.csv", ["a comment"])
     assert (tmp_path / "trace.csv").read_text().startswith("# a comment")

@@ -44,6 +44,7 @@ def test_every_method_has_an_example_that_runs(
     c1: pyhoid.Record,
     c4: pyhoid.Record,
     fit: pyhoid.Fit,
+    group_results: Path,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -61,6 +62,7 @@ def test_every_method_has_an_example_that_runs(
         "change": pyhoid.identify(c4, change="sigmoid"),
         "trace": pyhoid.track(c4, "physical", nk=29, nd=1, every=64),
         "tracker": pyhoid.Tracker("physical", nk=29, nd=1, record=c1),
+        "found": pyhoid.compare(group_results),
         "results": pyhoid.study("noise-level", "study", replications=1),
         "pandas": pytest.importorskip("pandas"),
         "polars": pytest.importorskip("polars"),

@@ -130,7 +130,7 @@ const fn slow_of(name: &'static str, package: &'static str, example: &'static st
     }
 }
 
-const SLOW: [Slow; 15] = [
+const SLOW: [Slow; 16] = [
     slow_of("people-coverage", "hoid", "people_coverage"),
     Slow {
         program: Some("hoid-cli"),
@@ -139,6 +139,7 @@ const SLOW: [Slow; 15] = [
     slow_of("faults-clean", "hoid-evidence", "faults_clean"),
     slow_of("little-noise", "hoid-evidence", "little_noise"),
     slow_of("intersample-coverage", "hoid-evidence", "intersample_coverage"),
+    slow_of("inputs-coverage", "hoid-evidence", "inputs_coverage"),
     slow_of("tracker-faults", "hoid", "tracker_faults"),
     Slow {
         profile: "dev",

@@ -27,6 +27,7 @@ impl Signal {
             period_s: self.period_s,
             largest: self.largest,
             rms: self.rms,
+            ..MultiSine::default()
         }
         .excitation()
     }
