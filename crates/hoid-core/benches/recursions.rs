@@ -10,7 +10,7 @@ use hoid_core::{
     adaptation::Forgetting,
     adaptive::{
         AdaptiveFilter, memory_needed,
-        usual::{REPLAYED_S, Usual},
+        defaults::{REPLAYED_S, DefaultOperator},
     },
     covariance::Covariance,
     error_bars::{ErrorBars, NoErrorBars},
@@ -174,9 +174,9 @@ fn plain(data: &[(f64, f64)], history: &mut Vec<[f64; 4]>) {
 
 /// A person in the basis that people share, at its usual settings.
 fn person() -> AdaptiveFilter<Vec<f64>> {
-    let (usual, ts) = (Usual::with_delay(0.285), 0.01);
+    let (default_operator, ts) = (DefaultOperator::with_delay(0.285), 0.01);
     let memory = vec![0.0; memory_needed(ts, REPLAYED_S)];
-    AdaptiveFilter::new(usual.prior(ts), memory).unwrap()
+    AdaptiveFilter::new(default_operator.prior(ts), memory).unwrap()
 }
 
 /// Goes on with a person: from the beginning, where replays are short, or from where they are long.

@@ -6,11 +6,11 @@ use hoid_core::{
         AdaptiveFilter, AdaptivePrior, GAINS, LARGEST_ORDER, STATES,
         basis::{Basis, Point},
         detector::Detection,
-        known::Known,
+        initial_estimate::InitialEstimate,
         least_memory, memory_needed,
         mixture::ChangePrior,
         noise::Lags,
-        usual::{REPLAYED_S, Usual},
+        defaults::{REPLAYED_S, DefaultOperator},
     },
     state::State,
 };
@@ -28,11 +28,11 @@ fn prior(threshold: f64) -> AdaptivePrior {
             held: [3.3, 0.125, 0.05],
             refractory: 16,
         },
-        ..Usual::with_delay(0.2).prior(TS)
+        ..DefaultOperator::with_delay(0.2).prior(TS)
     }
 }
 
-fn usual() -> Point {
+fn default_operator() -> Point {
     Point {
         tau: 0.2,
         omega: 11.0,
@@ -80,7 +80,7 @@ struct Person {
 
 impl Person {
     fn new(seed: u64) -> Self {
-        Self::at(seed, usual())
+        Self::at(seed, default_operator())
     }
 
     fn at(seed: u64, point: Point) -> Self {
@@ -194,7 +194,7 @@ fn a_steep_remnant_is_no_harder_than_a_flat_one() {
                 assert!((0.7..1.5).contains(&ratio), "{poles} poles: {ratio}");
             }
         }
-        let truth = response(&basis(usual()), GAINS_OF_A_PERSON, 2.0);
+        let truth = response(&basis(default_operator()), GAINS_OF_A_PERSON, 2.0);
         let (value, variance) = estimate(&filter, 2.0);
         for part in 0..2 {
             let z = (value[part] - truth[part]) / variance[part].sqrt();
@@ -213,7 +213,7 @@ fn neuromuscular_system_and_delay_are_found() {
         tau: 0.22,
         omega: 13.0,
         zeta: 0.35,
-        ..usual()
+        ..default_operator()
     };
     for seed in 0..3 {
         let (mut person, mut filter) = (Person::at(300 + seed, point), filter(1e9));
@@ -221,7 +221,7 @@ fn neuromuscular_system_and_delay_are_found() {
             let [e, u] = person.sample(GAINS_OF_A_PERSON, 0.02);
             filter.step(e, u);
         }
-        let found = filter.held();
+        let found = filter.dynamics();
         let near = |found: f64, truth: f64, by: f64| (found - truth).abs() < by;
         let all = near(found.omega, 13.0, 0.4) && near(found.zeta, 0.35, 0.04) && near(found.tau, 0.22, 0.004);
         assert!(all && filter.basis().point().omega > 12.0, "{seed}: {found:?}");
@@ -233,13 +233,13 @@ fn one_who_is_far_from_what_is_usual_is_found() {
     // A delay 100 ms later than what is supposed, and a system of 16 rad/s that acts 60 ms earlier: from
     // the usual person the corrections end elsewhere.
     for (point, seed) in [
-        (Point { tau: 0.3, ..usual() }, 400),
+        (Point { tau: 0.3, ..default_operator() }, 400),
         (
             Point {
                 tau: 0.14,
                 omega: 16.0,
                 zeta: 0.15,
-                ..usual()
+                ..default_operator()
             },
             401,
         ),
@@ -249,7 +249,7 @@ fn one_who_is_far_from_what_is_usual_is_found() {
             let [e, u] = person.sample(GAINS_OF_A_PERSON, 0.02);
             filter.step(e, u);
         }
-        let found = filter.held();
+        let found = filter.dynamics();
         assert!((found.tau - point.tau).abs() < 0.003, "{seed}: {found:?}");
         assert!((found.omega / point.omega - 1.0).abs() < 0.06, "{seed}: {found:?}");
     }
@@ -257,7 +257,7 @@ fn one_who_is_far_from_what_is_usual_is_found() {
 
 #[test]
 fn a_change_of_the_delay_is_found_and_told_from_one_of_the_gains() {
-    let later = Point { tau: 0.21, ..usual() };
+    let later = Point { tau: 0.21, ..default_operator() };
     let mut found = 0;
     for seed in 600..604 {
         let (mut person, mut filter) = (Person::new(seed), filter(12.5));
@@ -362,7 +362,7 @@ fn a_copy_goes_on_with_the_same_digits() {
     for k in 0..1000 {
         let [e, u] = person.sample(GAINS_OF_A_PERSON, 0.05);
         assert_eq!(first.step(e, u), second.step(e, u), "{k}");
-        assert_eq!(first.detector().against_chance(), second.detector().against_chance());
+        assert_eq!(first.detector().log_significance(), second.detector().log_significance());
     }
     assert_eq!(estimate(&first, 2.0), estimate(&second, 2.0));
 }
@@ -373,17 +373,17 @@ fn what_says_nothing_does_no_harm() {
     for _ in 0..500 {
         assert_eq!(silent.step(0.0, 0.0).innovation, 0.0);
     }
-    assert!(!silent.began());
+    assert!(!silent.has_started());
     // No error ever, an output that moves: nothing to begin with.
     let mut stream = Stream(3);
     for _ in 0..500 {
         silent.step(0.0, stream.normal());
     }
-    assert!(!silent.began());
+    assert!(!silent.has_started());
 
     let (mut person, mut filter) = (Person::new(9), filter(12.5));
     let [e, u] = person.sample(GAINS_OF_A_PERSON, 0.05);
-    assert!(filter.step(e, u).innovation.is_finite() && !filter.began());
+    assert!(filter.step(e, u).innovation.is_finite() && !filter.has_started());
     for k in 0..2000 {
         let [e, u] = person.sample(GAINS_OF_A_PERSON, 0.05);
         match k % 7 {
@@ -431,7 +431,7 @@ fn what_makes_no_sense_is_refused() {
     };
     for wrong in [
         AdaptivePrior {
-            person: Point { tau: 1.0, ..usual() },
+            person: Point { tau: 1.0, ..default_operator() },
             ..sound
         },
         AdaptivePrior { order: 1, ..sound },
@@ -506,7 +506,7 @@ fn what_is_known_stands_at_the_beginning() {
         let of = |a: f64, b: f64| a.powi(k as i32 + 1) / ((a - b) * (1.0 - a * b) * (1.0 - a * a));
         of(pole, other_pole) + of(other_pole, pole)
     });
-    let known = Known {
+    let known = InitialEstimate {
         state,
         covariance,
         variance: 0.05 * 0.05,
@@ -514,14 +514,14 @@ fn what_is_known_stands_at_the_beginning() {
         remnant: Some((lags, 20.0)),
     };
     let mut told = filter(1e9).with_initial_estimate(&known).expect("a sound estimate");
-    assert!(told.began() && (told.d()[0] + 1.6).abs() < 0.01 && (told.d()[1] - 0.63).abs() < 0.01);
+    assert!(told.has_started() && (told.d()[0] + 1.6).abs() < 0.01 && (told.d()[1] - 0.63).abs() < 0.01);
     let spread = told.state_covariance();
     for i in 0..STATES {
         for j in 0..STATES {
             assert!((spread[i][j] - covariance[i][j]).abs() < 1e-12);
         }
     }
-    let (value, truth) = (told.response(2.0), response(&basis(usual()), GAINS_OF_A_PERSON, 2.0));
+    let (value, truth) = (told.response(2.0), response(&basis(default_operator()), GAINS_OF_A_PERSON, 2.0));
     assert!((value[0] - truth[0]).hypot(value[1] - truth[1]) < 1e-9);
     // Beside one who begins with nothing, over ten seconds.
     let (mut person, mut other) = (Person::new(3), filter(1e9));
@@ -538,12 +538,12 @@ fn what_is_known_stands_at_the_beginning() {
     }
     assert!(errors[0] < 0.25 * errors[1], "{errors:?}");
     for wrong in [
-        Known { unit: 0.0, ..known },
-        Known {
+        InitialEstimate { unit: 0.0, ..known },
+        InitialEstimate {
             variance: f64::NAN,
             ..known
         },
-        Known {
+        InitialEstimate {
             remnant: Some(([0.0; LARGEST_ORDER + 1], 1.0)),
             ..known
         },

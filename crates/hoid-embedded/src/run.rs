@@ -7,7 +7,7 @@ use core::{ffi::CStr, fmt::Arguments};
 
 use hoid_core::adaptive::{
     AdaptiveFilter, PARAMETERS,
-    usual::{GIVEN_DELAY_S, SPREAD, Usual},
+    defaults::{GIVEN_DELAY_S, SPREAD, DefaultOperator},
 };
 
 /// The file of the samples.
@@ -41,9 +41,9 @@ pub fn run(
     read: impl FnMut(&mut [u8]) -> Result<usize, &'static str>,
     mut write: impl FnMut(Arguments<'_>) -> Result<(), &'static str>,
 ) -> Result<(), &'static str> {
-    let supposed = Usual {
+    let supposed = DefaultOperator {
         spread: [SPREAD[0], SPREAD[1], GIVEN_DELAY_S],
-        ..Usual::with_delay((NK - 0.5) * SAMPLE_TIME_S)
+        ..DefaultOperator::with_delay((NK - 0.5) * SAMPLE_TIME_S)
     };
     let mut filter =
         Filter::new(supposed.prior(SAMPLE_TIME_S), [0.0; MEMORY]).ok_or("there is no filter for this prior")?;
@@ -53,7 +53,7 @@ pub fn run(
     while let Some((e, u)) = lines.next()? {
         filter.step(e, u);
         samples += 1;
-        if samples.is_multiple_of(EVERY) && filter.began() {
+        if samples.is_multiple_of(EVERY) && filter.has_started() {
             let (values, covariance) = (filter.operator(), filter.operator_covariance());
             let [a, b, c, d, t]: [f64; PARAMETERS] = values;
             let se = |i: usize| libm::sqrt(covariance[i][i]);

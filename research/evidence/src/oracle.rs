@@ -8,7 +8,7 @@
 //!
 //! over the first seconds after the change, each without its mean. It needs about 12 where once an hour may
 //! be wrong; without knowing both persons, more.
-use hoid_core::adaptive::{basis::Basis, usual::Usual};
+use hoid_core::adaptive::{basis::Basis, defaults::DefaultOperator};
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 
 const ORDER: usize = 16;
@@ -25,7 +25,7 @@ pub struct Rows {
 impl Rows {
     /// Of error and output with a ramp of `from` rows before.
     pub fn new(e: &[f64], u: &[f64], from: usize, ts: f64) -> Self {
-        let point = Usual::with_delay(DELAY_S + 0.5 * ts).point;
+        let point = DefaultOperator::with_delay(DELAY_S + 0.5 * ts).point;
         let mut basis = Basis::new(point, ts).unwrap();
         let delay = basis.delay();
         let step = |k: usize| {

@@ -29,9 +29,9 @@
 //! Each x_i is divided by its gain at [`REFERENCE`], so that all gains are in units of |Y| there.
 
 use super::{
-    pair::Pair,
-    past::{Paired, paired},
-    sizes::{GAINS, HELD, LINEAR, SIGNALS, STATES},
+    f64x2::F64x2,
+    signal_history::{Paired, paired},
+    sizes::{GAINS, DYNAMICS, LINEAR, SIGNALS, STATES},
 };
 
 /// Frequency at which each response has a gain of one, rad/s.
@@ -66,7 +66,7 @@ crate::state!([] Point { tau, omega, zeta, lag });
 
 impl Point {
     /// Moved by corrections of omega, zeta and tau.
-    pub fn moved(self, [omega, zeta, tau]: [f64; HELD]) -> Self {
+    pub fn moved(self, [omega, zeta, tau]: [f64; DYNAMICS]) -> Self {
         Self {
             tau: self.tau + tau,
             omega: self.omega + omega,
@@ -82,7 +82,7 @@ pub struct Regressors {
     /// x_i.
     pub x: [f64; GAINS],
     /// Derivatives.
-    pub by: [[f64; GAINS]; HELD],
+    pub by: [[f64; GAINS]; DYNAMICS],
 }
 
 /// The filter of a point.
@@ -114,8 +114,8 @@ impl Basis {
         let mut basis = Self {
             point,
             sample_time,
-            columns: [[Pair::ZERO; SIGNALS / 2]; N],
-            taps: [[Pair::ZERO; SIGNALS / 2]; 3],
+            columns: [[F64x2::ZERO; SIGNALS / 2]; N],
+            taps: [[F64x2::ZERO; SIGNALS / 2]; 3],
             monic: [0.0; N],
             delay: 0,
             part: 0.0,
@@ -239,13 +239,13 @@ impl Basis {
     /// The signals of a sample from the errors of `delay`, `delay + 1` and `delay + 2` samples ago.
     #[inline(always)]
     pub fn step(&mut self, errors: [f64; 3]) -> Signals {
-        let mut sums = [Pair::ZERO; SIGNALS / 2];
+        let mut sums = [F64x2::ZERO; SIGNALS / 2];
         for i in 0..sums.len() {
             for j in 0..N {
-                sums[i] += self.columns[j][i] * Pair::both(self.z[j]);
+                sums[i] += self.columns[j][i] * F64x2::both(self.z[j]);
             }
             for j in 0..3 {
-                sums[i] += self.taps[j][i] * Pair::both(errors[j]);
+                sums[i] += self.taps[j][i] * F64x2::both(errors[j]);
             }
         }
         let mut signals: Signals = core::array::from_fn(|i| sums[i / 2].0[i % 2]);
@@ -266,7 +266,7 @@ impl Basis {
         let through: [f64; LINKS] = core::array::from_fn(|i| z[i + 2] + p * z[i + 1] + q * z[i]);
         let mut r = Regressors {
             x: [0.0; GAINS],
-            by: [[0.0; GAINS]; HELD],
+            by: [[0.0; GAINS]; DYNAMICS],
         };
         for i in 0..GAINS {
             let s = self.scale[i] * q;

@@ -12,7 +12,7 @@
 
 use hoid_numerics::{cholesky, products::dot};
 
-use super::sizes::{HELD, LINEAR, STATES};
+use super::sizes::{DYNAMICS, LINEAR, STATES};
 
 /// Products of the upper triangle.
 const PRODUCTS: usize = STATES * (STATES + 1) / 2;
@@ -100,7 +100,7 @@ impl Block {
     }
 
     /// With a prior of what is held: this mean and these standard deviations.
-    pub fn with_prior(mut self, mean: [f64; HELD], deviations: [f64; HELD]) -> Self {
+    pub fn with_prior(mut self, mean: [f64; DYNAMICS], deviations: [f64; DYNAMICS]) -> Self {
         let mut diagonal = 0;
         for i in 0..STATES {
             if let Some(j) = i.checked_sub(LINEAR) {

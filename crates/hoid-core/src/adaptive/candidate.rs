@@ -19,9 +19,9 @@ use super::{
     mixture::{ChangePrior, Mixture, NoiseScales, Segments},
     moments::Moments,
     noise::NoiseModel,
-    pair::Pair,
-    past::{Paired, PastSignals, paired},
-    sizes::{GAINS, HELD, LARGEST_ORDER, LINEAR, PARAMETERS, SIGNALS, STATES},
+    f64x2::F64x2,
+    signal_history::{Paired, SignalHistory, paired},
+    sizes::{GAINS, DYNAMICS, LARGEST_ORDER, LINEAR, PARAMETERS, SIGNALS, STATES},
     volatility::Volatility,
 };
 use crate::state::{State, visit_all};
@@ -30,8 +30,8 @@ use crate::state::{State, visit_all};
 pub(super) const LARGEST: f64 = 1e100;
 /// Where the basis may be: omega in rad/s, zeta, tau in s; and how far it moves at once, in shares of omega
 /// and zeta and in s.
-const RANGE: [[f64; 2]; HELD] = [[3.0, 35.0], [0.05, 1.4], [0.01, 0.85]];
-const FAR: [[f64; 2]; HELD] = [[-0.3, 0.4], [-0.4, 0.6], [-0.05, 0.05]];
+const RANGE: [[f64; 2]; DYNAMICS] = [[3.0, 35.0], [0.05, 1.4], [0.01, 0.85]];
+const FAR: [[f64; 2]; DYNAMICS] = [[-0.3, 0.4], [-0.4, 0.6], [-0.05, 0.05]];
 /// Longest delay, s.
 pub(super) const LATEST_S: f64 = 0.9;
 /// Frequencies at which gain and lead are nearest, rad/s.
@@ -47,7 +47,7 @@ const EVIDENCE_S: f64 = 20.0;
 /// Time between two solutions of the noise model where nothing is replayed, s.
 const RENEWED_S: f64 = 1.28;
 /// Variances beyond which the square of an innovation counts no more in the noise model.
-const CLIPPED: f64 = 100.0;
+const CLIP_VARIANCES: f64 = 100.0;
 /// Power of u that the variance never falls below, as a share.
 const LEAST: f64 = 1e-24;
 
@@ -64,7 +64,7 @@ pub(super) struct Whitened {
 pub(super) struct Candidate {
     basis: Basis,
     now: [f64; SIGNALS],
-    past: PastSignals,
+    past: SignalHistory,
     outputs: [f64; LARGEST_ORDER],
     d: [f64; LARGEST_ORDER],
     pub noise: NoiseModel,
@@ -133,7 +133,7 @@ impl Candidate {
         Self {
             basis,
             now: [0.0; SIGNALS],
-            past: PastSignals::ZERO,
+            past: SignalHistory::ZERO,
             outputs: [0.0; LARGEST_ORDER],
             d: padded,
             noise: empty,
@@ -155,19 +155,19 @@ impl Candidate {
     }
 
     /// Where the residuals of the noise model come from, in place of the mixture's mean.
-    pub fn guided(mut self, guide: Segments) -> Self {
+    pub fn with_guide(mut self, guide: Segments) -> Self {
         self.guide = guide;
         self
     }
 
     /// Learns nothing from so many samples: the filters start at rest, but what they filter did not.
-    pub fn skipping(mut self, samples: u64) -> Self {
+    pub fn with_skipped(mut self, samples: u64) -> Self {
         self.skipped = samples;
         self
     }
 
     /// Goes on without a guide.
-    pub fn unguided(&mut self) {
+    pub fn clear_guide(&mut self) {
         self.guide = Segments::NONE;
     }
 
@@ -200,7 +200,7 @@ impl Candidate {
             y += d * u;
             level += d;
             for (z, before) in z.iter_mut().zip(before) {
-                *z += Pair::both(*d) * *before;
+                *z += F64x2::both(*d) * *before;
             }
         }
         Whitened {
@@ -220,7 +220,7 @@ impl Candidate {
 
     /// Learns from a sample; false where a number has overflowed.
     #[inline(always)]
-    pub fn learn(&mut self, white: &Whitened, u: f64, prior: &ChangePrior) -> bool {
+    pub fn update(&mut self, white: &Whitened, u: f64, prior: &ChangePrior) -> bool {
         let sound = |x: &f64| x.abs() < LARGEST;
         if !(sound(&white.y) && white.signals.iter().all(sound)) {
             return false;
@@ -239,7 +239,7 @@ impl Candidate {
         }
         self.take_residual(u);
         let innovation = self.innovation(white);
-        let row = self.row(white, innovation, prior.look);
+        let row = self.row(white, innovation, prior.detector_limit);
         self.blocks.take(&row);
         let y = self.limited(white.y, innovation, prior.limit);
         let part = match self.early.samples < order as f64 {
@@ -271,7 +271,7 @@ impl Candidate {
         let (mut row, mut shift) = ([0.0; STATES], 0.0);
         for i in 0..GAINS {
             row[i] = x[i];
-            for j in 0..HELD {
+            for j in 0..DYNAMICS {
                 row[i] += state[LINEAR + j] * by[j][i];
                 row[LINEAR + j] += state[i] * by[j][i];
             }
@@ -309,7 +309,7 @@ impl Candidate {
         }
         // What is not the noise's, as the seconds after a change, counts no more than it would if it were.
         let eps = v[0] + self.d.iter().zip(&v[1..]).map(|(d, v)| d * v).sum::<f64>();
-        let excess = eps * eps / (CLIPPED * self.level[0]);
+        let excess = eps * eps / (CLIP_VARIANCES * self.level[0]);
         self.noise.update(&v, eps, 1.0 / excess.max(1.0));
     }
 
@@ -416,7 +416,7 @@ impl Candidate {
         for (j, size) in [point.omega, point.zeta, 0.1].into_iter().enumerate() {
             let step = 1e-5 * size;
             let at = |sign: f64| {
-                let mut by = [0.0; HELD];
+                let mut by = [0.0; DYNAMICS];
                 by[j] = sign * step;
                 of(&self.basis.response(omega_rad_s, point.moved(by)))
             };

@@ -9,7 +9,7 @@
 //!
 //! for K stretches of both spans together, N unknowns and `n_i` of the n samples in a span: the two solutions take 2
 //! of the K, and the inverse of a Wishart matrix is `K / (K - N - 1)` times too large in the mean. S knows what the
-//! model does not; with few stretches it is uncertain, and the model's part keeps it from zero: w is `SHOWN`. Then
+//! model does not; with few stretches it is uncertain, and the model's part keeps it from zero: w is `EMPIRICAL_SHARE`. Then
 //!
 //! `d = s_1 - s_0`, `C = A_0^-1 W_0 A_0^-1 + A_1^-1 W_1 A_1^-1`.
 //!
@@ -26,10 +26,10 @@ use super::{blocks::Block, sizes::STATES};
 type Matrix = [[f64; STATES]; STATES];
 
 /// Blocks of a stretch.
-const STRETCH: usize = 2;
+const BLOCKS_PER_SCORE: usize = 2;
 /// Share of what the scores show in the variance of the score, and where the noise model is believed.
-pub(super) const SHOWN: f64 = 2.0 / 3.0;
-pub(super) const BY_MODEL: f64 = 0.0;
+pub(super) const EMPIRICAL_SHARE: f64 = 2.0 / 3.0;
+pub(super) const MODEL_ONLY: f64 = 0.0;
 /// Least share of the degrees of freedom that is left.
 const LEAST_FREE: f64 = 0.3;
 
@@ -63,7 +63,7 @@ impl Contrast {
         let solutions = [before, now];
         let (mut squares, mut stretches) = ([[0.0; STATES]; STATES], 0.0);
         for (blocks, solution) in sides.iter().zip(&solutions) {
-            for stretch in blocks.rchunks_exact(STRETCH) {
+            for stretch in blocks.rchunks_exact(BLOCKS_PER_SCORE) {
                 let score = Block::of(stretch).score(&solution.state);
                 for (row, a) in squares.iter_mut().zip(score) {
                     row.iter_mut().zip(score).for_each(|(s, b)| *s += a * b);
@@ -119,7 +119,7 @@ impl Contrast {
     }
 
     /// `d' C^-1 d` of those at these places; `None` where C is not positive.
-    pub(super) fn distance<const N: usize>(&self, places: [usize; N]) -> Option<f64> {
+    pub(super) fn wald_statistic<const N: usize>(&self, places: [usize; N]) -> Option<f64> {
         let d = places.map(|i| self.difference[i]);
         let mut factor = places.map(|i| places.map(|j| self.covariance[i][j]));
         let mut solved = d;
@@ -194,12 +194,12 @@ mod tests {
         for _ in 0..runs {
             let all = blocks(70, &STATE, noise_pole, &mut random);
             let sides = [&all[..60], &all[60..]];
-            let contrast = Contrast::between(sides, SHOWN, |sum| sum).unwrap();
-            let t = contrast.distance(PLACES).unwrap();
+            let contrast = Contrast::between(sides, EMPIRICAL_SHARE, |sum| sum).unwrap();
+            let t = contrast.wald_statistic(PLACES).unwrap();
             sum += t;
             square += t * t;
-            let model = Contrast::between(sides, BY_MODEL, |sum| sum).unwrap();
-            by_model += model.distance(PLACES).unwrap();
+            let model = Contrast::between(sides, MODEL_ONLY, |sum| sum).unwrap();
+            by_model += model.wald_statistic(PLACES).unwrap();
         }
         let n = runs as f64;
         let mean = sum / n;
@@ -227,7 +227,7 @@ mod tests {
         for (pole, [low, high]) in [(0.0, [0.9, 1.6]), (0.9, [3.0, 12.0])] {
             let mut random = 5;
             let all = blocks(70, &STATE, pole, &mut random);
-            let [shown, model] = [1.0, BY_MODEL].map(|w| {
+            let [shown, model] = [1.0, MODEL_ONLY].map(|w| {
                 let sides = [&all[..60], &all[60..]];
                 Contrast::between(sides, w, |sum| sum).unwrap()
             });
@@ -243,8 +243,8 @@ mod tests {
         let mut all = blocks(60, &STATE, 0.0, &mut random);
         let changed = core::array::from_fn(|i| STATE[i] + if i == 1 { 1.0 } else { 0.0 });
         all.extend(blocks(10, &changed, 0.0, &mut random));
-        let contrast = Contrast::between([&all[..60], &all[60..]], SHOWN, |sum| sum).unwrap();
-        assert!(contrast.distance(PLACES).unwrap() > 100.0);
+        let contrast = Contrast::between([&all[..60], &all[60..]], EMPIRICAL_SHARE, |sum| sum).unwrap();
+        assert!(contrast.wald_statistic(PLACES).unwrap() > 100.0);
         for i in 0..STATES {
             let expected = if i == 1 { 1.0 } else { 0.0 };
             let error = libm::sqrt(contrast.covariance[i][i]);
@@ -258,10 +258,10 @@ mod tests {
     fn blocks_that_say_nothing_have_no_contrast() {
         let mut random = 4;
         let all = blocks(20, &STATE, 0.0, &mut random);
-        assert!(Contrast::between([&[], &all], SHOWN, |sum| sum).is_none());
-        assert!(Contrast::between([&all, &[EMPTY; 4]], SHOWN, |sum| sum).is_none());
+        assert!(Contrast::between([&[], &all], EMPIRICAL_SHARE, |sum| sum).is_none());
+        assert!(Contrast::between([&all, &[EMPTY; 4]], EMPIRICAL_SHARE, |sum| sum).is_none());
         let nothing = |sum: Block| sum;
-        assert!(Contrast::between([&[EMPTY; 10], &[EMPTY; 4]], SHOWN, nothing).is_none());
-        assert!(Contrast::default().distance(PLACES).is_none());
+        assert!(Contrast::between([&[EMPTY; 10], &[EMPTY; 4]], EMPIRICAL_SHARE, nothing).is_none());
+        assert!(Contrast::default().wald_statistic(PLACES).is_none());
     }
 }

@@ -30,30 +30,30 @@
 
 use super::{
     blocks::Block,
-    contrast::{BY_MODEL, Contrast, SHOWN},
+    contrast::{MODEL_ONLY, Contrast, EMPIRICAL_SHARE},
     difference::Difference,
     last_blocks::{BLOCK_S, BLOCKS, LastBlocks},
-    sizes::{GAINS, HELD, LINEAR},
+    sizes::{GAINS, DYNAMICS, LINEAR},
 };
 
 /// Expectation of the logarithm of a chi-square with one pair of degrees of freedom, `ln 2 - gamma`.
 const MEAN_LOG: f64 = 0.115_931_515_658_412_45;
 /// Gains and what is held.
-const OPERATOR: usize = GAINS + HELD;
+const OPERATOR: usize = GAINS + DYNAMICS;
 /// Where they are among the states: all but the level.
-const PLACES: [usize; OPERATOR] = [0, 1, 2, LINEAR, LINEAR + 1, LINEAR + 2];
+const OPERATOR_STATES: [usize; OPERATOR] = [0, 1, 2, LINEAR, LINEAR + 1, LINEAR + 2];
 /// Pairs of degrees of freedom.
 const PAIRS: u32 = OPERATOR as u32 / 2;
 /// Blocks between before and now.
-const APART: usize = 2;
+const GUARD_BLOCKS: usize = 2;
 /// Blocks behind a gap from which they are held against those before it.
-const FEWEST: usize = 4;
+const LEAST_AFTER_GAP: usize = 4;
 /// Blocks that the supposed level of T, that of a chi-square, counts for.
-const SUPPOSED: f64 = 60.0;
+const PRIOR_BLOCKS: f64 = 60.0;
 /// Blocks that the level is a mean of at most.
-const LONGEST: f64 = 240.0;
+const LEVEL_MEMORY: f64 = 240.0;
 /// By so much a logarithm raises the level at most: a change is no usual variation.
-const MOST: f64 = 3.0;
+const LARGEST_LOG_STEP: f64 = 3.0;
 
 /// What the detector looks at.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -67,7 +67,7 @@ pub struct Detection {
     /// What a difference must have against chance, nats.
     pub threshold: f64,
     /// Standard deviations that are supposed of what is held, in its units.
-    pub held: [f64; HELD],
+    pub held: [f64; DYNAMICS],
     /// Blocks after a change in which none is declared.
     pub refractory: u64,
 }
@@ -77,29 +77,29 @@ pub struct Detection {
 struct Statistic {
     level: f64,
     levels: f64,
-    against_chance: f64,
+    log_significance: f64,
 }
 
-crate::state!([] Statistic { level, levels, against_chance });
+crate::state!([] Statistic { level, levels, log_significance });
 
 impl Statistic {
     fn new() -> Self {
         Self {
             level: mean_log(PAIRS),
-            levels: SUPPOSED,
-            against_chance: 0.0,
+            levels: PRIOR_BLOCKS,
+            log_significance: 0.0,
         }
     }
 
     /// How many times larger than a chi-square it has been.
-    fn usual(&self) -> f64 {
+    fn scale(&self) -> f64 {
         libm::exp(self.level - mean_log(PAIRS)).max(1.0)
     }
 
     fn take(&mut self, t: f64) {
-        self.against_chance = against_chance(t / libm::sqrt(self.usual()), PAIRS);
-        self.levels = (self.levels + 1.0).min(SUPPOSED + LONGEST);
-        let log = libm::log(t.max(0.05)).min(self.level + MOST);
+        self.log_significance = log_significance(t / libm::sqrt(self.scale()), PAIRS);
+        self.levels = (self.levels + 1.0).min(PRIOR_BLOCKS + LEVEL_MEMORY);
+        let log = libm::log(t.max(0.05)).min(self.level + LARGEST_LOG_STEP);
         self.level += (log - self.level) / self.levels;
     }
 }
@@ -110,7 +110,7 @@ fn mean_log(pairs: u32) -> f64 {
 }
 
 /// `-ln P(chi^2 > x)` for a chi-square with so many pairs of degrees of freedom.
-fn against_chance(x: f64, pairs: u32) -> f64 {
+fn log_significance(x: f64, pairs: u32) -> f64 {
     let half = 0.5 * x;
     let (mut term, mut sum) = (1.0, 1.0);
     for k in 1..pairs {
@@ -123,33 +123,33 @@ fn against_chance(x: f64, pairs: u32) -> f64 {
 /// What the blocks say.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Detector {
-    what: Detection,
+    settings: Detection,
     /// Over the short and over the long present.
     statistics: [Statistic; 2],
     /// Blocks since the last change was declared.
     since: u64,
     declared: bool,
-    told: Contrast,
+    declared_contrast: Contrast,
     innovation_variances: [f64; 2],
     difference: Difference,
     ago: usize,
 }
 
-crate::state!([] Detector { statistics, since, declared, told, innovation_variances, difference, ago });
+crate::state!([] Detector { statistics, since, declared, declared_contrast, innovation_variances, difference, ago });
 
 impl Detector {
     /// Before the first block. `None` where there is no room for the blocks.
-    pub fn new(what: Detection) -> Option<Self> {
-        let [short, long] = what.recent;
+    pub fn new(settings: Detection) -> Option<Self> {
+        let [short, long] = settings.recent;
         let present = short > 0 && short <= long;
-        let room = present && what.least > 0 && what.least <= what.most && long + what.most <= BLOCKS;
-        let sound = what.held.iter().all(|d| *d > 0.0 && d.is_finite());
+        let room = present && settings.least > 0 && settings.least <= settings.most && long + settings.most <= BLOCKS;
+        let sound = settings.held.iter().all(|d| *d > 0.0 && d.is_finite());
         (room && sound).then_some(Self {
-            what,
+            settings,
             statistics: [Statistic::new(); 2],
             since: u64::MAX >> 12,
             declared: false,
-            told: Contrast::default(),
+            declared_contrast: Contrast::default(),
             innovation_variances: [0.0; 2],
             difference: Difference::default(),
             ago: 0,
@@ -158,7 +158,7 @@ impl Detector {
 
     /// Looks at blocks of which the last is new. `held` is where what is held is now, about the basis of the
     /// blocks.
-    pub(super) fn look(&mut self, last: &LastBlocks, held: [f64; HELD]) {
+    pub(super) fn test(&mut self, last: &LastBlocks, held: [f64; DYNAMICS]) {
         self.declared = false;
         self.since += 1;
         // What was before the last change is no measure of what comes.
@@ -168,44 +168,44 @@ impl Detector {
             .min(usize::try_from(self.since).unwrap_or(BLOCKS) + self.ago);
         let blocks = &last.all()[last.all().len() - known..];
         for present in 0..self.statistics.len() {
-            match self.distance(blocks, last.fresh(), held, present) {
+            match self.wald_statistic(blocks, last.fresh(), held, present) {
                 Some(t) => self.statistics[present].take(t),
-                None => self.statistics[present].against_chance = 0.0,
+                None => self.statistics[present].log_significance = 0.0,
             }
         }
-        if self.against_chance() > self.what.threshold && self.since > self.what.refractory {
+        if self.log_significance() > self.settings.threshold && self.since > self.settings.refractory {
             self.declared = true;
             self.since = 0;
-            let [_, long] = self.what.recent;
-            self.split(blocks, held, long.min(last.fresh()));
+            let [_, long] = self.settings.recent;
+            self.locate_change(blocks, held, long.min(last.fresh()));
         }
     }
 
     /// T of a present; `None` where there is too little to compare.
-    fn distance(&self, blocks: &[Block], fresh: usize, held: [f64; HELD], present: usize) -> Option<f64> {
+    fn wald_statistic(&self, blocks: &[Block], fresh: usize, held: [f64; DYNAMICS], present: usize) -> Option<f64> {
         let Detection {
             recent, least, most, ..
-        } = self.what;
+        } = self.settings;
         let recent_blocks = recent[present].min(fresh);
         let now = blocks.len().saturating_sub(recent_blocks);
-        let before = now.saturating_sub(APART);
-        if before < least || recent_blocks < FEWEST.min(recent[0]) {
+        let before = now.saturating_sub(GUARD_BLOCKS);
+        if before < least || recent_blocks < LEAST_AFTER_GAP.min(recent[0]) {
             return None;
         }
         let sides = [&blocks[before.saturating_sub(most)..before], &blocks[now..]];
-        self.contrast(sides, SHOWN, held)?.distance(PLACES)
+        self.compare(sides, EMPIRICAL_SHARE, held)?.wald_statistic(OPERATOR_STATES)
     }
 
     /// The change is supposed to be at the block that leaves least where all is free before it and behind it.
     /// What changed is told in the metric of the noise model, whose covariance is raised by how much more the
     /// scores show in the mean between the halves of what was before: that of the scores alone is too uncertain to
     /// tell gains from a delay, and those behind the change have the change in them.
-    fn split(&mut self, blocks: &[Block], held: [f64; HELD], recent: usize) {
+    fn locate_change(&mut self, blocks: &[Block], held: [f64; DYNAMICS], recent: usize) {
         let mut best: Option<Contrast> = None;
         self.ago = recent.min(blocks.len().saturating_sub(1));
         for after in 1..=self.ago {
             let (past, present) = blocks.split_at(blocks.len() - after);
-            let Some(contrast) = self.contrast([past, present], BY_MODEL, held) else {
+            let Some(contrast) = self.compare([past, present], MODEL_ONLY, held) else {
                 continue;
             };
             if best.is_none_or(|best| contrast.left < best.left) {
@@ -214,16 +214,16 @@ impl Detector {
         }
         let (past, present) = blocks.split_at(blocks.len() - self.ago);
         let halves = past.split_at(past.len() / 2);
-        let [by_model, shown] = [BY_MODEL, SHOWN].map(|w| self.contrast([halves.0, halves.1], w, held));
+        let [by_model, shown] = [MODEL_ONLY, EMPIRICAL_SHARE].map(|w| self.compare([halves.0, halves.1], w, held));
         let dispersion = shown.zip(by_model).and_then(|(shown, model)| shown.dispersion(&model));
-        self.told = best.unwrap_or_default().times(dispersion.unwrap_or(1.0).max(1.0));
+        self.declared_contrast = best.unwrap_or_default().times(dispersion.unwrap_or(1.0).max(1.0));
         self.innovation_variances = [past, present].map(|side| Block::of(side).innovation_variance());
-        self.difference = Difference::of(&self.told).unwrap_or_default();
+        self.difference = Difference::of(&self.declared_contrast).unwrap_or_default();
     }
 
     /// Gains, level and what is held, now against before.
-    fn contrast(&self, sides: [&[Block]; 2], shown: f64, held: [f64; HELD]) -> Option<Contrast> {
-        let deviations = self.what.held;
+    fn compare(&self, sides: [&[Block]; 2], shown: f64, held: [f64; DYNAMICS]) -> Option<Contrast> {
+        let deviations = self.settings.held;
         Contrast::between(sides, shown, |sum| sum.with_prior(held, deviations))
     }
 
@@ -234,18 +234,18 @@ impl Detector {
 
     /// What the last block has against chance, nats: the most that one of them has; zero while there is too
     /// little to compare.
-    pub fn against_chance(&self) -> f64 {
-        self.statistics.iter().fold(0.0, |most, s| s.against_chance.max(most))
+    pub fn log_significance(&self) -> f64 {
+        self.statistics.iter().fold(0.0, |most, s| s.log_significance.max(most))
     }
 
     /// How many times larger than a chi-square T has been without a change: the most of all.
-    pub fn usual_level(&self) -> f64 {
-        self.statistics.iter().fold(1.0, |most, s| s.usual().max(most))
+    pub fn typical_level(&self) -> f64 {
+        self.statistics.iter().fold(1.0, |most, s| s.scale().max(most))
     }
 
     /// Before and behind the change that was declared last.
-    pub fn told(&self) -> &Contrast {
-        &self.told
+    pub fn contrast(&self) -> &Contrast {
+        &self.declared_contrast
     }
 
     /// Mean square of the innovations before and behind it.
@@ -282,9 +282,9 @@ mod tests {
             (3, [12.5916, 22.4577]),
         ] {
             for (x, q) in [(five, 0.05_f64), (one, 0.001)] {
-                assert!((against_chance(x, pairs) + libm::log(q)).abs() < 1e-4, "{pairs} {q}");
+                assert!((log_significance(x, pairs) + libm::log(q)).abs() < 1e-4, "{pairs} {q}");
             }
         }
-        assert_eq!(against_chance(0.0, 3), 0.0);
+        assert_eq!(log_significance(0.0, 3), 0.0);
     }
 }

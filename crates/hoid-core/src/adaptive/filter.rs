@@ -14,12 +14,12 @@ use super::{
     candidate::{Candidate, LARGEST, LATEST_S},
     detector::Detector,
     history::{History, Use},
-    known::Known,
+    initial_estimate::InitialEstimate,
     mixture::{Mixture, NoiseScales},
     noise::NoiseModel,
     prior::AdaptivePrior,
     saturation::Saturation,
-    sizes::{GAINS, HELD, LINEAR, STATES},
+    sizes::{GAINS, DYNAMICS, LINEAR, STATES},
 };
 use crate::{
     recursion::Step,
@@ -27,7 +27,7 @@ use crate::{
 };
 
 /// Trust region of the corrections in a replay: shares of omega and zeta, and s.
-const NEAR: [f64; HELD] = [0.15, 0.3, 0.03];
+const NEAR: [f64; DYNAMICS] = [0.15, 0.3, 0.03];
 /// Time from which a replay learns nothing, s: its filters start at rest, and the person did not.
 const AT_REST_S: f64 = 2.0;
 /// Time from which nothing is learnt of signals that do not move, s.
@@ -40,10 +40,10 @@ const SETTLING_S: f64 = 2.0;
 pub struct AdaptiveFilter<E> {
     prior: AdaptivePrior,
     origin: Basis,
-    known: Option<Known>,
-    supposed: NoiseModel,
+    initial: Option<InitialEstimate>,
+    prior_noise: NoiseModel,
     live: Candidate,
-    began: bool,
+    started: bool,
     trial: Candidate,
     /// 0: nothing is replayed; 1: the estimate; from 2 on: a start elsewhere.
     stage: u64,
@@ -73,7 +73,7 @@ impl<E: AsMut<[f64]>> State for AdaptiveFilter<E> {
             &mut [
                 &mut self.history,
                 &mut self.live,
-                &mut self.began,
+                &mut self.started,
                 &mut self.trial,
                 &mut self.stage,
                 &mut self.at,
@@ -103,7 +103,7 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         }
         let basis = Basis::new(prior.person, ts)?;
         let detector = Detector::new(prior.detection)?;
-        let supposed = NoiseModel::new(prior.order, prior.noise_memory, ts)?;
+        let prior_noise = NoiseModel::new(prior.order, prior.noise_memory, ts)?;
         let scales = NoiseScales {
             unit: 1.0,
             size: 1.0,
@@ -114,8 +114,8 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         let mixture = Mixture::new(&prior.changes, &basis, &scales, variances(&prior));
         let live = Candidate::new(
             basis.clone(),
-            &supposed,
-            supposed.clone(),
+            &prior_noise,
+            prior_noise.clone(),
             mixture,
             scales,
             &prior.changes,
@@ -124,11 +124,11 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         Some(Self {
             prior,
             origin: basis,
-            known: None,
-            supposed,
+            initial: None,
+            prior_noise,
             trial: live.clone(),
             live,
-            began: false,
+            started: false,
             stage: 0,
             at: 0,
             replays: 0,
@@ -146,13 +146,13 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
     }
 
     /// Starts at once, at what is known of the person. `None` for numbers that make no sense.
-    pub fn with_initial_estimate(mut self, known: &Known) -> Option<Self> {
-        if !known.is_sound() || !known.place_in(&mut self.supposed, self.prior.sample_time) {
+    pub fn with_initial_estimate(mut self, known: &InitialEstimate) -> Option<Self> {
+        if !known.is_sound() || !known.apply_to_noise(&mut self.prior_noise, self.prior.sample_time) {
             return None;
         }
-        self.known = Some(*known);
-        self.live = self.candidate(self.origin.point(), &self.supposed, 1.0)?;
-        self.began = true;
+        self.initial = Some(*known);
+        self.live = self.candidate(self.origin.point(), &self.prior_noise, 1.0)?;
+        self.started = true;
         Some(self)
     }
 
@@ -163,7 +163,7 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         let measured = NoiseScales {
             unit: libm::sqrt(u / e),
             size: libm::sqrt(u / samples),
-            innovations: match (self.began, &self.known) {
+            innovations: match (self.started, &self.initial) {
                 (true, _) => self.live.mixture.variance(),
                 (false, Some(known)) => known.variance,
                 (false, None) => y / samples,
@@ -171,7 +171,7 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
             sample_time: self.prior.sample_time,
             dispersion,
         };
-        match &self.known {
+        match &self.initial {
             Some(known) => NoiseScales {
                 unit: known.unit,
                 size: measured.size.max(libm::sqrt(known.covariance[GAINS][GAINS])),
@@ -186,7 +186,7 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         let (ts, changes) = (self.prior.sample_time, &self.prior.changes);
         let basis = Basis::new(point, ts)?;
         let scales = self.scales(dispersion);
-        let mixture = match &self.known {
+        let mixture = match &self.initial {
             Some(known) => {
                 let units = self.origin.units_of(&basis);
                 let of = |i: usize| units.get(i).copied().unwrap_or(1.0);
@@ -211,7 +211,7 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         let empty = NoiseModel::new(self.prior.order, self.prior.noise_memory, ts)?;
         let there = self.history.samples().saturating_sub(start);
         let skipped = (libm::round(AT_REST_S / ts) as u64).min(there / 2);
-        Some(Candidate::new(basis, d, empty, mixture, scales, changes, start).skipping(skipped))
+        Some(Candidate::new(basis, d, empty, mixture, scales, changes, start).with_skipped(skipped))
     }
 
     /// Samples that a replay reads.
@@ -227,7 +227,7 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
     /// Takes a sample. Both must be finite.
     pub fn step(&mut self, e: f64, u: f64) -> Step {
         self.respond(e);
-        let end = self.saturation.end(u).filter(|_| self.began);
+        let end = self.saturation.end(u).filter(|_| self.started);
         self.saturation.remember(u);
         self.detector.pass_over();
         if let Some(end) = end {
@@ -235,12 +235,12 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
             self.history.revise_previous(end);
             return self.pass(u, end);
         }
-        if self.stands_still(u) {
-            return self.pass(u, Use::Follow);
+        if self.is_stationary(u) {
+            return self.pass(u, Use::FilterOnly);
         }
         self.powers[0] += e * e;
         self.powers[1] += u * u;
-        if !self.began {
+        if !self.started {
             // Before that the whitening filter is not full.
             if self.history.samples() > self.prior.order as u64 {
                 let y = self.live.whitened(u).y;
@@ -255,8 +255,8 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         }
         let white = self.live.whitened(u);
         let innovation = self.live.innovation(&white);
-        if !self.live.learn(&white, u, &self.prior.changes) {
-            self.rest();
+        if !self.live.update(&white, u, &self.prior.changes) {
+            self.restart();
             return Step {
                 innovation: 0.0,
                 shortened: true,
@@ -269,7 +269,7 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
             false => self.live.renew(),
         }
         if self.live.blocks.closed() {
-            self.look_for_changes();
+            self.test_for_change();
         }
         Step {
             innovation,
@@ -280,7 +280,7 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
     /// Nothing is learnt while neither signal moves: it would be that of a recording that stands, or of a
     /// person who rests, and the innovation variance would vanish.
     #[inline(always)]
-    fn stands_still(&mut self, u: f64) -> bool {
+    fn is_stationary(&mut self, u: f64) -> bool {
         let samples = self.history.samples();
         let moved = samples < 2 || {
             let (newest, before) = (samples - 1, samples - 2);
@@ -311,7 +311,7 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
                 shortened: false,
             };
         }
-        self.rest();
+        self.restart();
         Step {
             innovation: 0.0,
             shortened: true,
@@ -322,7 +322,7 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
     pub fn step_without_update(&mut self, e: f64, u: f64) -> Step {
         self.respond(e);
         self.detector.pass_over();
-        self.pass(u, Use::Follow)
+        self.pass(u, Use::FilterOnly)
     }
 
     /// As [`AdaptiveFilter::step_without_update`] where the output is missing: the one-step
@@ -343,34 +343,34 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
     }
 
     fn keep(&mut self, u: f64) {
-        self.history.complete(u, Use::Learn);
+        self.history.complete(u, Use::Update);
         self.live.remember(u);
     }
 
     /// What the detector says of the last blocks.
-    fn look_for_changes(&mut self) {
+    fn test_for_change(&mut self) {
         let held = core::array::from_fn(|j| self.live.mixture.mean()[LINEAR + j]);
-        self.detector.look(&self.live.blocks, held);
+        self.detector.test(&self.live.blocks, held);
     }
 
     /// Starts again where a signal has overflowed.
-    fn rest(&mut self) {
+    fn restart(&mut self) {
         self.history.clear();
         self.detector.pass_over();
         self.saturation = Saturation::new();
         (self.powers, self.stage, self.age, self.replays, self.passed) = ([0.0; 3], 0, 0, 0, 0);
         self.alternatives = Alternatives::NONE;
         self.restarts += 1;
-        self.began = false;
-        if let Some(live) = self.candidate(self.origin.point(), &self.supposed, 1.0) {
+        self.started = false;
+        if let Some(live) = self.candidate(self.origin.point(), &self.prior_noise, 1.0) {
             self.live = live;
-            self.began = self.known.is_some();
+            self.started = self.initial.is_some();
         }
     }
 
     /// True from when on there is an estimate.
-    pub fn began(&self) -> bool {
-        self.began
+    pub fn has_started(&self) -> bool {
+        self.started
     }
 
     /// Samples that the estimate has learnt from.
@@ -379,8 +379,8 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
     }
 
     /// True where an earlier fit of the person is where the estimate started.
-    pub fn is_known(&self) -> bool {
-        self.known.is_some()
+    pub fn has_initial_estimate(&self) -> bool {
+        self.initial.is_some()
     }
 
     /// s.
@@ -407,7 +407,7 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
     }
 
     /// Where what is held is now, the corrections included: never outside of where the basis may be.
-    pub fn held(&self) -> Point {
+    pub fn dynamics(&self) -> Point {
         self.live.point()
     }
 
@@ -455,12 +455,12 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
 
 fn remember(candidate: &mut Candidate, use_of_it: Use, u: f64) {
     match use_of_it {
-        Use::Learn => {}
-        Use::Follow | Use::Missing => candidate.blocks.skip(),
-        Use::AtMost | Use::AtLeast => candidate.blocks.pass_over(),
+        Use::Update => {}
+        Use::FilterOnly | Use::Missing => candidate.blocks.skip(),
+        Use::AtUpperLimit | Use::AtLowerLimit => candidate.blocks.pass_over(),
     }
     match use_of_it {
-        Use::Learn | Use::Follow => candidate.remember(u),
+        Use::Update | Use::FilterOnly => candidate.remember(u),
         _ => candidate.remember_prediction(u),
     }
 }
@@ -474,13 +474,13 @@ fn through_filters(saturation: &Saturation, use_of_it: Use, u: f64, predicted: f
 }
 
 /// Variances of what is supposed of the corrections.
-fn variances(prior: &AdaptivePrior) -> [f64; HELD] {
+fn variances(prior: &AdaptivePrior) -> [f64; DYNAMICS] {
     let [omega, zeta, tau] = prior.spread;
     [omega * prior.person.omega, zeta * prior.person.zeta, tau].map(|s| s * s)
 }
 
 /// Variances of the trust region of a replay.
-fn trusted(point: Point) -> [f64; HELD] {
+fn trusted(point: Point) -> [f64; DYNAMICS] {
     let [omega, zeta, tau] = NEAR;
     [omega * point.omega, zeta * point.zeta, tau].map(|s| s * s)
 }

@@ -13,22 +13,22 @@ const USES: usize = 2;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Use {
     /// The estimate learns from it.
-    Learn,
+    Update,
     /// It passes through the filters.
-    Follow,
+    FilterOnly,
     /// Its output is missing: the prediction takes its place.
     Missing,
     /// The stick is at its upper end: the output is at least as large.
-    AtMost,
+    AtUpperLimit,
     /// The stick is at its lower end.
-    AtLeast,
+    AtLowerLimit,
 }
 
 impl Use {
-    const ALL: [Self; 5] = [Self::Follow, Self::Learn, Self::Missing, Self::AtMost, Self::AtLeast];
+    const ALL: [Self; 5] = [Self::FilterOnly, Self::Update, Self::Missing, Self::AtUpperLimit, Self::AtLowerLimit];
 
     fn of(number: f64) -> Self {
-        Self::ALL.get(number as usize).copied().unwrap_or(Self::Follow)
+        Self::ALL.get(number as usize).copied().unwrap_or(Self::FilterOnly)
     }
 
     fn number(self) -> f64 {
@@ -104,7 +104,7 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> History<E> {
     /// Says something else of the sample before the newest, from which had been learnt.
     pub fn revise_previous(&mut self, use_of_it: Use) {
         if let Some(previous) = self.samples.checked_sub(2)
-            && self.output(previous).1 == Use::Learn
+            && self.output(previous).1 == Use::Update
         {
             self.put(USES, previous, use_of_it.number());
         }
@@ -151,7 +151,7 @@ mod tests {
         // No room at all is no panic.
         let mut none = History::new([0.0; 2]);
         none.push(1.0);
-        none.complete(1.0, Use::Learn);
-        assert_eq!(none.output(0), (0.0, Use::Follow));
+        none.complete(1.0, Use::Update);
+        assert_eq!(none.output(0), (0.0, Use::FilterOnly));
     }
 }

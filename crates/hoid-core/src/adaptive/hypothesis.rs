@@ -55,7 +55,7 @@ crate::state!([] Hypothesis { state, covariance, variance, residuals, log_weight
 
 /// What a block left.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Left {
+pub(super) struct BlockResidual {
     /// Sum of the squares that are left after the update, those of the prediction's error included.
     pub energy: f64,
     /// Samples of the block that were not taken, and the part of that sum which is set for them.
@@ -64,8 +64,8 @@ pub(super) struct Left {
     log_determinant: f64,
 }
 
-impl Left {
-    pub const NOTHING: Self = Self {
+impl BlockResidual {
+    pub const ZERO: Self = Self {
         energy: 0.0,
         passed: [0.0; 2],
         log_determinant: 0.0,
@@ -116,7 +116,7 @@ impl Hypothesis {
     }
 
     /// The update by a block, each of whose samples counts for `1/dispersion` of one.
-    pub fn update(&mut self, moments: &Moments, basis: &Basis, dispersion: f64) -> Left {
+    pub fn update(&mut self, moments: &Moments, basis: &Basis, dispersion: f64) -> BlockResidual {
         let about = moments.about(basis, &self.state);
         let per = 1.0 / (self.variance * dispersion);
         let mut matrix: Covariance = core::array::from_fn(|i| {
@@ -138,9 +138,9 @@ impl Hypothesis {
         }
         let sound = after.iter().flatten().all(|p| p.is_finite()) && (0..STATES).all(|i| after[i][i] >= 0.0);
         if !sound {
-            return Left {
+            return BlockResidual {
                 energy: about.energy,
-                ..Left::NOTHING
+                ..BlockResidual::ZERO
             };
         }
         let mut explained = 0.0;
@@ -150,16 +150,16 @@ impl Hypothesis {
             explained += per * about.score[i] * step;
         }
         self.covariance = after;
-        Left {
+        BlockResidual {
             energy: (about.energy - explained).max(0.0),
             log_determinant,
-            ..Left::NOTHING
+            ..BlockResidual::ZERO
         }
     }
 
     /// The logarithm of the density of the block, and the update of the variance; `common` is the least
     /// energy that any hypothesis left.
-    pub fn weigh(&mut self, left: &Left, samples: f64, common: f64, dispersion: f64, memory: f64) {
+    pub fn weigh(&mut self, left: &BlockResidual, samples: f64, common: f64, dispersion: f64, memory: f64) {
         let (n, nu) = (samples / dispersion, self.residuals);
         let over = common / (self.variance * dispersion);
         self.log_weight += libm::lgamma(0.5 * (nu + n))

@@ -24,9 +24,9 @@ use hoid_numerics::elimination;
 
 use super::{
     basis::Basis,
-    hypothesis::{Covariance, Hypothesis, Left, Segment},
+    hypothesis::{Covariance, Hypothesis, BlockResidual, Segment},
     moments::Moments,
-    sizes::{CLASSES, GAINS, HELD, HYPOTHESES, LINEAR, SEGMENTS, STATES},
+    sizes::{CLASSES, GAINS, DYNAMICS, HYPOTHESES, LINEAR, SEGMENTS, STATES},
 };
 
 /// What is supposed of changes. Gains are in units of |Y| at the reference frequency.
@@ -55,7 +55,7 @@ pub struct ChangePrior {
     /// Standard deviations beyond which an innovation counts no more than there.
     pub limit: f64,
     /// The same in the detector.
-    pub look: f64,
+    pub detector_limit: f64,
 }
 
 impl ChangePrior {
@@ -68,7 +68,7 @@ impl ChangePrior {
             && self.settling[0] >= 0.0
             && self.level >= 0.0
             && self.limit > 0.0
-            && self.look > 0.0
+            && self.detector_limit > 0.0
             && share(self.steady)
             && share(self.any)
     }
@@ -77,11 +77,11 @@ impl ChangePrior {
 /// Births before this time are of a start that is not settled, s.
 const FIRST_BIRTH_S: f64 = 3.0;
 /// A form is handed on from a gain with a lead to any numerator with this share of its probability.
-const HANDED_ON: f64 = 0.3;
+const FORM_SWITCH: f64 = 0.3;
 /// Least logarithm of a probability.
-const LEAST: f64 = -60.0;
+const LEAST_LOG_WEIGHT: f64 = -60.0;
 /// Size of the gains before anything is known, in units of the ratio of u to e.
-const WIDE: f64 = 2.0;
+const INITIAL_GAIN_DEVIATION: f64 = 2.0;
 
 /// Scales of the signals.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -111,7 +111,7 @@ crate::state!([] Mixture { hypotheses, count, blocks, mean });
 
 impl Mixture {
     /// One hypothesis of each class about a state. `held` are the variances of the corrections.
-    pub fn new(prior: &ChangePrior, basis: &Basis, scales: &NoiseScales, held: [f64; HELD]) -> Self {
+    pub fn new(prior: &ChangePrior, basis: &Basis, scales: &NoiseScales, held: [f64; DYNAMICS]) -> Self {
         let mut p = [[0.0; STATES]; STATES];
         p[GAINS][GAINS] = scales.size * scales.size;
         for (j, variance) in held.into_iter().enumerate() {
@@ -119,7 +119,7 @@ impl Mixture {
         }
         Self::of(prior, |class| {
             let mut p = p;
-            open_gains(&mut p, basis, class, [WIDE * scales.unit; 2]);
+            inflate_gains(&mut p, basis, class, [INITIAL_GAIN_DEVIATION * scales.unit; 2]);
             ([0.0; STATES], p, scales.innovations)
         })
     }
@@ -133,7 +133,7 @@ impl Mixture {
         let share =
             |class: usize| [prior.steady, 1.0 - prior.steady][class % 2] * [1.0 - prior.any, prior.any][class / 2];
         let mut mixture = Self {
-            hypotheses: [Hypothesis::new([0.0; STATES], [[0.0; STATES]; STATES], 0.0, 0, LEAST); HYPOTHESES],
+            hypotheses: [Hypothesis::new([0.0; STATES], [[0.0; STATES]; STATES], 0.0, 0, LEAST_LOG_WEIGHT); HYPOTHESES],
             count: 0,
             blocks: 0,
             mean: [0.0; STATES],
@@ -170,7 +170,7 @@ impl Mixture {
         let (blocks, seconds) = (self.blocks, moments.samples * scales.sample_time);
         let newborn = |h: &Hypothesis| h.born > 0 && h.born + 1 == blocks;
         let parents = self.best_of_classes().map(|best| best.map(|i| self.hypotheses[i]));
-        let mut left = [Left::NOTHING; HYPOTHESES];
+        let mut left = [BlockResidual::ZERO; HYPOTHESES];
         let (mut common, mut best) = (f64::INFINITY, self.mean);
         for (h, left) in self.all_mut().iter_mut().zip(&mut left) {
             let age = (blocks - h.born.min(blocks)) as f64 * seconds;
@@ -180,7 +180,7 @@ impl Mixture {
                 drift += size * size * libm::exp(-2.0 * age / time);
             }
             let step = libm::sqrt(drift * seconds) * scales.unit;
-            open_gains(&mut h.covariance, basis, h.class, [step; 2]);
+            inflate_gains(&mut h.covariance, basis, h.class, [step; 2]);
             let level = prior.level * scales.size;
             h.covariance[GAINS][GAINS] += level * level * seconds;
             if newborn(h) {
@@ -233,7 +233,7 @@ impl Mixture {
             .sum();
         let all = best + libm::log(sum);
         for h in self.all_mut() {
-            h.log_weight = (finite(h.log_weight) - all).max(LEAST);
+            h.log_weight = (finite(h.log_weight) - all).max(LEAST_LOG_WEIGHT);
         }
     }
 
@@ -288,7 +288,7 @@ impl Mixture {
             }
             let own = self.probability(class);
             let other = if any {
-                HANDED_ON * self.probability(class - 2)
+                FORM_SWITCH * self.probability(class - 2)
             } else {
                 0.0
             };
@@ -302,7 +302,7 @@ impl Mixture {
             let every = if wanders { 2.0 } else { 1.0 };
             child.class = class;
             child.log_weight = libm::log(share.max(1e-12) * (every * seconds / prior.between).min(0.5));
-            open_gains(
+            inflate_gains(
                 &mut child.covariance,
                 basis,
                 class,
@@ -310,7 +310,7 @@ impl Mixture {
             );
             let youth = prior.variance[1] / scales.sample_time / scales.dispersion;
             child.residuals = child.residuals.min(youth);
-            let Some(place) = self.place_for_one(prior) else {
+            let Some(place) = self.free_slot(prior) else {
                 continue;
             };
             self.hypotheses[place] = child;
@@ -319,7 +319,7 @@ impl Mixture {
     }
 
     /// A free place, or that of the least likely that is old enough and not the best of its class.
-    fn place_for_one(&mut self, prior: &ChangePrior) -> Option<usize> {
+    fn free_slot(&mut self, prior: &ChangePrior) -> Option<usize> {
         if self.count < HYPOTHESES {
             self.count += 1;
             return Some(self.count - 1);
@@ -370,7 +370,7 @@ impl Mixture {
 
     /// What the likeliest says of the past: the states before its changes, the oldest first, and the one of
     /// now.
-    pub fn history(&self) -> Segments {
+    pub fn segments(&self) -> Segments {
         let mut segments = Segments::NONE;
         if let Some(best) = self.likeliest(|_| true) {
             for segment in self.hypotheses[best].segments() {
@@ -387,12 +387,12 @@ impl Mixture {
     /// Replaces what was supposed of the corrections, normal about zero with the variances `was`, by what is
     /// supposed of people, normal about `mean` with the variances `is`:
     /// `P' = (I + P D)^-1 P`, `D = 1/is - 1/was`, `s' = s + P' (mean/is - D s)`.
-    pub fn suppose(&mut self, was: [f64; HELD], is: [f64; HELD], mean: [f64; HELD]) {
+    pub fn replace_prior(&mut self, was: [f64; DYNAMICS], is: [f64; DYNAMICS], mean: [f64; DYNAMICS]) {
         for h in self.all_mut() {
             let mut matrix: Covariance = [[0.0; STATES]; STATES];
             for (i, row) in matrix.iter_mut().enumerate() {
                 row[i] = 1.0;
-                for j in 0..HELD {
+                for j in 0..DYNAMICS {
                     row[LINEAR + j] += h.covariance[i][LINEAR + j] * (1.0 / is[j] - 1.0 / was[j]);
                 }
             }
@@ -402,12 +402,12 @@ impl Mixture {
             if !sound {
                 continue;
             }
-            let pull: [f64; HELD] = core::array::from_fn(|j| {
+            let pull: [f64; DYNAMICS] = core::array::from_fn(|j| {
                 let s = h.state[LINEAR + j];
                 (mean[j] - s) / is[j] + s / was[j]
             });
             for i in 0..STATES {
-                h.state[i] += (0..HELD).map(|j| after[i][LINEAR + j] * pull[j]).sum::<f64>();
+                h.state[i] += (0..DYNAMICS).map(|j| after[i][LINEAR + j] * pull[j]).sum::<f64>();
                 for j in 0..i {
                     let half = 0.5 * (after[i][j] + after[j][i]);
                     (after[i][j], after[j][i]) = (half, half);
@@ -475,7 +475,7 @@ fn gain_and_lead(basis: &Basis) -> [[f64; GAINS]; 2] {
 }
 
 /// Adds the variance of a change of the gains: of a gain and a lead, or of any numerator, by the class.
-fn open_gains(p: &mut Covariance, basis: &Basis, class: usize, [gain, lead]: [f64; 2]) {
+fn inflate_gains(p: &mut Covariance, basis: &Basis, class: usize, [gain, lead]: [f64; 2]) {
     if class >= 2 {
         for (i, size) in [gain, lead, lead].into_iter().enumerate() {
             p[i][i] += size * size;
@@ -495,7 +495,7 @@ fn open_gains(p: &mut Covariance, basis: &Basis, class: usize, [gain, lead]: [f6
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
-    use crate::adaptive::{basis::Point, sizes::SIGNALS, usual::Usual};
+    use crate::adaptive::{basis::Point, sizes::SIGNALS, defaults::DefaultOperator};
 
     /// The sample of the change: two before the end of block 56.
     const CHANGE: usize = 32 * 56 - 2;
@@ -511,7 +511,7 @@ mod tests {
         };
         let (mut basis, prior) = (
             Basis::new(point, 0.01).unwrap(),
-            Usual::with_delay(0.2).prior(0.01).changes,
+            DefaultOperator::with_delay(0.2).prior(0.01).changes,
         );
         let scales = NoiseScales {
             unit: 1.0,

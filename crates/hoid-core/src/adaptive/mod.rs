@@ -42,13 +42,13 @@
 //! is an array of the caller's.
 //!
 //! ```
-//! use hoid_core::adaptive::{AdaptiveFilter, least_memory, usual::Usual};
+//! use hoid_core::adaptive::{AdaptiveFilter, least_memory, defaults::DefaultOperator};
 //!
 //! const SAMPLE_TIME_S: f64 = 0.02;
 //! // Without what is kept for replays, as on a microcontroller; memory_needed() says how much those take.
 //! const MEMORY: usize = 192;
 //! assert!(MEMORY >= least_memory(SAMPLE_TIME_S));
-//! let person = Usual::with_delay(0.2);
+//! let person = DefaultOperator::with_delay(0.2);
 //! let mut tracker = AdaptiveFilter::new(person.prior(SAMPLE_TIME_S), [0.0; MEMORY]).ok_or("no filter")?;
 //!
 //! // Two minutes of somebody with a gain of 0.5, muscles of 11 rad/s and a delay of 0.2 s; some noise.
@@ -74,10 +74,10 @@ pub mod basis;
 pub mod contrast;
 pub mod detector;
 pub mod difference;
-pub mod known;
+pub mod initial_estimate;
 pub mod mixture;
 pub mod noise;
-pub mod usual;
+pub mod defaults;
 
 mod alternatives;
 mod blocks;
@@ -88,8 +88,8 @@ mod hypothesis;
 mod last_blocks;
 mod moments;
 mod operator;
-mod pair;
-mod past;
+mod f64x2;
+mod signal_history;
 mod prior;
 mod saturation;
 mod sizes;
@@ -98,4 +98,4 @@ mod volatility;
 pub use filter::{AdaptiveFilter, REPLAYED, errors_needed, least_memory, memory_needed};
 pub use operator::through;
 pub use prior::AdaptivePrior;
-pub use sizes::{GAINS, HELD, HYPOTHESES, LARGEST_ORDER, LINEAR, PARAMETERS, SIGNALS, STARTS, STATES};
+pub use sizes::{GAINS, DYNAMICS, HYPOTHESES, LARGEST_ORDER, LINEAR, PARAMETERS, SIGNALS, STARTS, STATES};

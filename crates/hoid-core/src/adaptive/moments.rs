@@ -15,7 +15,7 @@
 
 use super::{
     basis::Basis,
-    sizes::{GAINS, HELD, INPUTS, LINEAR, SIGNALS, STATES},
+    sizes::{GAINS, DYNAMICS, INPUTS, LINEAR, SIGNALS, STATES},
 };
 
 const ALL: usize = INPUTS + 1;
@@ -132,7 +132,7 @@ fn derivatives(basis: &Basis, state: &[f64; STATES], w: &[f64; INPUTS]) -> [[f64
         t[i] = weights(basis, &one);
     }
     t[GAINS][SIGNALS] = 1.0;
-    for j in 0..HELD {
+    for j in 0..DYNAMICS {
         let mut moved = *state;
         moved[LINEAR + j] += 1.0;
         let there = weights(basis, &moved);

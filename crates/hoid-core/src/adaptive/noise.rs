@@ -7,7 +7,7 @@
 //! seconds, in which the gains are not known, do not stay.
 //!
 //! Before the data say more the coefficients are supposed to be normal about those of a usual remnant, with the
-//! standard deviation `WIDE`, which adds `sigma^2/WIDE^2` to the diagonal of the sums, sigma^2 the variance of eps.
+//! standard deviation `PRIOR_DEVIATION`, which adds `sigma^2/PRIOR_DEVIATION^2` to the diagonal of the sums, sigma^2 the variance of eps.
 //! It is in units of eps and not of v: the spectrum of a steep remnant, of more than two poles, falls far
 //! below a share of its power, and D has to follow it there.
 //!
@@ -15,7 +15,7 @@
 
 use hoid_numerics::{cholesky, elimination};
 
-use super::{pair::Pair, sizes::LARGEST_ORDER, usual::ORDER};
+use super::{f64x2::F64x2, sizes::LARGEST_ORDER, defaults::ORDER};
 
 const WIDTH: usize = LARGEST_ORDER + 1;
 /// The same in pairs, a whole number of them.
@@ -23,27 +23,27 @@ const PAIRS: usize = WIDTH.div_ceil(2);
 /// A number for each lag from zero on.
 pub type Lags = [f64; WIDTH];
 /// Time constants of the remnant that is supposed before anything is known, s.
-const USUAL: [f64; 2] = [0.3, 0.06];
+const DEFAULT_TIME_CONSTANTS_S: [f64; 2] = [0.3, 0.06];
 /// Standard deviation of the coefficients about that.
-const WIDE: f64 = 10.0;
+const PRIOR_DEVIATION: f64 = 10.0;
 
 /// Least of that weight, where nothing is left.
 const LEAST: f64 = 1e-300;
 
 /// Share of the sums from which on they are scaled anew.
-const FADED: f64 = 0.5;
+const RESCALE_BELOW: f64 = 0.5;
 
 /// The sums and D.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NoiseModel {
     order: usize,
-    supposed: [f64; 2],
+    prior_d: [f64; 2],
     /// Longest memory and shortest, in samples.
     longest: f64,
     shortest: f64,
     /// Upper triangle of the sums over `fade`, in pairs of rows and of columns: a sample leaves those of
     /// before as they are and counts for more.
-    products: [[[Pair; PAIRS]; 2]; PAIRS],
+    products: [[[F64x2; PAIRS]; 2]; PAIRS],
     fade: f64,
     /// The sum of the weights, and that of the squares of eps with them.
     weight: f64,
@@ -61,16 +61,16 @@ impl NoiseModel {
         if !(2..=LARGEST_ORDER).contains(&order) || memory.is_nan() || memory <= 0.0 {
             return None;
         }
-        let [a, b] = USUAL.map(|t| libm::exp(-ts / t));
-        let supposed = [-(a + b), a * b];
+        let [a, b] = DEFAULT_TIME_CONSTANTS_S.map(|t| libm::exp(-ts / t));
+        let prior_d = [-(a + b), a * b];
         let mut d = [0.0; LARGEST_ORDER];
-        d[..2].copy_from_slice(&supposed);
+        d[..2].copy_from_slice(&prior_d);
         Some(Self {
             order,
-            supposed,
+            prior_d,
             longest: memory / ts,
             shortest: (3.0 / ts).min(memory / ts).max(2.0 * order as f64),
-            products: [[[Pair::ZERO; PAIRS]; 2]; PAIRS],
+            products: [[[F64x2::ZERO; PAIRS]; 2]; PAIRS],
             fade: 1.0,
             weight: 0.0,
             squares: 0.0,
@@ -81,7 +81,7 @@ impl NoiseModel {
 
     /// Begins as if so many samples of a v had been seen, with this variance of eps and autocovariances over
     /// it; false where they are none.
-    pub(super) fn suppose(&mut self, lags: &Lags, variance: f64, samples: f64) -> bool {
+    pub(super) fn set_prior(&mut self, lags: &Lags, variance: f64, samples: f64) -> bool {
         let positive = |x: f64| x > 0.0 && x.is_finite();
         if !(positive(variance) && lags[0] > 0.0 && lags.iter().all(|c| c.is_finite()) && positive(samples)) {
             return false;
@@ -123,8 +123,8 @@ impl NoiseModel {
         self.weight = lambda * self.weight + weight;
         self.squares = lambda * self.squares + weight * eps * eps;
         self.fade *= lambda;
-        if self.fade < FADED {
-            let fade = Pair::both(self.fade);
+        if self.fade < RESCALE_BELOW {
+            let fade = F64x2::both(self.fade);
             self.products
                 .as_flattened_mut()
                 .as_flattened_mut()
@@ -143,10 +143,10 @@ impl NoiseModel {
     #[inline(always)]
     fn add(&mut self, v: &Lags, weight: f64, order: usize) {
         let pairs = (order / 2 + 1).min(PAIRS);
-        let v: [Pair; PAIRS] = core::array::from_fn(|i| Pair([v[2 * i], v.get(2 * i + 1).copied().unwrap_or(0.0)]));
+        let v: [F64x2; PAIRS] = core::array::from_fn(|i| F64x2([v[2 * i], v.get(2 * i + 1).copied().unwrap_or(0.0)]));
         for first in 0..pairs {
             let [above, below] = &mut self.products[first];
-            let [a, b] = v[first].0.map(|v| Pair::both(weight * v));
+            let [a, b] = v[first].0.map(|v| F64x2::both(weight * v));
             for k in first..pairs {
                 above[k] += a * v[k];
                 below[k] += b * v[k];
@@ -170,7 +170,7 @@ impl NoiseModel {
 
     /// Weight of what is supposed, in the unit of the sums.
     fn ridge(&self) -> f64 {
-        self.variance() / (WIDE * WIDE) + LEAST
+        self.variance() / (PRIOR_DEVIATION * PRIOR_DEVIATION) + LEAST
     }
 
     /// The sums over the lags, and what is supposed: the upper triangle.
@@ -215,7 +215,7 @@ impl NoiseModel {
         let ridge = self.ridge();
         let mut d = [0.0; N];
         for (i, d) in d.iter_mut().enumerate().take(p) {
-            *d = ridge * self.supposed.get(i).copied().unwrap_or(0.0) - self.product(0, i + 1);
+            *d = ridge * self.prior_d.get(i).copied().unwrap_or(0.0) - self.product(0, i + 1);
         }
         let solved = elimination::solve(&mut self.sums(p), p, &mut d);
         if solved && d.iter().all(|d| d.is_finite()) {
@@ -317,7 +317,7 @@ mod tests {
         // An autoregression of order 1 with the pole .9: its autocovariances are .9^k/(1 - .81).
         let (mut model, mut seed) = (NoiseModel::new(6, 40.0, 0.01).unwrap(), 5);
         let lags: Lags = core::array::from_fn(|k| 0.9_f64.powi(k as i32) / 0.19);
-        assert!(model.suppose(&lags, 1.0 / 12.0, 2000.0));
+        assert!(model.set_prior(&lags, 1.0 / 12.0, 2000.0));
         assert!(
             (model.d()[0] + 0.9).abs() < 1e-3 && model.d()[1].abs() < 1e-3,
             "{:?}",
@@ -334,7 +334,7 @@ mod tests {
         // Ten memories of 4000 samples: what was supposed is gone, d1 has a standard error of .01.
         assert!((model.d()[0] + 0.5).abs() < 0.05, "{:?}", model.d());
         let mut other = NoiseModel::new(6, 40.0, 0.01).unwrap();
-        assert!(!other.suppose(&[0.0; WIDTH], 1.0, 2000.0) && !other.suppose(&lags, 1.0, f64::NAN));
+        assert!(!other.set_prior(&[0.0; WIDTH], 1.0, 2000.0) && !other.set_prior(&lags, 1.0, f64::NAN));
     }
 
     #[test]

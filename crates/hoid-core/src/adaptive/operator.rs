@@ -12,14 +12,14 @@
 use super::{
     AdaptiveFilter,
     candidate::NEAR_RAD_S,
-    sizes::{GAINS, HELD, LINEAR, PARAMETERS, STATES},
-    usual::HOLD_S,
+    sizes::{GAINS, DYNAMICS, LINEAR, PARAMETERS, STATES},
+    defaults::HOLD_S,
 };
 
 /// In the first seconds the noise model has not been seen for long, and the errors of what it whitens are
-/// too small: they are reported `1 + UNLEARNT_S/t` times as large after t seconds. Set on virtual people of
+/// too small: they are reported `1 + SETTLING_S/t` times as large after t seconds. Set on virtual people of
 /// another seed than those of the test (`tests/first_seconds.rs` of `hoid-track`).
-const UNLEARNT_S: f64 = 4.0;
+const SETTLING_S: f64 = 4.0;
 
 impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
     /// K_e, K_e_dot, omega_nm in rad/s, zeta_nm, and tau_e in s.
@@ -36,7 +36,7 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         for (row, gains) in rows.iter_mut().zip(self.gain_and_lead()) {
             row[..GAINS].copy_from_slice(&gains);
         }
-        for j in 0..HELD {
+        for j in 0..DYNAMICS {
             rows[2 + j][LINEAR + j] = 1.0;
         }
         let own = through(&rows, &self.state_covariance());
@@ -78,9 +78,9 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
     /// Covariance of gains, level and corrections, as it is reported.
     pub fn state_covariance(&self) -> [[f64; STATES]; STATES] {
         let mut c = self.live().mixture.covariance();
-        if !self.is_known() {
+        if !self.has_initial_estimate() {
             let seconds = self.samples() as f64 * self.sample_time();
-            let wider = 1.0 + UNLEARNT_S / seconds.max(HOLD_S);
+            let wider = 1.0 + SETTLING_S / seconds.max(HOLD_S);
             c.iter_mut().flatten().for_each(|c| *c *= wider * wider);
         }
         c

@@ -4,7 +4,7 @@ use super::{
     basis::Point,
     detector::Detection,
     mixture::ChangePrior,
-    sizes::{HELD, STARTS},
+    sizes::{DYNAMICS, STARTS},
 };
 
 /// What is supposed of a person and their changes.
@@ -14,7 +14,7 @@ pub struct AdaptivePrior {
     /// the delay.
     pub person: Point,
     /// See `person`.
-    pub spread: [f64; HELD],
+    pub spread: [f64; DYNAMICS],
     /// Ts, s.
     pub sample_time: f64,
     /// Order of the noise model.

@@ -41,8 +41,8 @@ impl Saturation {
         let [low, high] = self.known;
         let again = u == self.last;
         match self.highest > self.lowest {
-            true if u == self.highest && (again || high) => Some(Use::AtMost),
-            true if u == self.lowest && (again || low) => Some(Use::AtLeast),
+            true if u == self.highest && (again || high) => Some(Use::AtUpperLimit),
+            true if u == self.lowest && (again || low) => Some(Use::AtLowerLimit),
             _ => None,
         }
     }
@@ -53,8 +53,8 @@ impl Saturation {
     pub fn beyond(&self, end: Use, u: f64, predicted: f64) -> f64 {
         let range = self.highest - self.lowest;
         match end {
-            Use::AtMost => predicted.max(u).min(u + range),
-            Use::AtLeast => predicted.min(u).max(u - range),
+            Use::AtUpperLimit => predicted.max(u).min(u + range),
+            Use::AtLowerLimit => predicted.min(u).max(u - range),
             _ => u,
         }
     }
@@ -91,9 +91,9 @@ mod tests {
         assert_eq!(beyond(1.0, 0.2), Some(1.0));
         assert_eq!(beyond(1.0, 1e9), Some(1.0 + 1.4));
         let lower = after(&[0.1, -0.4]);
-        assert_eq!(lower.end(-0.4), Some(Use::AtLeast));
-        assert_eq!(lower.beyond(Use::AtLeast, -0.4, -0.5), -0.5);
-        assert_eq!(lower.beyond(Use::AtLeast, -0.4, 3.0), -0.4);
+        assert_eq!(lower.end(-0.4), Some(Use::AtLowerLimit));
+        assert_eq!(lower.beyond(Use::AtLowerLimit, -0.4, -0.5), -0.5);
+        assert_eq!(lower.beyond(Use::AtLowerLimit, -0.4, 3.0), -0.4);
     }
 
     #[test]
@@ -107,8 +107,8 @@ mod tests {
     #[test]
     fn an_end_at_which_the_stick_has_stayed_is_known_at_once() {
         let ends = after(&[0.1, 1.0, 1.0, -0.3]);
-        assert_eq!(ends.end(1.0), Some(Use::AtMost));
-        assert_eq!(ends.end(-0.3), Some(Use::AtLeast));
+        assert_eq!(ends.end(1.0), Some(Use::AtUpperLimit));
+        assert_eq!(ends.end(-0.3), Some(Use::AtLowerLimit));
         // Farther out than the end is no end.
         assert_eq!(after(&[0.1, 1.0, 1.0, 1.2, 0.0]).end(1.2), None);
     }
@@ -122,6 +122,6 @@ mod tests {
     #[test]
     fn a_pedal_ends_where_it_is_let_go() {
         let ends = after(&[0.0, 0.3, 0.0]);
-        assert_eq!(ends.end(0.0), Some(Use::AtLeast));
+        assert_eq!(ends.end(0.0), Some(Use::AtLowerLimit));
     }
 }

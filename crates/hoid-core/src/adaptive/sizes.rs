@@ -3,13 +3,13 @@
 /// Gains of the numerator.
 pub const GAINS: usize = 3;
 /// What is held but for small corrections: natural frequency, damping, delay.
-pub const HELD: usize = 3;
+pub const DYNAMICS: usize = 3;
 /// Gains and level.
 pub const LINEAR: usize = GAINS + 1;
 /// Gains, level and corrections.
-pub const STATES: usize = LINEAR + HELD;
+pub const STATES: usize = LINEAR + DYNAMICS;
 /// Parameters of the operator that is reported: K_e, K_e_dot and what is held.
-pub const PARAMETERS: usize = 2 + HELD;
+pub const PARAMETERS: usize = 2 + DYNAMICS;
 /// Signals of the basis: the states of its filter and their derivative.
 pub const SIGNALS: usize = 6;
 /// Signals and level.

@@ -19,9 +19,9 @@
 /// Power of v that the dispersion is.
 const POWER: f64 = 0.3;
 /// Differences that the supposition v = 1 counts for.
-const SUPPOSED: f64 = 4.0;
+const PRIOR_DIFFERENCES: f64 = 4.0;
 /// Largest v.
-const MOST: f64 = 1000.0;
+const LARGEST: f64 = 1000.0;
 
 /// The running mean of the squared differences.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -75,8 +75,8 @@ impl Volatility {
 
     /// Samples that count for one.
     pub fn dispersion(&self) -> f64 {
-        let root = (self.steps + SUPPOSED) / (self.differences + SUPPOSED);
-        libm::pow((root * root).clamp(1.0, MOST), POWER)
+        let root = (self.steps + PRIOR_DIFFERENCES) / (self.differences + PRIOR_DIFFERENCES);
+        libm::pow((root * root).clamp(1.0, LARGEST), POWER)
     }
 }
 

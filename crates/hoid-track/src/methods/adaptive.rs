@@ -11,15 +11,15 @@
 //! **What it reports.** The gain and lead that are nearest to the gains of the basis
 //! ([`AdaptiveFilter::operator`]). The polynomials are the hold of that, with the delay of nk.
 
-mod beginning;
+mod starting_point;
 
-use beginning::{Beginning, known};
+use starting_point::{StartingPoint, initial_estimate};
 use hoid_core::{
     adaptive::{
-        AdaptiveFilter, GAINS, HELD, LARGEST_ORDER, LINEAR, PARAMETERS,
+        AdaptiveFilter, GAINS, DYNAMICS, LARGEST_ORDER, LINEAR, PARAMETERS,
         basis::Basis,
         memory_needed, through,
-        usual::{self, Usual},
+        defaults::{self, DefaultOperator},
     },
     state::{State, visit_all},
 };
@@ -53,7 +53,7 @@ settings! {
         pub limit: Option<f64> = None,
         /// Time that is read again and again; 0 for a recursion that reads each sample once, as a microcontroller does
         #[setting(unit("s"), bounds(Bounds::NonNegative))]
-        pub replay: f64 = usual::REPLAYED_S,
+        pub replay: f64 = defaults::REPLAYED_S,
         /// What is known of the person before the first sample: population, none, NAME=CENTRE:SPREAD of
         /// omega_nm, zeta_nm, tau_e, T_I (the spread is relative), or an earlier fit of them, a file that
         /// hoid identify --json has printed
@@ -82,7 +82,7 @@ impl RecursiveMethod for AdaptiveOptions {
     }
 
     fn usual_nd(&self) -> Option<usize> {
-        Some(usual::ORDER)
+        Some(defaults::ORDER)
     }
 
     /// It follows from the weights of the drifts.
@@ -147,18 +147,18 @@ impl RecursiveMethod for AdaptiveOptions {
     }
 
     fn limit(&self) -> f64 {
-        self.limit.unwrap_or(usual::LIMIT)
+        self.limit.unwrap_or(defaults::LIMIT)
     }
 
-    fn spread_before(&self) -> Option<[f64; HELD]> {
+    fn spread_before(&self) -> Option<[f64; DYNAMICS]> {
         // What a fit determined is known, whatever the data say.
         let known = self.prior.fit().is_some();
-        let Beginning { point, spread } = Beginning::of(&self.prior, 0.0, false, SampleTime::HUNDREDTH).ok()?;
+        let StartingPoint { point, spread } = StartingPoint::of(&self.prior, 0.0, false, SampleTime::HUNDREDTH).ok()?;
         (!known).then_some([spread[0] * point.omega, spread[1] * point.zeta, spread[2]])
     }
 
     fn lag_of_basis_s(&self) -> Option<f64> {
-        let Beginning { point, .. } = Beginning::of(&self.prior, 0.0, false, SampleTime::HUNDREDTH).ok()?;
+        let StartingPoint { point, .. } = StartingPoint::of(&self.prior, 0.0, false, SampleTime::HUNDREDTH).ok()?;
         Some(point.lag)
     }
 
@@ -189,17 +189,17 @@ impl AdaptiveRecursion {
         let nk = setup.orders.nk;
         // A delay that is not the default one has been given.
         let is_given = nk != sample_time.nk(USUAL_DELAY_S);
-        let beginning = Beginning::of(&options.prior, (nk as f64 - 0.5) * ts, is_given, sample_time)?;
+        let beginning = StartingPoint::of(&options.prior, (nk as f64 - 0.5) * ts, is_given, sample_time)?;
         let point = beginning.point;
         let basis = Basis::new(point, ts).ok_or_else(|| unusable(&format!("a delay of {} s", point.tau)))?;
         let fit = options.prior.fit();
-        let known = fit.map(|fit| known(fit, &basis, sample_time)).transpose()?;
-        let supposed = Usual {
+        let known = fit.map(|fit| initial_estimate(fit, &basis, sample_time)).transpose()?;
+        let supposed = DefaultOperator {
             point,
             spread: beginning.spread,
             // A structure without a noise model, or with one pole, does not say how it is coloured.
             order: match setup.orders.nd {
-                0 | 1 => usual::ORDER,
+                0 | 1 => defaults::ORDER,
                 nd => nd,
             },
             limit: options.limit(),
@@ -224,7 +224,7 @@ impl AdaptiveRecursion {
 
     /// True for a response of an estimate: that of no gains at all has no size in dB and no phase.
     fn answers(&self, [re, im]: [f64; 2]) -> bool {
-        self.model.began() && (re != 0.0 || im != 0.0)
+        self.model.has_started() && (re != 0.0 || im != 0.0)
     }
 
     fn report(&mut self) {
@@ -246,7 +246,7 @@ impl AdaptiveRecursion {
             let variance = pairs.map(|(a, b)| map[i][a] * of(a, b) * map[i][b]).sum();
             Estimate::with_variance(value, variance)
         };
-        let (told, by) = (detector.told(), detector.difference());
+        let (told, by) = (detector.contrast(), detector.difference());
         let before = |i: usize| match i {
             0 | 1 => gain(i, &told.before, &|a, b| told.covariance_before[a][b]),
             _ => {
@@ -280,7 +280,7 @@ impl State for AdaptiveRecursion {
 impl Recursion for AdaptiveRecursion {
     fn step(&mut self, sample: Sample) -> StepOutcome {
         let step = self.model.step(sample.e, sample.u);
-        if self.model.began() {
+        if self.model.has_started() {
             self.report();
         }
         step.into()
@@ -299,7 +299,7 @@ impl Recursion for AdaptiveRecursion {
     }
 
     fn covariance(&self, into: &mut [f64]) -> bool {
-        if !self.model.began() {
+        if !self.model.has_started() {
             return false;
         }
         let c = self.model.operator_covariance();
@@ -318,7 +318,7 @@ impl Recursion for AdaptiveRecursion {
 
     fn operator(&self) -> Option<OperatorEstimate> {
         let (values, covariance) = (self.model.operator(), self.model.operator_covariance());
-        let [lead, lead_variance] = match self.model.began() {
+        let [lead, lead_variance] = match self.model.has_started() {
             true => self.model.lead_time(),
             false => [f64::NAN; 2],
         };
@@ -334,7 +334,7 @@ impl Recursion for AdaptiveRecursion {
     }
 
     fn change_odds(&self) -> Option<f64> {
-        Some(self.model.detector().against_chance())
+        Some(self.model.detector().log_significance())
     }
 
     fn change(&self) -> Option<Change> {
@@ -356,10 +356,10 @@ impl Recursion for AdaptiveRecursion {
             },
         };
         let pair = |i: usize| [old[i], new(i)];
-        let told = detector.told();
+        let told = detector.contrast();
         let variance = detector.innovation_variances();
         let log_variance = 2.0 / told.samples[0] + 2.0 / told.samples[1];
-        let level = (variance[1] / variance[0]).ln() / (log_variance * detector.usual_level()).sqrt();
+        let level = (variance[1] / variance[0]).ln() / (log_variance * detector.typical_level()).sqrt();
         Some(Change {
             seconds_ago: detector.ago_s(),
             odds: self.change_odds()?,

@@ -9,7 +9,7 @@
 //! whatever the machine.
 //!
 //! Every second replay starts elsewhere. It is repeated [`STAGES`] times from where it ended, and takes over
-//! only if its evidence is better by [`BETTER`].
+//! only if its evidence is better by [`TAKEOVER_NATS`].
 //!
 //! With no more memory than the longest delay needs nothing is replayed: basis and noise model are then
 //! those of the start, but for corrections, and the noise model is renewed in place.
@@ -29,10 +29,10 @@ use crate::adaptive::{
 pub const REPLAYED: usize = 50;
 /// Replays of a start that is elsewhere, and the evidence by which it must be better, nats.
 const STAGES: u64 = 3;
-const BETTER: f64 = 3.0;
+const TAKEOVER_NATS: f64 = 3.0;
 /// Evidence by which a replay of the estimate itself may be worse: it started with what was known less
 /// well.
-const WORSE: f64 = 20.0;
+const TOLERATED_NATS: f64 = 20.0;
 /// Samples that a first estimate needs, in orders of the noise model.
 const FEWEST: u64 = 3;
 
@@ -45,15 +45,15 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
             return;
         }
         if !self.replays_anything() {
-            if let Some(live) = self.candidate(self.prior.person, &self.supposed, 1.0) {
+            if let Some(live) = self.candidate(self.prior.person, &self.prior_noise, 1.0) {
                 self.live = live;
-                self.began = true;
+                self.started = true;
             }
             return;
         }
         let mut best: Option<(f64, Candidate)> = None;
         for start in self.prior.starts {
-            let Some(mut candidate) = self.candidate(start, &self.supposed, 1.0) else {
+            let Some(mut candidate) = self.candidate(start, &self.prior_noise, 1.0) else {
                 continue;
             };
             if !read(
@@ -65,19 +65,19 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
             ) {
                 continue;
             }
-            let evidence = candidate.evidence + self.plausibility(start);
+            let evidence = candidate.evidence + self.log_prior(start);
             if evidence.is_finite() && best.as_ref().is_none_or(|(least, _)| evidence > *least) {
                 best = Some((evidence, candidate));
             }
         }
         if let Some((_, mut candidate)) = best {
-            self.suppose(&mut candidate);
-            (self.live, self.began) = (candidate, true);
+            self.apply_population_prior(&mut candidate);
+            (self.live, self.started) = (candidate, true);
         }
     }
 
     /// Logarithm of the prior density of a point, but for a constant.
-    fn plausibility(&self, point: Point) -> f64 {
+    fn log_prior(&self, point: Point) -> f64 {
         let (p, is) = (self.prior.person, variances(&self.prior));
         let away = [point.omega - p.omega, point.zeta - p.zeta, point.tau - p.tau];
         -0.5 * away.iter().zip(is).map(|(a, v)| a * a / v).sum::<f64>()
@@ -107,7 +107,7 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
 
     fn start_replay(&mut self) {
         self.replays += 1;
-        let elsewhere = self.replays.is_multiple_of(2) && self.known.is_none();
+        let elsewhere = self.replays.is_multiple_of(2) && self.initial.is_none();
         let (point, stage) = match elsewhere {
             true => (self.prior.starts[self.turn()], 2),
             false => (self.live.point(), 1),
@@ -130,37 +130,37 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
             return;
         };
         let later = (trial.start.saturating_sub(from.start)) / from.block_samples().max(1);
-        let guide = from.mixture.history();
+        let guide = from.mixture.segments();
         let basis = trial.basis().clone();
-        self.trial = trial.guided(guide.carried(later, |state| from.carried(&basis, state)));
+        self.trial = trial.with_guide(guide.carried(later, |state| from.carried(&basis, state)));
         (self.stage, self.at) = (stage, self.trial.start);
     }
 
     /// What becomes of a trial that has caught up.
     fn decide(&mut self) {
         let mut trial = self.trial.clone();
-        trial.unguided();
+        trial.clear_guide();
         let evidence = trial.evidence;
         let stage = core::mem::replace(&mut self.stage, 0);
         if !(evidence.is_finite() && trial.mixture.mean().iter().all(|s| s.is_finite())) {
             return;
         }
         let same = trial.start == self.live.start;
-        self.suppose(&mut trial);
+        self.apply_population_prior(&mut trial);
         if stage > 1 && stage <= STAGES {
             let point = trial.point();
             self.start_from(&trial, point, stage + 1);
             return;
         }
         let takes_over = match stage {
-            1 => !same || evidence > self.live.evidence - WORSE,
-            _ => same && evidence > self.live.evidence + BETTER,
+            1 => !same || evidence > self.live.evidence - TOLERATED_NATS,
+            _ => same && evidence > self.live.evidence + TAKEOVER_NATS,
         };
         if stage > 1 && same {
             let loser = if takes_over { &self.live } else { &trial };
-            let behind = (evidence - self.live.evidence).abs();
+            let deficit = (evidence - self.live.evidence).abs();
             self.alternatives
-                .put(self.turn(), loser.operator(), behind, self.read());
+                .put(self.turn(), loser.operator(), deficit, self.read());
         }
         if takes_over {
             self.live = trial;
@@ -168,13 +168,13 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
     }
 
     /// Puts what is supposed of people in the place of the trust region of a replay.
-    fn suppose(&self, candidate: &mut Candidate) {
-        if self.known.is_some() {
+    fn apply_population_prior(&self, candidate: &mut Candidate) {
+        if self.initial.is_some() {
             return;
         }
         let (p, at) = (self.prior.person, candidate.basis().point());
         let mean = [p.omega - at.omega, p.zeta - at.zeta, p.tau - at.tau];
-        candidate.mixture.suppose(trusted(at), variances(&self.prior), mean);
+        candidate.mixture.replace_prior(trusted(at), variances(&self.prior), mean);
     }
 }
 
@@ -190,14 +190,14 @@ fn read<E: AsRef<[f64]> + AsMut<[f64]>>(
         candidate.respond(|age| history.error(sample, age));
         let (u, use_of_it) = history.output(sample);
         let through = match use_of_it {
-            Use::Learn => {
+            Use::Update => {
                 let white = candidate.whitened(u);
-                if !candidate.learn(&white, u, changes) {
+                if !candidate.update(&white, u, changes) {
                     return false;
                 }
                 u
             }
-            Use::Follow => u,
+            Use::FilterOnly => u,
             _ => {
                 let predicted = u - candidate.innovation(&candidate.whitened(u));
                 through_filters(saturation, use_of_it, u, predicted)

@@ -4,31 +4,31 @@
 //! another.
 
 use super::{
-    pair::Pair,
+    f64x2::F64x2,
     sizes::{LARGEST_ORDER, SIGNALS},
 };
 use crate::state::State;
 
 /// Signals in pairs.
-pub(super) type Paired = [Pair; SIGNALS / 2];
+pub(super) type Paired = [F64x2; SIGNALS / 2];
 
 /// In pairs.
 #[inline(always)]
 pub(super) fn paired(signals: &[f64; SIGNALS]) -> Paired {
-    core::array::from_fn(|i| Pair([signals[2 * i], signals[2 * i + 1]]))
+    core::array::from_fn(|i| F64x2([signals[2 * i], signals[2 * i + 1]]))
 }
 
 /// The signals of the last samples.
 #[derive(Debug, Clone)]
-pub(super) struct PastSignals {
+pub(super) struct SignalHistory {
     twice: [Paired; 2 * LARGEST_ORDER],
     newest: usize,
 }
 
-impl PastSignals {
+impl SignalHistory {
     /// All zero.
     pub const ZERO: Self = Self {
-        twice: [[Pair::ZERO; SIGNALS / 2]; 2 * LARGEST_ORDER],
+        twice: [[F64x2::ZERO; SIGNALS / 2]; 2 * LARGEST_ORDER],
         newest: 0,
     };
 
@@ -49,14 +49,14 @@ impl PastSignals {
     }
 }
 
-impl PartialEq for PastSignals {
+impl PartialEq for SignalHistory {
     /// Wherever the ring begins.
     fn eq(&self, other: &Self) -> bool {
         self.newest_first() == other.newest_first()
     }
 }
 
-impl State for PastSignals {
+impl State for SignalHistory {
     /// The newest first, wherever the ring begins: it is turned to its beginning.
     fn visit(&mut self, each: &mut dyn FnMut(&mut f64)) {
         self.twice[..LARGEST_ORDER].rotate_left(self.newest);
@@ -73,7 +73,7 @@ mod tests {
 
     #[test]
     fn the_last_ones_stand_in_their_order_and_can_be_saved_anywhere() {
-        let mut past = PastSignals::ZERO;
+        let mut past = SignalHistory::ZERO;
         for t in 0..100 {
             past.push(&[f64::from(t); SIGNALS]);
             let expected = |age: usize| (f64::from(t) - age as f64).max(0.0);

@@ -11,7 +11,7 @@ use super::{
 
 /// An estimate that is there before the first sample.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Known {
+pub struct InitialEstimate {
     /// Gains, level, and corrections of the basis.
     pub state: [f64; STATES],
     /// Their covariance.
@@ -25,7 +25,7 @@ pub struct Known {
     pub remnant: Option<(Lags, f64)>,
 }
 
-impl Known {
+impl InitialEstimate {
     /// True for numbers that make sense.
     pub(super) fn is_sound(&self) -> bool {
         let finite = |x: &f64| x.is_finite();
@@ -40,9 +40,9 @@ impl Known {
     }
 
     /// Puts the remnant into a noise model; false for numbers that make no sense.
-    pub(super) fn place_in(&self, noise: &mut NoiseModel, sample_time: f64) -> bool {
+    pub(super) fn apply_to_noise(&self, noise: &mut NoiseModel, sample_time: f64) -> bool {
         match &self.remnant {
-            Some((lags, seconds)) => noise.suppose(lags, self.variance, seconds / sample_time),
+            Some((lags, seconds)) => noise.set_prior(lags, self.variance, seconds / sample_time),
             None => true,
         }
     }

@@ -14,11 +14,11 @@
 //! the variance of eps are `r_k = sum_j g_j g_{j+k}`.
 
 use hoid_core::adaptive::{
-    GAINS, HELD, LARGEST_ORDER, LINEAR, STATES,
+    GAINS, DYNAMICS, LARGEST_ORDER, LINEAR, STATES,
     basis::{Basis, Point, REFERENCE},
-    known::Known,
+    initial_estimate::InitialEstimate,
     noise::Lags,
-    usual::{GIVEN_DELAY_S, LAG_S, Usual},
+    defaults::{GIVEN_DELAY_S, LAG_S, DefaultOperator},
 };
 use hoid_ident::IdentError;
 use hoid_model::{Complex64, FittedOperator, SampleTime, operator_family::Coordinate, uncertainty::variance_along};
@@ -26,7 +26,7 @@ use hoid_model::{Complex64, FittedOperator, SampleTime, operator_family::Coordin
 use crate::person_prior::PersonPrior;
 
 /// Spread of what is held where nothing is known: shares of omega and zeta, and s for the delay.
-const WIDE: [f64; HELD] = [0.45, 0.75, 0.15];
+const WIDE: [f64; DYNAMICS] = [0.45, 0.75, 0.15];
 /// Frequencies at which the gains of a fit are found, rad/s: the range, and how many.
 const FREQUENCIES: ([f64; 2], usize) = ([0.3, 8.0], 24);
 /// Lags that a basis may have, s: beyond the longest a lag cannot be told from an integration.
@@ -42,19 +42,19 @@ const LEFT: f64 = 1e-6;
 const LEVEL: f64 = 3.0;
 
 /// The basis at the beginning, and how far a person is from it.
-pub(super) struct Beginning {
+pub(super) struct StartingPoint {
     pub point: Point,
     /// Shares of omega and zeta, and s for the delay.
-    pub spread: [f64; HELD],
+    pub spread: [f64; DYNAMICS],
 }
 
-impl Beginning {
+impl StartingPoint {
     /// Of what is known; `tau_s` is the delay, for an error that is straight between samples, and whether it
     /// has been given.
     pub fn of(prior: &PersonPrior, tau_s: f64, is_given: bool, sample_time: SampleTime) -> Result<Self, IdentError> {
-        let Usual {
+        let DefaultOperator {
             mut point, mut spread, ..
-        } = Usual::with_delay(tau_s);
+        } = DefaultOperator::with_delay(tau_s);
         // An error that is held comes half a sample later than one that is straight.
         let hold = 0.5 * sample_time.s();
         let of_delay = |otherwise: f64| if is_given { GIVEN_DELAY_S } else { otherwise };
@@ -111,11 +111,11 @@ fn no_place(fit: &FittedOperator, why: &str) -> IdentError {
     }
 }
 
-/// The estimate of a fit in a basis that `Beginning::of` has made for it.
+/// The estimate of a fit in a basis that `StartingPoint::of` has made for it.
 ///
 /// # Errors
 /// [`IdentError::BadStart`] for a form that is not near to any gains.
-pub(super) fn known(fit: &FittedOperator, basis: &Basis, sample_time: SampleTime) -> Result<Known, IdentError> {
+pub(super) fn initial_estimate(fit: &FittedOperator, basis: &Basis, sample_time: SampleTime) -> Result<InitialEstimate, IdentError> {
     let nearest = Nearest::new(fit, basis, sample_time);
     let (value, misfit) = nearest.gains(|k| nearest.responses[k].value);
     if misfit > MISFIT {
@@ -162,7 +162,7 @@ pub(super) fn known(fit: &FittedOperator, basis: &Basis, sample_time: SampleTime
     let lags = remnant(fit, sample_time);
     let power = lags.map_or(1.0, |lags| lags[0]) * fit.innovation_variance;
     covariance[GAINS][GAINS] = LEVEL * LEVEL * power;
-    Ok(Known {
+    Ok(InitialEstimate {
         state,
         covariance: symmetric(&covariance),
         variance: fit.innovation_variance,
@@ -423,14 +423,14 @@ mod tests {
             .with("prior", "omega_nm=9:0.2,tau_e=0.25:0.1")
             .unwrap();
         let prior = named.person_prior().unwrap();
-        let found = Beginning::of(prior, 0.205, false, SampleTime::HUNDREDTH).unwrap();
+        let found = StartingPoint::of(prior, 0.205, false, SampleTime::HUNDREDTH).unwrap();
         assert_eq!(
             (found.point.omega, found.point.zeta, found.point.lag),
-            (9.0, usual::ZETA, LAG_S)
+            (9.0, defaults::ZETA, LAG_S)
         );
         assert!((found.point.tau - 0.255).abs() < 1e-12);
-        assert_eq!(found.spread, [0.2, usual::SPREAD[1], 0.025]);
-        let wide = Beginning::of(&PersonPrior::Nothing, 0.205, false, SampleTime::HUNDREDTH).unwrap();
-        assert!(wide.spread.iter().zip(usual::SPREAD).all(|(a, b)| *a > b));
+        assert_eq!(found.spread, [0.2, defaults::SPREAD[1], 0.025]);
+        let wide = StartingPoint::of(&PersonPrior::Nothing, 0.205, false, SampleTime::HUNDREDTH).unwrap();
+        assert!(wide.spread.iter().zip(defaults::SPREAD).all(|(a, b)| *a > b));
     }
 }

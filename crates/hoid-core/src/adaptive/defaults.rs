@@ -12,7 +12,7 @@ use super::{
     last_blocks::BLOCK_S,
     mixture::ChangePrior,
     prior::AdaptivePrior,
-    sizes::{HELD, STARTS},
+    sizes::{DYNAMICS, STARTS},
 };
 
 /// Lag T_I in s, natural frequency in rad/s and damping of the usual person.
@@ -23,7 +23,7 @@ pub const OMEGA_RAD_S: f64 = 11.0;
 pub const ZETA: f64 = 0.25;
 /// How far people are from that: shares of omega and zeta, and s for the delay, where that is not given
 /// and where it is.
-pub const SPREAD: [f64; HELD] = [0.3, 0.5, 0.1];
+pub const SPREAD: [f64; DYNAMICS] = [0.3, 0.5, 0.1];
 /// See [`SPREAD`].
 pub const GIVEN_DELAY_S: f64 = 0.02;
 /// Order of the noise model.
@@ -49,7 +49,7 @@ const CHANGES: ChangePrior = ChangePrior {
     any: 0.4,
     protected: 4,
     limit: LIMIT,
-    look: DETECTOR_LIMIT,
+    detector_limit: DETECTOR_LIMIT,
 };
 /// Memory of the noise model, s.
 const NOISE_MEMORY_S: f64 = 100.0;
@@ -57,7 +57,7 @@ const NOISE_MEMORY_S: f64 = 100.0;
 const DETECTOR_LIMIT: f64 = 3.5;
 /// Where estimates start: delay, s more than that of the person; natural frequency, rad/s; damping. A delay
 /// that is given is kept.
-const ELSEWHERE: [[f64; 3]; STARTS] = [
+const STARTING_POINTS: [[f64; 3]; STARTS] = [
     [0.0, OMEGA_RAD_S, ZETA],
     [0.1, 11.0, 0.3],
     [0.2, 9.0, 0.4],
@@ -84,11 +84,11 @@ const DELAY_CHANGE_S: f64 = 0.05;
 
 /// A person before the first sample.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Usual {
+pub struct DefaultOperator {
     /// Where the basis is made.
     pub point: Point,
     /// How far the person may be from that: shares of omega and zeta, and s for the delay.
-    pub spread: [f64; HELD],
+    pub spread: [f64; DYNAMICS],
     /// Order of the noise model.
     pub order: usize,
     /// Standard deviations beyond which an innovation moves the estimate no further.
@@ -97,7 +97,7 @@ pub struct Usual {
     pub false_alarms: f64,
 }
 
-impl Usual {
+impl DefaultOperator {
     /// Somebody with this delay, s, for an error that is straight between samples: one that is held comes
     /// half a sample later.
     pub fn with_delay(tau: f64) -> Self {
@@ -135,7 +135,7 @@ impl Usual {
                 limit: self.limit,
                 ..CHANGES
             },
-            starts: ELSEWHERE.map(|[later, omega, zeta]| Point {
+            starts: STARTING_POINTS.map(|[later, omega, zeta]| Point {
                 tau: (self.point.tau + if given { 0.0 } else { later }).max(EARLIEST_S),
                 omega,
                 zeta,
@@ -160,11 +160,11 @@ mod tests {
     #[test]
     fn fewer_false_alarms_need_a_higher_threshold_and_any_number_has_one() {
         let of = |false_alarms: f64| {
-            let usual = Usual {
+            let default = DefaultOperator {
                 false_alarms,
-                ..Usual::with_delay(0.2)
+                ..DefaultOperator::with_delay(0.2)
             };
-            usual.prior(0.01).detection.threshold
+            default.prior(0.01).detection.threshold
         };
         assert!(of(0.5) > of(1.0) && of(1.0) > of(30.0));
         assert!(of(1e9) > 0.0);
@@ -172,7 +172,7 @@ mod tests {
 
     #[test]
     fn starts_of_a_short_delay_stay_where_a_basis_can_be_made() {
-        let prior = Usual::with_delay(0.05).prior(0.01);
+        let prior = DefaultOperator::with_delay(0.05).prior(0.01);
         assert!(prior.is_sound());
         assert!(prior.starts.iter().all(|start| start.tau >= EARLIEST_S));
     }

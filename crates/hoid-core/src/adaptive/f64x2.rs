@@ -9,15 +9,15 @@ use core::ops::{Add, AddAssign, Div, Mul, Sub, SubAssign};
 /// Two numbers.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[repr(align(16))]
-pub(super) struct Pair(pub [f64; 2]);
+pub(super) struct F64x2(pub [f64; 2]);
 
-impl crate::state::State for Pair {
+impl crate::state::State for F64x2 {
     fn visit(&mut self, each: &mut dyn FnMut(&mut f64)) {
         self.0.visit(each);
     }
 }
 
-impl Pair {
+impl F64x2 {
     pub const ZERO: Self = Self::both(0.0);
 
     /// One number twice.
@@ -38,7 +38,7 @@ impl Pair {
     }
 }
 
-impl Add for Pair {
+impl Add for F64x2 {
     type Output = Self;
     #[inline(always)]
     fn add(self, other: Self) -> Self {
@@ -46,7 +46,7 @@ impl Add for Pair {
     }
 }
 
-impl Sub for Pair {
+impl Sub for F64x2 {
     type Output = Self;
     #[inline(always)]
     fn sub(self, other: Self) -> Self {
@@ -54,7 +54,7 @@ impl Sub for Pair {
     }
 }
 
-impl Mul for Pair {
+impl Mul for F64x2 {
     type Output = Self;
     #[inline(always)]
     fn mul(self, other: Self) -> Self {
@@ -62,7 +62,7 @@ impl Mul for Pair {
     }
 }
 
-impl Div for Pair {
+impl Div for F64x2 {
     type Output = Self;
     #[inline(always)]
     fn div(self, other: Self) -> Self {
@@ -70,14 +70,14 @@ impl Div for Pair {
     }
 }
 
-impl AddAssign for Pair {
+impl AddAssign for F64x2 {
     #[inline(always)]
     fn add_assign(&mut self, other: Self) {
         *self = *self + other;
     }
 }
 
-impl SubAssign for Pair {
+impl SubAssign for F64x2 {
     #[inline(always)]
     fn sub_assign(&mut self, other: Self) {
         *self = *self - other;
