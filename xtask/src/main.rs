@@ -19,8 +19,8 @@
 //! Little but the standard library: a chore must start at once on a fresh machine.
 #![allow(clippy::print_stdout, clippy::print_stderr)]
 
+mod background;
 mod bench;
-mod beside;
 mod counts;
 mod crates;
 mod embedded;
@@ -38,7 +38,7 @@ use std::{
     process::{Command, ExitCode},
 };
 
-use beside::Beside;
+use background::Background;
 use counts::Counts;
 use process::{SHIPPED, cargo, cargo_command, each_line, run};
 
@@ -82,18 +82,18 @@ fn test(arguments: &[String]) -> Result<(), String> {
     let shown = format!("{command:?}");
     let mut total = Counts::default();
     let status = if arguments.is_empty() {
-        let required = Beside::begin(python::REQUIRE)?;
+        let required = Background::begin(python::REQUIRE)?;
         cargo(&["test", "--workspace", "--no-run"], &[])?;
         let mut required = Some(required.end());
         let mut built = Ok(None);
         let status = each_line(&mut command, |line| {
             // Not before the first test runs: until then cargo keeps other builds waiting, and they it.
             if let Some(required) = required.take() {
-                built = required.and_then(|()| Beside::begin(python::BUILD).map(Some));
+                built = required.and_then(|()| Background::begin(python::BUILD).map(Some));
             }
             total.add(line);
         })?;
-        built?.map_or(Ok(()), Beside::end)?;
+        built?.map_or(Ok(()), Background::end)?;
         total.join(&python::pytest(&[])?);
         status
     } else {

@@ -6,7 +6,7 @@
 //! the crossover, and not determined for who asks for the delay. By default it is that of the response, and a loop that is
 //! open is a doubt.
 
-use hoid_ident::{Fit, GreyBoxFit, SigmoidFit, family::FamilyFit, judgement::is_open};
+use hoid_ident::{Fit, GreyBoxFit, SigmoidFit, diagnostics::is_open, family::FamilyFit};
 use hoid_model::{ContinuousTransferFunction, Finding, Verdict, operator_family::PARAMETERS, uncertainty::Estimate};
 
 use crate::AnalysisError;
@@ -68,7 +68,7 @@ pub fn judged(verdict: Verdict, answers: &[Answered], asked: &[String]) -> Verdi
         let is_told = |finding: &Finding| matches!(finding.kind, "no-crossover" | "unstable-loop");
         let wanted = LOOP.iter().filter(|_| !verdict.findings().iter().any(is_told));
         let of_loop = wanted.filter_map(|name| of(name)?.open.clone());
-        of_loop.map(|finding| Finding::doubt(OPEN, finding.words)).collect()
+        of_loop.map(|finding| Finding::doubt(OPEN, finding.message)).collect()
     } else {
         let wanted = asked.iter().filter_map(|name| match of(name) {
             Some(answer) => answer.open.clone(),
@@ -76,7 +76,7 @@ pub fn judged(verdict: Verdict, answers: &[Answered], asked: &[String]) -> Verdi
         });
         wanted.collect()
     };
-    verdict.and(open)
+    verdict.append(open)
 }
 
 /// The verdict on one answer: what is known of the fit as a whole, and what makes this one open.
@@ -85,8 +85,8 @@ pub fn of_answer(verdict: &Verdict, answer: &Answered) -> Verdict {
     Verdict::of(whole.chain(&answer.open).cloned().collect())
 }
 
-fn open(words: String) -> Finding {
-    Finding::undetermined(OPEN, words)
+fn open(message: String) -> Finding {
+    Finding::undetermined(OPEN, message)
 }
 
 fn answered(name: &str, why: Option<String>) -> Answered {

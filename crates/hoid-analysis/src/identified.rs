@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use hoid_ident::{Fit, family::FamilyFit, frequency::Description, judgement::response, validation::GoodnessOfFit};
+use hoid_ident::{Fit, diagnostics::response, family::FamilyFit, frequency::Description, validation::GoodnessOfFit};
 use hoid_model::{ContinuousTransferFunction, Decimation, Detrend, Record, Verdict, uncertainty::Estimate};
 use serde_json::{Map, Value};
 
@@ -82,17 +82,17 @@ impl<E: BatchEstimator> Identification<E> {
         } = E::fit(self, &mut data)?;
         let verdict = data.judged(verdict);
         let response = (E::OF == Of::Person).then(|| response(&data.records)).flatten();
-        let verdict = verdict.behind(response.and_then(|found| found.finding()));
+        let verdict = verdict.prepend(response.and_then(|found| found.finding()));
         let verdict = answers::judged(verdict, &fit.answers(self.controlled_element.as_ref()), &self.answers);
         E::judged(&mut fit, &verdict);
         let reading = data.source.as_ref().map(|source| &source.reading);
         let by_default = Identification::of(self.estimator.by_default());
-        let usual_reading = reading.map(|_| Reading::default());
-        let mut usual = by_default.settings(data.records[0].sample_time());
-        usual.extend(shared_settings(&by_default, usual_reading.as_ref()));
-        let mut settings = Setting::against(used, &usual);
+        let default_reading = reading.map(|_| Reading::default());
+        let mut default = by_default.settings(data.records[0].sample_time());
+        default.extend(shared_settings(&by_default, default_reading.as_ref()));
+        let mut settings = Setting::against(used, &default);
         settings.extend(found);
-        settings.extend(Setting::against(shared_settings(self, reading), &usual));
+        settings.extend(Setting::against(shared_settings(self, reading), &default));
         Ok(Identified {
             fit,
             verdict,

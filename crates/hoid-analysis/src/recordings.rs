@@ -95,13 +95,13 @@ impl Recordings {
                 if of_stick && std::mem::replace(&mut said, true) {
                     continue;
                 }
-                let words = match (several, of_stick) {
-                    (true, true) => format!("{name} and {} more: {}", resting - 1, finding.words),
-                    (true, false) => format!("{name}: {}", finding.words),
-                    (false, _) => finding.words.clone(),
+                let message = match (several, of_stick) {
+                    (true, true) => format!("{name} and {} more: {}", resting - 1, finding.message),
+                    (true, false) => format!("{name}: {}", finding.message),
+                    (false, _) => finding.message.clone(),
                 };
                 all.push(Finding {
-                    words,
+                    message,
                     ..finding.clone()
                 });
             }
@@ -112,6 +112,10 @@ impl Recordings {
     /// A verdict with what the recordings say: first, since a wrong recording is why a result is wrong.
     pub fn judged(&self, verdict: Verdict) -> Verdict {
         let more = self.findings();
-        if more.is_empty() { verdict } else { verdict.behind(more) }
+        if more.is_empty() {
+            verdict
+        } else {
+            verdict.prepend(more)
+        }
     }
 }

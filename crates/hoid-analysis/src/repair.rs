@@ -1,6 +1,6 @@
 //! Faults of recordings, looked for and mended before anything else is done with them.
 
-use hoid_ident::faults::{SLOWEST_S, mend};
+use hoid_ident::faults::{SLOWEST_S, repair};
 use hoid_model::{FaultHandling, Finding, ModelError, Record};
 
 use crate::{
@@ -33,10 +33,10 @@ impl Recordings {
                 FaultHandling::Bridge | FaultHandling::Cut if steps => FaultHandling::Report,
                 as_asked => as_asked,
             };
-            let mut found = mend(&record, handling)?;
+            let mut found = repair(&record, handling)?;
             if steps || (of == Of::System && record.sample_time().s() > SLOWEST_S) {
                 // No person's; of a furnace it is usual.
-                let note = |finding: Finding| Finding::note(finding.kind, finding.words);
+                let note = |finding: Finding| Finding::note(finding.kind, finding.message);
                 found.findings = found.findings.into_iter().map(note).collect();
             }
             let whole = found.segments.len() == 1 && found.segments[0].len() == record.len();
@@ -81,7 +81,7 @@ pub(crate) fn steps_from_level_to_level(record: &Record) -> bool {
 pub(crate) fn repaired_alike(records: Vec<Record>, handling: FaultHandling) -> Result<Vec<Record>, ModelError> {
     let mut all = Vec::with_capacity(records.len());
     for record in records {
-        all.extend(mend(&record, handling)?.segments);
+        all.extend(repair(&record, handling)?.segments);
     }
     Ok(all)
 }

@@ -36,7 +36,7 @@ pub struct Request {
 
 /// An identification that can be run.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Asked {
+pub enum ResolvedRequest {
     /// The operator of a person, its form by evidence.
     Operator(Identification),
     /// A gain with a lead, and its remnant of order m.
@@ -51,15 +51,15 @@ pub enum Asked {
 macro_rules! each {
     ($asked:expr, $how:ident => $what:expr) => {
         match $asked {
-            Asked::Operator($how) => $what,
-            Asked::Remnant($how) => $what,
-            Asked::Change($how) => $what,
-            Asked::Polynomials($how) => $what,
+            ResolvedRequest::Operator($how) => $what,
+            ResolvedRequest::Remnant($how) => $what,
+            ResolvedRequest::Change($how) => $what,
+            ResolvedRequest::Polynomials($how) => $what,
         }
     };
 }
 
-impl Asked {
+impl ResolvedRequest {
     /// The estimator of a name in the registry, with its defaults; `None` for another name.
     pub fn of_estimator(name: &str, structure: Structure) -> Option<Self> {
         let polynomials = |structure: Structure, method: Option<IvMethod>| {
@@ -122,7 +122,7 @@ impl Request {
     ///
     /// # Errors
     /// [`AnalysisError`] for options that contradict each other or have no such value.
-    pub fn asked(&self) -> Result<(Asked, Vec<String>), AnalysisError> {
+    pub fn resolve(&self) -> Result<(ResolvedRequest, Vec<String>), AnalysisError> {
         let mut notes = Vec::new();
         let mut asked = self.kind(&mut notes)?;
         let all = estimators();
@@ -160,7 +160,7 @@ impl Request {
     }
 
     /// What is fitted, with its defaults.
-    fn kind(&self, notes: &mut Vec<String>) -> Result<Asked, AnalysisError> {
+    fn kind(&self, notes: &mut Vec<String>) -> Result<ResolvedRequest, AnalysisError> {
         let options = |reason: String| AnalysisError::Options { reason };
         let typed = self
             .structure
@@ -196,7 +196,7 @@ impl Request {
         } else {
             self.operator(typed.as_deref(), notes)?
         };
-        Asked::of_estimator(estimator, polynomial.unwrap_or(Structure::BoxJenkins))
+        ResolvedRequest::of_estimator(estimator, polynomial.unwrap_or(Structure::BoxJenkins))
             .ok_or_else(|| options(unknown_method(estimator)))
     }
 

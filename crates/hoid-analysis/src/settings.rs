@@ -38,7 +38,7 @@ impl Setting {
         let is_default = |one: &Self| {
             by_default
                 .iter()
-                .any(|usual| (&usual.name, &usual.value) == (&one.name, &one.value))
+                .any(|default| (&default.name, &default.value) == (&one.name, &one.value))
         };
         all.into_iter()
             .map(|one| {

@@ -80,7 +80,7 @@ fn a_stick_at_its_end_is_told_of_files_and_of_records_alike() {
     let place = format!("{}/", directory.path().display());
     let words = |found: &hoid_analysis::Identified| -> Vec<String> {
         let all = found.fit.verdict.findings().iter();
-        all.map(|f| f.words.replace(&place, "").replace(".csv", "")).collect()
+        all.map(|f| f.message.replace(&place, "").replace(".csv", "")).collect()
     };
     assert_eq!(words(&of_records), words(&of_files));
     let first = &words(&of_files)[0];
@@ -157,15 +157,15 @@ fn faults_are_mended_or_kept() {
         let e = Channel::new("e", "", record.input().to_vec());
         Recordings::of_records([Record::new(record.sample_time(), e, Channel::new("u", "", u)).unwrap()])
     };
-    let mended = quick().run(spoilt()).unwrap();
-    assert_eq!(mended.data.accounts[0].faults.len(), 1);
+    let repaired = quick().run(spoilt()).unwrap();
+    assert_eq!(repaired.data.accounts[0].faults.len(), 1);
     let kept = Identification {
         faults: FaultHandling::Keep,
         ..quick()
     };
     let kept = kept.run(spoilt()).unwrap();
     assert!(kept.data.accounts[0].faults.is_empty());
-    assert!(kept.fit.loss > 3.0 * mended.fit.loss);
+    assert!(kept.fit.loss > 3.0 * repaired.fit.loss);
 }
 
 #[test]
@@ -270,8 +270,8 @@ fn another_run_of_the_person_judges_the_operator() {
 #[test]
 fn orders_of_polynomials_are_those_that_were_given_and_the_operators() {
     let ts = SampleTime::HUNDREDTH;
-    let usual = Polynomials::new(Structure::BoxJenkins).ranges(ts).unwrap();
-    assert_eq!((usual.nk, usual.nd, usual.nb), (6..=61, 1..=4, 2..=2));
+    let default = Polynomials::new(Structure::BoxJenkins).ranges(ts).unwrap();
+    assert_eq!((default.nk, default.nd, default.nb), (6..=61, 1..=4, 2..=2));
     let some = Polynomials {
         orders: [("nd".to_owned(), 2..=2)].into(),
         delay_s: Some((0.28, 0.28)),

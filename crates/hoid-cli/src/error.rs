@@ -12,7 +12,7 @@ use hoid::thesis::ThesisError;
 use thiserror::Error;
 
 use crate::{
-    args::{flag, in_words},
+    args::{as_text, flag},
     interrupt,
 };
 
@@ -84,7 +84,7 @@ impl From<AnalysisError> for CliError {
             AnalysisError::Option { name, reason } => Self::Usage(format!("{}: {reason}", typed(name))),
             AnalysisError::Misplaced { name, of, instead } => {
                 let instead = instead.replace("delay", "--delay");
-                Self::Usage(format!("{} belongs to {}{instead}", typed(name), in_words(&of)))
+                Self::Usage(format!("{} belongs to {}{instead}", typed(name), as_text(&of)))
             }
         }
     }

@@ -9,9 +9,9 @@ use std::sync::{
     atomic::{AtomicI32, Ordering},
 };
 
-type Answer = Box<dyn FnMut(i32) + Send>;
+type Handler = Box<dyn FnMut(i32) + Send>;
 
-static ANSWER: Mutex<Option<Answer>> = Mutex::new(None);
+static HANDLER: Mutex<Option<Handler>> = Mutex::new(None);
 /// The last signal, for the exit code of what was stopped by it.
 static LAST: AtomicI32 = AtomicI32::new(SIGINT);
 const SIGINT: i32 = 2;
@@ -45,8 +45,8 @@ pub fn exit_code() -> i32 {
     128 + LAST.load(Ordering::Relaxed)
 }
 
-fn answer() -> MutexGuard<'static, Option<Answer>> {
-    ANSWER.lock().unwrap_or_else(PoisonError::into_inner)
+fn answer() -> MutexGuard<'static, Option<Handler>> {
+    HANDLER.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 #[cfg(unix)]

@@ -30,7 +30,7 @@ pub fn request(args: &RecursionArgs) -> Result<TrackRequest, CliError> {
         orders: orders::named_orders(args.orders.as_deref(), delay.as_ref())?,
         delay,
         start: match args.start.as_deref().map(str::trim) {
-            None => RequestedStart::Usual,
+            None => RequestedStart::Default,
             Some("nothing") => RequestedStart::Nothing,
             Some(text) => RequestedStart::Coefficients(orders::start(text)?),
         },

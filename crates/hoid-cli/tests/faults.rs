@@ -200,8 +200,8 @@ fn wrong_units_wrong_columns_and_a_wrong_sign() {
         (kinds(&found), found["verdict"]["level"].as_str()),
         (vec!["sign"], Some("doubtful"))
     );
-    let mended = identified(d, &[&BOX_JENKINS[..], &["--output=-u"]].concat());
-    assert_eq!(mended["verdict"]["level"], "trustworthy", "{}", mended["verdict"]);
+    let repaired = identified(d, &[&BOX_JENKINS[..], &["--output=-u"]].concat());
+    assert_eq!(repaired["verdict"]["level"], "trustworthy", "{}", repaired["verdict"]);
 }
 
 #[test]

@@ -24,8 +24,8 @@ fn a_unit_is_written_whole_and_the_same_again() {
     let folder = TempDir::new().unwrap();
     library(&folder);
     let with = |more: &[&str]| {
-        let usual = ["fmu", "--library", "libhoid.so", "--out", "a.fmu"];
-        let said = good(folder.path(), &[&usual[..], more].concat());
+        let default = ["fmu", "--library", "libhoid.so", "--out", "a.fmu"];
+        let said = good(folder.path(), &[&default[..], more].concat());
         (said, fs::read(folder.path().join("a.fmu")).unwrap())
     };
     let (said, bytes) = with(&[]);

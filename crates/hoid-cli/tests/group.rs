@@ -302,7 +302,7 @@ fn a_manifest_is_made_from_names_and_mistakes_are_named() {
 fn people_are_simulated_and_their_options_are_theirs() {
     let directory = TempDir::new().unwrap();
     let at = directory.path();
-    let usual = [
+    let default = [
         "simulate-group",
         "--people",
         "--subjects",
@@ -322,7 +322,7 @@ fn people_are_simulated_and_their_options_are_theirs() {
         "--sample-time",
         "0.01",
     ];
-    let said = good(at, &[&usual[..], &more].concat());
+    let said = good(at, &[&default[..], &more].concat());
     assert!(said.contains("1 runs") && said.contains("truth.csv"), "{said}");
     let run = fs::read_to_string(at.join("people/S1_integrator_1.csv")).unwrap();
     assert!(run.starts_with("t,e,u,d,y\n") && run.lines().count() == 4001);

@@ -390,9 +390,9 @@ fn a_person_is_followed_from_an_earlier_fit_of_them() {
     assert_eq!(setting(&found, "prior"), "fit.json");
     let known = trace(d);
     json(d, &["track", "c.csv", "--out", "trace.csv", "--json", "--at", "2.5"]);
-    let usual = trace(d);
+    let default = trace(d);
     // There from the first sample on, and for the first seconds known better than without.
-    let (of_known, of_usual) = (column(&known, "gain_db@2.5_se"), column(&usual, "gain_db@2.5_se"));
+    let (of_known, of_usual) = (column(&known, "gain_db@2.5_se"), column(&default, "gain_db@2.5_se"));
     assert!(of_known[0].is_finite() && of_usual[0].is_nan());
     assert!(
         (150..800).all(|k| of_known[k] < of_usual[k]),

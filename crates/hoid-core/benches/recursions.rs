@@ -9,8 +9,9 @@ use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use hoid_core::{
     adaptation::Forgetting,
     adaptive::{
-        AdaptiveFilter, memory_needed,
-        defaults::{REPLAYED_S, DefaultOperator},
+        AdaptiveFilter,
+        defaults::{DefaultOperator, REPLAYED_S},
+        memory_needed,
     },
     covariance::Covariance,
     error_bars::{ErrorBars, NoErrorBars},

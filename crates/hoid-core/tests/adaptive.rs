@@ -5,12 +5,12 @@ use hoid_core::{
     adaptive::{
         AdaptiveFilter, AdaptivePrior, GAINS, LARGEST_ORDER, STATES,
         basis::{Basis, Point},
+        defaults::{DefaultOperator, REPLAYED_S},
         detector::Detection,
         initial_estimate::InitialEstimate,
         least_memory, memory_needed,
         mixture::ChangePrior,
         noise::Lags,
-        defaults::{REPLAYED_S, DefaultOperator},
     },
     state::State,
 };
@@ -25,7 +25,7 @@ fn prior(threshold: f64) -> AdaptivePrior {
             least: 16,
             most: 80,
             threshold,
-            held: [3.3, 0.125, 0.05],
+            dynamics: [3.3, 0.125, 0.05],
             refractory: 16,
         },
         ..DefaultOperator::with_delay(0.2).prior(TS)
@@ -233,7 +233,13 @@ fn one_who_is_far_from_what_is_usual_is_found() {
     // A delay 100 ms later than what is supposed, and a system of 16 rad/s that acts 60 ms earlier: from
     // the usual person the corrections end elsewhere.
     for (point, seed) in [
-        (Point { tau: 0.3, ..default_operator() }, 400),
+        (
+            Point {
+                tau: 0.3,
+                ..default_operator()
+            },
+            400,
+        ),
         (
             Point {
                 tau: 0.14,
@@ -257,7 +263,10 @@ fn one_who_is_far_from_what_is_usual_is_found() {
 
 #[test]
 fn a_change_of_the_delay_is_found_and_told_from_one_of_the_gains() {
-    let later = Point { tau: 0.21, ..default_operator() };
+    let later = Point {
+        tau: 0.21,
+        ..default_operator()
+    };
     let mut found = 0;
     for seed in 600..604 {
         let (mut person, mut filter) = (Person::new(seed), filter(12.5));
@@ -362,7 +371,10 @@ fn a_copy_goes_on_with_the_same_digits() {
     for k in 0..1000 {
         let [e, u] = person.sample(GAINS_OF_A_PERSON, 0.05);
         assert_eq!(first.step(e, u), second.step(e, u), "{k}");
-        assert_eq!(first.detector().log_significance(), second.detector().log_significance());
+        assert_eq!(
+            first.detector().log_significance(),
+            second.detector().log_significance()
+        );
     }
     assert_eq!(estimate(&first, 2.0), estimate(&second, 2.0));
 }
@@ -431,7 +443,10 @@ fn what_makes_no_sense_is_refused() {
     };
     for wrong in [
         AdaptivePrior {
-            person: Point { tau: 1.0, ..default_operator() },
+            person: Point {
+                tau: 1.0,
+                ..default_operator()
+            },
             ..sound
         },
         AdaptivePrior { order: 1, ..sound },
@@ -521,7 +536,10 @@ fn what_is_known_stands_at_the_beginning() {
             assert!((spread[i][j] - covariance[i][j]).abs() < 1e-12);
         }
     }
-    let (value, truth) = (told.response(2.0), response(&basis(default_operator()), GAINS_OF_A_PERSON, 2.0));
+    let (value, truth) = (
+        told.response(2.0),
+        response(&basis(default_operator()), GAINS_OF_A_PERSON, 2.0),
+    );
     assert!((value[0] - truth[0]).hypot(value[1] - truth[1]) < 1e-9);
     // Beside one who begins with nothing, over ten seconds.
     let (mut person, mut other) = (Person::new(3), filter(1e9));

@@ -7,7 +7,7 @@ use core::{ffi::CStr, fmt::Arguments};
 
 use hoid_core::adaptive::{
     AdaptiveFilter, PARAMETERS,
-    defaults::{GIVEN_DELAY_S, SPREAD, DefaultOperator},
+    defaults::{DefaultOperator, GIVEN_DELAY_S, SPREAD},
 };
 
 /// The file of the samples.

@@ -12,7 +12,8 @@ use std::{
 use crate::{
     session::Session,
     status::{
-        Failure, HOID_BAD_POINTER, HOID_BAD_TEXT, HOID_BROKEN, HOID_PANIC, HOID_TOO_SMALL, HoidStatus, guarded, said,
+        Failure, HOID_BAD_POINTER, HOID_BAD_TEXT, HOID_BROKEN, HOID_PANIC, HOID_TOO_SMALL, HoidStatus, guarded,
+        panic_message,
     },
 };
 
@@ -167,7 +168,7 @@ pub(crate) unsafe fn move_tracker(
         let moved = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| call(session)));
         moved.unwrap_or_else(|panic| {
             tracker.is_broken = true;
-            Err(Failure::new(HOID_PANIC, said(&*panic)))
+            Err(Failure::new(HOID_PANIC, panic_message(&*panic)))
         })
     })
 }

@@ -20,13 +20,13 @@ use serde_json::{Map, Value};
 use crate::status::Failure;
 
 /// Length of the warm-up of methods that have one, s.
-const USUAL_WARM_UP_S: f64 = 20.0;
+const DEFAULT_WARM_UP_S: f64 = 20.0;
 /// Longest warm-up, samples.
 const LONGEST_WARM_UP: f64 = 1e7;
 
 /// What was asked for, as it is saved.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Asked {
+pub(crate) struct TrackerRequest {
     /// Name of the method; none for the usual one.
     pub method: Option<String>,
     pub sample_time_s: f64,
@@ -37,15 +37,15 @@ pub(crate) struct Asked {
 }
 
 /// What it means.
-pub(crate) struct Understood {
+pub(crate) struct ResolvedTracker {
     pub plan: TrackPlan,
     pub sample_time: SampleTime,
     /// Samples of the warm-up.
     pub warm_up: usize,
 }
 
-impl Asked {
-    pub fn understood(&self) -> Result<Understood, Failure> {
+impl TrackerRequest {
+    pub fn resolve(&self) -> Result<ResolvedTracker, Failure> {
         let sample_time = SampleTime::new(self.sample_time_s)?;
         let mut options = object(self.options.as_deref().unwrap_or("{}"))?;
         let mut method = match &self.method {
@@ -58,7 +58,7 @@ impl Asked {
         let at_rad_s = taken(&mut options, "at", numbers)?;
         let controlled_element = taken(&mut options, "controlled_element", element)?;
         let start = taken(&mut options, "start", start)?;
-        let warm_up_s = taken(&mut options, "warm_up", number)?.unwrap_or(USUAL_WARM_UP_S);
+        let warm_up_s = taken(&mut options, "warm_up", number)?.unwrap_or(DEFAULT_WARM_UP_S);
         let mut orders = NamedOrders::new();
         for name in ["na", "nb", "nc", "nd", "nf", "nk"] {
             if let Some(range) = taken(&mut options, name, |value| range(value, name))? {
@@ -88,7 +88,7 @@ impl Asked {
                 "warm_up is {warm_up_s} s, expected a time of one sample to 10 million"
             )));
         }
-        Ok(Understood {
+        Ok(ResolvedTracker {
             plan: asked.plan(sample_time)?,
             sample_time,
             warm_up: warm_up as usize,
@@ -246,19 +246,19 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
 
-    fn understood(method: &str, options: &str) -> Result<Understood, Failure> {
-        let asked = Asked {
+    fn resolved(method: &str, options: &str) -> Result<ResolvedTracker, Failure> {
+        let asked = TrackerRequest {
             method: Some(method.to_owned()),
             sample_time_s: 0.01,
             options: Some(options.to_owned()),
             fit: None,
         };
-        asked.understood()
+        asked.resolve()
     }
 
     #[test]
     fn options_are_those_of_python() {
-        let found = understood(
+        let found = resolved(
             "rpem",
             r#"{"structure": "bj", "nk": 29, "nd": [1, 2], "memory": 256, "memory_of": {"b": "inf"}, "largest": 50,
                 "at": [1, 2.5], "controlled_element": "90/(s(s+6))", "warm_up": 10, "forgetting": "exponential",
@@ -271,9 +271,9 @@ mod tests {
         let memory = options.method.settings().get("memory_of").unwrap();
         assert_eq!(memory, "b=inf");
         assert!(!found.plan.is_settled());
-        let pair = understood("adaptive", r#"{"controlled_element": [[90], [1, 6, 0]]}"#).unwrap();
+        let pair = resolved("adaptive", r#"{"controlled_element": [[90], [1, 6, 0]]}"#).unwrap();
         assert_eq!(pair.plan.options().controlled_element, options.controlled_element);
-        let none = understood("adaptive", " ").unwrap();
+        let none = resolved("adaptive", " ").unwrap();
         assert_eq!(none.plan.options().method, Method::adaptive());
     }
 
@@ -300,17 +300,17 @@ mod tests {
                 "no form of an operator",
             ),
         ] {
-            let failure = understood(method, options).err().unwrap();
+            let failure = resolved(method, options).err().unwrap();
             assert!(failure.text.contains(reason), "{options}: {}", failure.text);
         }
-        let mut asked = Asked {
+        let mut asked = TrackerRequest {
             method: None,
             sample_time_s: f64::NAN,
             options: None,
             fit: None,
         };
-        assert!(asked.understood().is_err());
+        assert!(asked.resolve().is_err());
         asked.sample_time_s = 0.01;
-        assert!(asked.understood().is_ok());
+        assert!(asked.resolve().is_ok());
     }
 }

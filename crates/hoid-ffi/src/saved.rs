@@ -8,7 +8,7 @@ use hoid_track::Live;
 use serde_json::{Value, json};
 
 use crate::{
-    options::Asked,
+    options::TrackerRequest,
     packed::{Closed, as_bytes, as_numbers, opened, packed},
     session::Session,
     status::{Failure, HOID_BAD_STATE},
@@ -46,13 +46,13 @@ impl Session {
             listed => Some(orders(listed).ok_or_else(damaged)?),
         };
         let text = |name: &str| description[name].as_str().map(str::to_owned);
-        let asked = Asked {
+        let asked = TrackerRequest {
             method: text("method"),
             sample_time_s: description["sample_time"].as_f64().ok_or_else(damaged)?,
             options: text("options"),
             fit: text("fit"),
         };
-        let live = |understood: &crate::options::Understood| {
+        let live = |understood: &crate::options::ResolvedTracker| {
             Live::restored(&understood.plan, orders, &numbers, understood.sample_time)
         };
         Self::of(asked, live).map_err(|failure| Failure::new(HOID_BAD_STATE, failure.text))

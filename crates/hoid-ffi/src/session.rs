@@ -8,7 +8,7 @@ use hoid_model::{VerdictLevel, uncertainty::Estimate};
 use hoid_track::{Change, Counts, Live, Outcome, Sample, TrackPlan, Tracker};
 
 use crate::{
-    options::{Asked, Understood},
+    options::{ResolvedTracker, TrackerRequest},
     status::Failure,
     types::{HOID_SHIFTS, HoidChange, HoidCounts, HoidEstimate, HoidOutcome, HoidShift},
 };
@@ -27,7 +27,7 @@ const SHIFTED: [&CStr; HOID_SHIFTS] = [c"K_e", c"K_e_dot", c"omega_nm", c"zeta_n
 
 /// A tracker and what is known of it.
 pub(crate) struct Session {
-    asked: Asked,
+    asked: TrackerRequest,
     plan: TrackPlan,
     sample_time: hoid_model::SampleTime,
     live: Live,
@@ -43,7 +43,7 @@ impl Session {
         options: Option<&str>,
         fit: Option<&str>,
     ) -> Result<Self, Failure> {
-        let asked = Asked {
+        let asked = TrackerRequest {
             method: method.map(str::to_owned),
             sample_time_s,
             options: options.map(str::to_owned),
@@ -55,8 +55,11 @@ impl Session {
     }
 
     /// With the recursion that `live` makes.
-    pub fn of(asked: Asked, live: impl FnOnce(&Understood) -> Result<Live, IdentError>) -> Result<Self, Failure> {
-        let understood = asked.understood()?;
+    pub fn of(
+        asked: TrackerRequest,
+        live: impl FnOnce(&ResolvedTracker) -> Result<Live, IdentError>,
+    ) -> Result<Self, Failure> {
+        let understood = asked.resolve()?;
         let mut session = Self {
             live: live(&understood)?,
             asked,
@@ -69,7 +72,7 @@ impl Session {
     }
 
     /// What it was made of, and its recursion to be saved.
-    pub fn parts(&mut self) -> (&Asked, &mut Live) {
+    pub fn parts(&mut self) -> (&TrackerRequest, &mut Live) {
         (&self.asked, &mut self.live)
     }
 

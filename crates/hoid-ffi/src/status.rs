@@ -86,14 +86,14 @@ pub(crate) fn guarded(call: impl FnOnce() -> Result<(), Failure>) -> HoidStatus 
     let failure = match catch_unwind(AssertUnwindSafe(call)) {
         Ok(Ok(())) => return HOID_OK,
         Ok(Err(failure)) => failure,
-        Err(panic) => Failure::new(HOID_PANIC, said(&*panic)),
+        Err(panic) => Failure::new(HOID_PANIC, panic_message(&*panic)),
     };
     remember(&failure.text);
     failure.status
 }
 
 /// What a panic says.
-pub(crate) fn said(panic: &(dyn Any + Send)) -> String {
+pub(crate) fn panic_message(panic: &(dyn Any + Send)) -> String {
     let words = (panic.downcast_ref::<&str>().copied())
         .or_else(|| panic.downcast_ref::<String>().map(String::as_str))
         .unwrap_or("a fault without words");

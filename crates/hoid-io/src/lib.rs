@@ -55,7 +55,7 @@ mod table;
 mod time;
 mod wording;
 
-pub use data_quality::{Place, QualityIssue, QualityIssueKind, quality_of_record};
+pub use data_quality::{QualityIssue, QualityIssueKind, RowSpan, quality_of_record};
 pub use error::IoError;
 pub use formats::{readable_endings, writable_endings};
 pub use input_file::{file_names, read_bytes, read_settings, read_text};

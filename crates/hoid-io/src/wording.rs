@@ -90,12 +90,12 @@ pub(crate) fn did_you_mean(unknown: &[&str], names: &[&str]) -> String {
 /// The column that is what was asked for by another name: the error for `e` or `error`, the control
 /// for `u` or `stick`.
 fn by_what_it_is(asked: &str, names: &[&str]) -> Option<String> {
-    let usual = match (error_among(&[asked]), control_among(&[asked])) {
+    let default = match (error_among(&[asked]), control_among(&[asked])) {
         (Some(_), _) => error_among(names),
         (_, Some(_)) => control_among(names),
         _ => None,
     };
-    usual.map(str::to_owned)
+    default.map(str::to_owned)
 }
 
 /// Names for a message: all of them, unless there are very many.

@@ -133,7 +133,7 @@ fn tracked(engine: &mut page::Engine, person: &Person, seed: u64, remnant: f64) 
 }
 
 fn main() -> ExitCode {
-    let number = |k: usize, usual: u32| std::env::args().nth(k).map_or(usual, |text| text.parse().unwrap());
+    let number = |k: usize, default: u32| std::env::args().nth(k).map_or(default, |text| text.parse().unwrap());
     let (runs, seeds) = (number(1, 10_000), number(2, 100));
     let Some(mut engine) = page::Engine::start() else {
         println!("skipped: there is no node");

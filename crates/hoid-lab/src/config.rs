@@ -171,10 +171,10 @@ pub struct Signal {
 impl Default for Signal {
     /// 20 s, up to the 31st multiple, 1.5.
     fn default() -> Self {
-        let usual = MultiSine::default();
+        let default = MultiSine::default();
         Self {
-            period_s: usual.period_s,
-            largest: usual.largest,
+            period_s: default.period_s,
+            largest: default.largest,
             rms: 1.5,
         }
     }
@@ -212,7 +212,7 @@ impl Default for Condition {
 
 /// The recursive method of the live estimate: it needs no start fit, so that there is something to see
 /// from the first seconds on.
-const USUAL_METHOD: &str = "adaptive";
+const DEFAULT_METHOD: &str = "adaptive";
 
 /// What a person confirms where the file says nothing else.
 const CONSENT: &str = "You will follow a moving target by hand for a few short runs. The program stores where your \
@@ -228,7 +228,7 @@ impl Default for Config {
             consent: CONSENT.to_owned(),
             order: Order::default(),
             live: LiveFor::default(),
-            method: USUAL_METHOD.to_owned(),
+            method: DEFAULT_METHOD.to_owned(),
             limits: Limits::default(),
             condition: vec![Condition {
                 target: Some(Signal::default()),

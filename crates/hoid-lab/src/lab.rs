@@ -33,7 +33,7 @@ use crate::{
     live::Samples,
     replay,
     reports::{self, Pages},
-    session::{Begun, How, RunLog, Session, Stem},
+    session::{How, RunLog, RunStart, Session, Stem},
     task::Task,
     wire::{FromPage, Role, ToPage},
 };
@@ -104,7 +104,7 @@ struct Ready {
 }
 
 struct Running {
-    begun: Begun,
+    begun: RunStart,
     stem: Stem,
     task: Task,
     log: RunLog,

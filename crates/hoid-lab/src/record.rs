@@ -6,7 +6,7 @@ use hoid_model::{Channel, Record, SampleTime};
 
 use crate::{
     LabError,
-    session::{Begun, Logged},
+    session::{Logged, RunStart},
     task::{TICK_S, TICKS_PER_SAMPLE, Task},
 };
 
@@ -14,7 +14,7 @@ use crate::{
 ///
 /// # Errors
 /// [`LabError::Model`] for a run without a sample.
-pub fn record(begun: &Begun, task: &Task, logged: &Logged) -> Result<Record, LabError> {
+pub fn record(begun: &RunStart, task: &Task, logged: &Logged) -> Result<Record, LabError> {
     // A log that is longer than its run holds ticks that never were.
     let n = logged.signals.e.len().min(logged.signals.u.len()).min(task.ticks);
     let every = |values: &[f64]| {

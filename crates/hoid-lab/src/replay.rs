@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 use crate::{
     LabError,
     record::record,
-    session::{Begun, Logged, Stem},
+    session::{Logged, RunStart, Stem},
     verify::check,
 };
 
@@ -15,7 +15,7 @@ use crate::{
 /// # Errors
 /// Those of files.
 pub fn data(stem: &Stem) -> Result<Vec<u8>, LabError> {
-    let begun = Begun::read(stem)?;
+    let begun = RunStart::read(stem)?;
     let task = begun.task(stem)?;
     let logged = Logged::read(stem)?;
     let checked = check(stem)?;

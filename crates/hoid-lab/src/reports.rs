@@ -72,7 +72,7 @@ fn one(program: &Path, config: &Config, stem: &Stem, name: &str) {
     let place = stem.reports().join(name);
     let mut command = hoid(program);
     command.arg(name).arg(stem.file("beh.parquet")).args(["--from", "0"]);
-    let begun = crate::session::Begun::read(stem).ok();
+    let begun = crate::session::RunStart::read(stem).ok();
     let course = begun.as_ref().and_then(|begun| begun.condition.course().ok());
     // Margins belong to one element.
     let element = course

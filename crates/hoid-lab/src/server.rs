@@ -57,9 +57,9 @@ pub struct Server {
 }
 
 /// A connection that has shown the token, counted for as long as it is answered.
-struct Known(Arc<Server>);
+struct AuthorisedConnection(Arc<Server>);
 
-impl Known {
+impl AuthorisedConnection {
     /// One more, while there is room.
     fn enter(server: &Arc<Server>) -> Option<Self> {
         let before = server.known.fetch_add(1, Ordering::Relaxed);
@@ -68,7 +68,7 @@ impl Known {
     }
 }
 
-impl Drop for Known {
+impl Drop for AuthorisedConnection {
     fn drop(&mut self) {
         self.0.known.fetch_sub(1, Ordering::Relaxed);
     }
@@ -131,7 +131,7 @@ impl Server {
             if let Err(reply) = server.admits(&request) {
                 return Err((reply, stream));
             }
-            let Some(known) = Known::enter(&server) else {
+            let Some(known) = AuthorisedConnection::enter(&server) else {
                 return Err((busy("too many connections"), stream));
             };
             // A thread that is not made takes its connection along: one to say so on.

@@ -25,7 +25,7 @@ use serde::Serialize;
 
 use crate::{
     LabError,
-    session::{Begun, Ended, How, Logged, Stem},
+    session::{Ended, How, Logged, RunStart, Stem},
     task::{Task, held_inputs},
 };
 
@@ -91,7 +91,7 @@ impl Checked {
 /// [`LabError`] where nothing is known of the run (`run.json`) or the system refuses a file; what is wrong
 /// in the others is a finding.
 pub fn check(stem: &Stem) -> Result<Checked, LabError> {
-    let begun = Begun::read(stem)?;
+    let begun = RunStart::read(stem)?;
     let logged = Logged::read(stem)?;
     let ended = Ended::read(stem).unwrap_or_default();
     let mut findings: Vec<Finding> = (logged.faults.iter())
@@ -129,7 +129,7 @@ pub fn check(stem: &Stem) -> Result<Checked, LabError> {
     })
 }
 
-fn end_of(begun: &Begun, ended: Option<&Ended>, logged: &Logged) -> Option<Finding> {
+fn end_of(begun: &RunStart, ended: Option<&Ended>, logged: &Logged) -> Option<Finding> {
     let finished = ended.is_some_and(|ended| ended.how == How::Finished);
     let ticks = logged.numbers.len();
     (!finished || ticks != begun.ticks).then(|| {
@@ -138,7 +138,7 @@ fn end_of(begun: &Begun, ended: Option<&Ended>, logged: &Logged) -> Option<Findi
     })
 }
 
-fn task_of(begun: &Begun, task: &Task) -> Option<Finding> {
+fn task_of(begun: &RunStart, task: &Task) -> Option<Finding> {
     let wrong = |what: &str| {
         Some(Finding::doubt(
             "lab-task",
@@ -171,7 +171,7 @@ fn ticks_of(logged: &Logged) -> Option<Finding> {
     wrong.map(|(k, tick)| Finding::doubt("lab-ticks", format!("tick {tick} stands in the place of tick {k}")))
 }
 
-fn events_of(begun: &Begun, logged: &Logged) -> Option<Finding> {
+fn events_of(begun: &RunStart, logged: &Logged) -> Option<Finding> {
     let mut last = 0.0;
     for (k, event) in logged.events.iter().enumerate() {
         let whole = event.tick >= 0.0 && event.tick.fract() == 0.0 && event.raw.is_finite();
@@ -195,7 +195,7 @@ fn events_of(begun: &Begun, logged: &Logged) -> Option<Finding> {
     None
 }
 
-fn inputs_of(begun: &Begun, logged: &Logged) -> Option<Finding> {
+fn inputs_of(begun: &RunStart, logged: &Logged) -> Option<Finding> {
     let events: Vec<(usize, f64)> = (logged.events.iter())
         .map(|event| (event.tick as usize, begun.input.u(event.raw)))
         .collect();
@@ -223,7 +223,7 @@ fn differing(made: &[f64], logged: &[f64]) -> Option<(usize, usize)> {
     Some((first, 1 + places.count()))
 }
 
-fn frames_of(begun: &Begun, logged: &Logged) -> Option<Finding> {
+fn frames_of(begun: &RunStart, logged: &Logged) -> Option<Finding> {
     let limit = begun.limits.frame_ms;
     let wrong = |k: usize, words: String| Some(Finding::doubt("lab-frame", format!("frame {} {words}", k + 1)));
     let mut last = 0.0;
@@ -283,7 +283,7 @@ fn files_of(stem: &Stem, ended: &Ended) -> Result<Option<Finding>, LabError> {
 }
 
 /// Runs that no hand made are said to be such; they can be as exact as others.
-fn hands_of(begun: &Begun, ended: &Ended) -> Vec<Finding> {
+fn hands_of(begun: &RunStart, ended: &Ended) -> Vec<Finding> {
     let made = ended.counted.get("synthetic_events").copied().unwrap_or(0.0);
     let mut notes = Vec::new();
     if made > 0.0 {
@@ -296,21 +296,21 @@ fn hands_of(begun: &Begun, ended: &Ended) -> Vec<Finding> {
     notes
 }
 
-fn measures(begun: &Begun, task: &Task, logged: &Logged) -> Measures {
+fn measures(begun: &RunStart, task: &Task, logged: &Logged) -> Measures {
     let intervals: Vec<f64> = logged
         .frames
         .windows(2)
         .map(|pair| pair[1].frame_ms - pair[0].frame_ms)
         .collect();
     let frame_ms = median(&intervals);
-    let usual = if begun.refresh_ms > 0.0 {
+    let typical = if begun.refresh_ms > 0.0 {
         begun.refresh_ms
     } else {
         frame_ms
     };
     let missed = |interval: &f64| {
-        if *interval > MISSED * usual {
-            ((interval / usual).round() as usize).saturating_sub(1)
+        if *interval > MISSED * typical {
+            ((interval / typical).round() as usize).saturating_sub(1)
         } else {
             0
         }

@@ -85,14 +85,14 @@ fn batches(task: &Task) -> Vec<Batch> {
 
 /// What was told before the disk was full.
 #[derive(Default)]
-struct Told {
+struct LoggedBefore {
     /// Ticks that were logged, of each run.
     ticks: Vec<(Stem, usize)>,
     verified: Vec<Stem>,
 }
 
 /// A session whose disk is full from a batch on, for so many batches.
-fn session(out: &Path, full: usize, until: usize, told: &mut Told) -> Option<Session> {
+fn session(out: &Path, full: usize, until: usize, told: &mut LoggedBefore) -> Option<Session> {
     let ballast = out.join("ballast");
     let mut session = Session::begin(out, &config(), "P01", false).ok()?;
     let mut instant = 0_usize;
@@ -153,7 +153,7 @@ fn a_disk_that_fills_loses_nothing_that_was_told() {
             eprintln!("skipped: no disk of its own can be mounted here");
             return;
         };
-        let mut told = Told::default();
+        let mut told = LoggedBefore::default();
         let session = session(at.path(), full, until, &mut told);
         let elsewhere = tempfile::tempdir().unwrap();
         let _ = fs::remove_file(at.path().join("ballast"));

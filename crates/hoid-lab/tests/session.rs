@@ -10,7 +10,7 @@ use std::{collections::BTreeMap, fs, path::Path};
 use hoid_lab::{
     config::{Condition, Config, Signal},
     plant::InputMap,
-    session::{Batch, Begun, Event, Frame, How, RunLog, Session, Stem},
+    session::{Batch, Event, Frame, How, RunLog, RunStart, Session, Stem},
     task::{Task, held_inputs},
     verify::{Checked, check},
 };
@@ -40,7 +40,7 @@ const MAP: InputMap = InputMap {
     gain: 3.0,
 };
 
-fn begun(session: &Session, number: usize) -> (Begun, Task) {
+fn begun(session: &Session, number: usize) -> (RunStart, Task) {
     run::begun(session, number, MAP).unwrap()
 }
 
@@ -106,7 +106,7 @@ fn a_run_is_verified_and_its_record_is_read_by_hoid() {
     assert_eq!(session.next(), Some(1));
     assert_eq!(checked.measures.ticks, 4000);
     assert!((checked.measures.input_hz - 125.0).abs() < 1.0);
-    let begun = Begun::read(&stem).unwrap();
+    let begun = RunStart::read(&stem).unwrap();
     let logged = hoid_lab::session::Logged::read(&stem).unwrap();
     let record = hoid_lab::record::record(&begun, &begun.task(&stem).unwrap(), &logged).unwrap();
     let path = stem.file("beh.parquet");
@@ -164,12 +164,12 @@ fn what_is_changed_makes_a_run_unverified_for_its_own_reason() {
 #[test]
 fn another_target_or_element_is_found() {
     for change in [
-        |begun: &mut Begun| begun.replication += 1,
-        |begun: &mut Begun| begun.phases[0].plant.b[0] *= 1.001,
+        |begun: &mut RunStart| begun.replication += 1,
+        |begun: &mut RunStart| begun.phases[0].plant.b[0] *= 1.001,
     ] {
         let dir = tempfile::tempdir().unwrap();
         let (_, stem, _) = finished(dir.path());
-        let mut begun = Begun::read(&stem).unwrap();
+        let mut begun = RunStart::read(&stem).unwrap();
         let task = begun.task(&stem).unwrap();
         change(&mut begun);
         begun.write(&stem, &task).unwrap();

@@ -213,7 +213,7 @@ pub fn fault_findings(faults: &[Fault], samples: usize) -> Vec<Finding> {
             });
         }
     }
-    let mended: usize = faults
+    let repaired: usize = faults
         .iter()
         .filter(|fault| fault.action != FaultAction::Reported && fault.kind != FaultKind::Wrap)
         .map(|fault| fault.samples)
@@ -223,7 +223,7 @@ pub fn fault_findings(faults: &[Fault], samples: usize) -> Vec<Finding> {
         .filter(|fault| fault.action == FaultAction::Cut && fault.kind == FaultKind::Idle)
         .map(|fault| fault.samples)
         .sum();
-    let share = (mended - idle) as f64 / samples.saturating_sub(idle).max(1) as f64;
+    let share = (repaired - idle) as f64 / samples.saturating_sub(idle).max(1) as f64;
     if share > MOST_MENDED {
         all.push(Finding::doubt(
             "faults",
@@ -278,9 +278,9 @@ mod tests {
         let many = vec![spike(FaultAction::Bridged); 300];
         let found = fault_findings(&many, 1000);
         assert!(
-            found[0].words.ends_with("and 297 more of this kind"),
+            found[0].message.ends_with("and 297 more of this kind"),
             "{}",
-            found[0].words
+            found[0].message
         );
         assert_eq!(found[1].severity, Severity::Doubt);
         let idle = Fault {

@@ -41,30 +41,31 @@ pub struct Finding {
     /// How much it weighs.
     pub severity: Severity,
     /// The observation in a sentence, with its numbers, without a full stop.
-    pub words: String,
+    #[serde(rename = "words")]
+    pub message: String,
 }
 
 impl Finding {
     /// A finding that the result stands in spite of.
-    pub fn note(kind: &'static str, words: impl Into<String>) -> Self {
-        Self::new(kind, Severity::Note, words)
+    pub fn note(kind: &'static str, message: impl Into<String>) -> Self {
+        Self::new(kind, Severity::Note, message)
     }
 
     /// A finding that makes the result doubtful.
-    pub fn doubt(kind: &'static str, words: impl Into<String>) -> Self {
-        Self::new(kind, Severity::Doubt, words)
+    pub fn doubt(kind: &'static str, message: impl Into<String>) -> Self {
+        Self::new(kind, Severity::Doubt, message)
     }
 
     /// A finding that leaves the question open.
-    pub fn undetermined(kind: &'static str, words: impl Into<String>) -> Self {
-        Self::new(kind, Severity::Undetermined, words)
+    pub fn undetermined(kind: &'static str, message: impl Into<String>) -> Self {
+        Self::new(kind, Severity::Undetermined, message)
     }
 
-    fn new(kind: &'static str, severity: Severity, words: impl Into<String>) -> Self {
+    fn new(kind: &'static str, severity: Severity, message: impl Into<String>) -> Self {
         Self {
             kind,
             severity,
-            words: words.into(),
+            message: message.into(),
         }
     }
 }
@@ -107,12 +108,12 @@ impl Verdict {
     }
 
     /// The verdict of these findings and more.
-    pub fn and(self, more: impl IntoIterator<Item = Finding>) -> Self {
+    pub fn append(self, more: impl IntoIterator<Item = Finding>) -> Self {
         Self::of(self.findings.into_iter().chain(more).collect())
     }
 
     /// The verdict of these findings behind others, from which they may follow.
-    pub fn behind(self, first: impl IntoIterator<Item = Finding>) -> Self {
+    pub fn prepend(self, first: impl IntoIterator<Item = Finding>) -> Self {
         Self::of(first.into_iter().chain(self.findings).collect())
     }
 
@@ -127,13 +128,16 @@ impl Verdict {
         self.findings
             .iter()
             .filter(weighs)
-            .map(|finding| finding.words.as_str())
+            .map(|finding| finding.message.as_str())
     }
 
     /// What is worth knowing besides.
     pub fn notes(&self) -> impl Iterator<Item = &str> {
         let light = |finding: &&Finding| finding.severity == Severity::Note;
-        self.findings.iter().filter(light).map(|finding| finding.words.as_str())
+        self.findings
+            .iter()
+            .filter(light)
+            .map(|finding| finding.message.as_str())
     }
 }
 
@@ -166,9 +170,12 @@ mod tests {
         assert_eq!(doubtful.level, VerdictLevel::Doubtful);
         assert_eq!(doubtful.reasons().collect::<Vec<_>>(), ["the search did not converge"]);
         let all = Verdict::of(vec![note.clone(), doubt.clone(), open.clone()]);
-        assert_eq!(Verdict::of(vec![note.clone()]).and([doubt.clone(), open.clone()]), all);
+        assert_eq!(
+            Verdict::of(vec![note.clone()]).append([doubt.clone(), open.clone()]),
+            all
+        );
         let second = Finding::doubt("second", "what follows from it");
-        let led = Verdict::of(vec![note, second.clone()]).behind([doubt.clone()]);
+        let led = Verdict::of(vec![note, second.clone()]).prepend([doubt.clone()]);
         assert_eq!(led.findings()[..2], [doubt, second]);
         assert_eq!(all.level, VerdictLevel::NotDetermined);
         assert_eq!(

@@ -160,7 +160,7 @@ impl DiscreteOperator {
         if self.nk == 0 {
             return Err(NotConvertible::NoDelay);
         }
-        let c = self.held.unhold(self.sample_time)?;
+        let c = self.held.inverse_zoh(self.sample_time)?;
         // K_e and omega_nm hang on 1 + f1 + f2, a difference of numbers of size 1: below this
         // nothing of it is left.
         let at_one = (1.0 + self.held.f1 + self.held.f2).abs();

@@ -15,7 +15,7 @@ use crate::{
     controlled_element::ControlledElement,
     errors::{Outcome, bad_option},
     faults::{UsedRecord, faults_of, used_records},
-    figures::{self, Pair, VerdictParts, error_or_nan, pair, verdict},
+    figures::{self, ValueWithError, VerdictParts, error_or_nan, pair, verdict},
     files, names,
 };
 
@@ -121,7 +121,7 @@ impl PyDescription {
 
     /// Share of the power of u off the lines, and with the part at the lines.
     #[getter]
-    fn remnant(&self) -> (Pair, Pair) {
+    fn remnant(&self) -> (ValueWithError, ValueWithError) {
         let function = &self.0.found.function;
         (pair(function.off_line_share), pair(function.noise_ratio))
     }

@@ -13,7 +13,7 @@ use crate::{
     controlled_element::ControlledElement,
     errors::Outcome,
     faults::{UsedRecord, faults_of, used_records},
-    figures::{self, Pair, VerdictParts, pair, response_columns, verdict},
+    figures::{self, ValueWithError, VerdictParts, pair, response_columns, verdict},
     fit::PyFit,
 };
 
@@ -65,7 +65,8 @@ fn loop_intervals<'py>(py: Python<'py>, measures: Option<LoopMeasures>) -> PyRes
 /// Every crossing, the smallest phase margin, the gain margin, and whether the closed loop is stable.
 fn shape_parts<'py>(py: Python<'py>, shape: &LoopShape) -> PyResult<Bound<'py, PyDict>> {
     let all = PyDict::new(py);
-    let crossovers: Vec<(Pair, Pair)> = shape.crossovers.iter().map(|(w, m)| (pair(*w), pair(*m))).collect();
+    let crossovers: Vec<(ValueWithError, ValueWithError)> =
+        shape.crossovers.iter().map(|(w, m)| (pair(*w), pair(*m))).collect();
     all.set_item("crossovers", crossovers)?;
     all.set_item(
         "smallest_phase_margin_deg",
@@ -210,7 +211,7 @@ impl PyOperatorFit {
         };
         let (all, mut rows) = (PyDict::new(py), Vec::new());
         for found in &agreement.rows {
-            let with_error = |(value, error): (f64, f64)| -> Pair { (value, Some(error)) };
+            let with_error = |(value, error): (f64, f64)| -> ValueWithError { (value, Some(error)) };
             let row = PyDict::new(py);
             row.set_item("coordinate", found.coordinate.name())?;
             for method in [

@@ -27,9 +27,9 @@ pub fn track_fault<'py>(py: Python<'py>, fault: &hoid_track::TrackFault) -> PyRe
 }
 
 /// Value and standard error.
-pub type Pair = (f64, Option<f64>);
+pub type ValueWithError = (f64, Option<f64>);
 
-pub fn pair(e: Estimate) -> Pair {
+pub fn pair(e: Estimate) -> ValueWithError {
     (e.value, e.standard_error)
 }
 

@@ -15,7 +15,7 @@ use crate::{
 };
 
 /// The parts of a record, what was done to the numbers of the file, and notes on reading it.
-type Read<'py> = (Bound<'py, PyDict>, Vec<String>, Vec<String>);
+type ReadParts<'py> = (Bound<'py, PyDict>, Vec<String>, Vec<String>);
 
 /// The record of a file, or the records between what is masked.
 #[pyfunction]
@@ -45,7 +45,7 @@ pub fn read<'py>(
     run_in: f64,
     mask: Vec<String>,
     shortest: f64,
-) -> Outcome<Vec<Read<'py>>> {
+) -> Outcome<Vec<ReadParts<'py>>> {
     let options = ReadOptions {
         input: match input {
             Some(column) => Some(column.parse()?),

@@ -17,7 +17,7 @@ use crate::{
     controlled_element::ControlledElement,
     errors::{DataError, Outcome},
     faults::{UsedRecord, faults_of, used_records},
-    figures::{self, Pair, VerdictParts, pair},
+    figures::{self, ValueWithError, VerdictParts, pair},
     names,
 };
 
@@ -196,7 +196,7 @@ impl PyFit {
     }
 
     #[getter]
-    fn parameters(&self) -> Vec<(String, Pair)> {
+    fn parameters(&self) -> Vec<(String, ValueWithError)> {
         self.fit
             .parameters()
             .into_iter()
@@ -281,7 +281,7 @@ impl PyFit {
 
     /// The level of u in each record of the fit as it was read; empty where none was estimated.
     #[getter]
-    fn levels(&self) -> Vec<Option<Pair>> {
+    fn levels(&self) -> Vec<Option<ValueWithError>> {
         let without = |whole: &&Whole| each!(whole, found => found.is_without_means());
         let data = self.whole.as_ref().filter(without).and_then(|_| self.data());
         let accounts = data.into_iter().flat_map(|data| &data.accounts);

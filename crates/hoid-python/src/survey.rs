@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use hoid_analysis::{Advice, Known, Look, Role};
+use hoid_analysis::{Advice, Look, LookOptions, Role};
 use hoid_io::{ColumnSurvey, QualityIssue, SamplingSurvey, ValueSurvey};
 use pyo3::{prelude::*, types::PyDict};
 
@@ -29,7 +29,7 @@ pub fn info<'py>(
         }
         None => None,
     };
-    let known = Known {
+    let known = LookOptions {
         input,
         output,
         excitation,
@@ -37,7 +37,7 @@ pub fn info<'py>(
         time: time.map(str::parse).transpose()?,
         trial: trial.map(str::parse).transpose()?,
         sampling_hz: sampling_frequency,
-        ..Known::default()
+        ..LookOptions::default()
     };
     let look = py.detach(|| Look::at(&path, &known))?;
     let found = &look.survey;

@@ -21,7 +21,10 @@ const LONGEST_WARM_UP: usize = 10_000_000;
 type Saved<'py> = (Option<Bound<'py, PyDict>>, Bound<'py, PyArray1<f64>>);
 
 /// Crossover and margin, or the reason why not.
-type OpenLoopParts = (Option<(figures::Pair, figures::Pair)>, Option<&'static str>);
+type OpenLoopParts = (
+    Option<(figures::ValueWithError, figures::ValueWithError)>,
+    Option<&'static str>,
+);
 
 /// The package derives `pyhoid.Tracker` from it.
 #[pyclass(name = "Tracker", module = "pyhoid._pyhoid", subclass)]
@@ -277,7 +280,7 @@ impl PyTracker {
     }
 
     #[getter]
-    fn parameters(&self) -> Outcome<Vec<(String, figures::Pair)>> {
+    fn parameters(&self) -> Outcome<Vec<(String, figures::ValueWithError)>> {
         let tracker = self.tracker()?;
         let estimates = tracker.parameters().into_iter().map(figures::pair);
         Ok(tracker.parameter_names().into_iter().zip(estimates).collect())
@@ -302,7 +305,7 @@ impl PyTracker {
     }
 
     /// Gain in dB and phase in deg at a frequency in rad/s, each with its standard error.
-    fn response(&self, omega: f64) -> Outcome<Option<(figures::Pair, figures::Pair)>> {
+    fn response(&self, omega: f64) -> Outcome<Option<(figures::ValueWithError, figures::ValueWithError)>> {
         let found = self.tracker()?.response(omega);
         Ok(found.map(|r| (figures::pair(r.gain_db()), figures::pair(r.phase_deg()))))
     }

@@ -9,7 +9,7 @@ use hoid_ident::{
 use hoid_model::{Complex64, ContinuousTransferFunction, FamilyOperator, GainUnit, uncertainty::Estimate};
 
 use crate::{
-    Answer, AnswerRow, ModelSection, Picture, Report, facts,
+    FitSummary, ModelSection, ParameterRow, Picture, Report, facts,
     figures::{ModelCurve, describing},
     model_figure, sentence,
 };
@@ -95,9 +95,9 @@ fn remark(p: &Parameter) -> String {
 }
 
 /// The head of a page.
-fn answer(found: &Identified) -> Answer {
+fn answer(found: &Identified) -> FitSummary {
     let gain = found.data.records.first().map(GainUnit::of).unwrap_or_default();
-    let row = |p: &Parameter| AnswerRow {
+    let row = |p: &Parameter| ParameterRow {
         name: p.name.clone(),
         unit: gain.unit(&p.name, p.unit),
         estimate: p.determined.then_some(Estimate {
@@ -107,7 +107,7 @@ fn answer(found: &Identified) -> Answer {
         interval: p.interval,
         remark: remark(p),
     };
-    Answer {
+    FitSummary {
         verdict: found.fit.verdict.clone(),
         sentence: sentence_of_operator(found),
         parameters: found.fit.operator(0).parameters.iter().map(row).collect(),

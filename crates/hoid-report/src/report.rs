@@ -8,7 +8,7 @@ use hoid_model::Record;
 use minijinja::{Value, context};
 
 use crate::{
-    Answer, ReportError, cells,
+    FitSummary, ReportError, cells,
     figures::{self, BodeModel, TrueResponse},
     model_section::{ModelSection, known_operator},
     page, tables,
@@ -29,7 +29,7 @@ pub struct Report<'a> {
     /// Remarks for the reader, such as warnings of the command.
     pub notes: Vec<String>,
     /// What the fit says, on top of the page.
-    pub answer: Option<Answer>,
+    pub answer: Option<FitSummary>,
     /// Figures that answer what was asked, before all others.
     pub pictures: Vec<Picture>,
 }
@@ -96,7 +96,7 @@ impl Report<'_> {
             title => self.title.clone(),
             settings => page::facts(&self.settings),
             notes => self.notes.clone(),
-            answer => self.answer.as_ref().map(Answer::to_value),
+            answer => self.answer.as_ref().map(FitSummary::to_value),
             pictures => self.pictures.iter().map(Picture::to_value).collect::<Vec<Value>>(),
             comparison => tables::comparison(&self.models, &qualities),
             bode => Value::from_safe_string(self.bode()),

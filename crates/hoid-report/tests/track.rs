@@ -22,7 +22,7 @@ fn run() -> Record {
 }
 
 fn options(method: Method) -> TrackOptions {
-    let structure = method.usual_structure();
+    let structure = method.default_structure();
     let mut options = TrackOptions::new(method.clone(), structure, structure.operator_orders(29));
     options.start = StartAt::Span(Some(SPANS[0]));
     options
@@ -283,7 +283,7 @@ fn a_batch_fit_beside_a_delay_that_changed_has_the_delay_of_its_span() {
         .run(RunSeed::default(), false)
         .unwrap();
     let mut with_delay = options(hoid_survey::multiple_model());
-    with_delay.orders = hoid_survey::multiple_model().usual_orders(29);
+    with_delay.orders = hoid_survey::multiple_model().default_orders(29);
     with_delay.method.set("track_delay", "0.2..0.4").unwrap();
     let trace = track(&record, &with_delay, 8).unwrap();
     let (_, fit) = batch_fit(&trace, &record, SPANS[1]).unwrap();

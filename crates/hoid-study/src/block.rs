@@ -1,6 +1,6 @@
 //! One block of a study: some replications of a cell, with all estimators of the cell.
 
-use hoid_analysis::{AnalysisError, Asked, Recordings};
+use hoid_analysis::{AnalysisError, Recordings, ResolvedRequest};
 use hoid_ident::{Fit, IdentError};
 use hoid_model::Record;
 use hoid_sim::{RunSeed, Simulator};
@@ -193,26 +193,31 @@ impl<'a> CellRun<'a> {
     }
 
     /// As `hoid identify` does it with the recording.
-    fn analyse(&mut self, asked: &Asked, record: &Record, estimator: &'a EstimatorCell) -> Result<(), String> {
+    fn analyse(
+        &mut self,
+        asked: &ResolvedRequest,
+        record: &Record,
+        estimator: &'a EstimatorCell,
+    ) -> Result<(), String> {
         let text = |error: AnalysisError| error.to_string();
         let recording = Recordings::of_records([record.clone()]);
         match asked {
-            Asked::Operator(how) => {
+            ResolvedRequest::Operator(how) => {
                 let found = how.run(recording).map_err(text)?;
                 self.rows.operator_row(&found)?;
                 self.rows.verdict(&found.verdict);
             }
-            Asked::Change(how) => {
+            ResolvedRequest::Change(how) => {
                 let found = how.run(recording).map_err(text)?;
                 self.rows.change_row(&found)?;
                 self.rows.verdict(&found.verdict);
             }
-            Asked::Remnant(how) => {
+            ResolvedRequest::Remnant(how) => {
                 let found = how.run(recording).map_err(text)?;
                 self.polynomial_row(estimator, found.fit.polynomial_fit(0), &found.data.records[0])?;
                 self.rows.verdict(&found.verdict);
             }
-            Asked::Polynomials(how) => {
+            ResolvedRequest::Polynomials(how) => {
                 let found = how.run(recording).map_err(text)?;
                 self.polynomial_row(estimator, &found.fit.fit, &found.data.records[0])?;
                 self.rows.verdict(&found.verdict);

@@ -11,7 +11,7 @@
 
 use std::collections::BTreeMap;
 
-use hoid_analysis::Asked;
+use hoid_analysis::ResolvedRequest;
 use hoid_io::{ColumnKind, ColumnSchema, ColumnValues, OutputColumn, OutputTable, TableSchema};
 
 use crate::plan::{Plan, Task, analysis};
@@ -224,7 +224,7 @@ fn fits(plan: &Plan, theta: &[String], comments: Vec<String>) -> TableSchema {
     c.add(Whole, &["decimate"]);
     c.add(Real, &["from_s", "to_s"]);
     c.add(Text, &["status", "reason", "termination"]);
-    let analyses: Vec<&Asked> = plan.estimators.iter().filter_map(|e| e.task.analysis()).collect();
+    let analyses: Vec<&ResolvedRequest> = plan.estimators.iter().filter_map(|e| e.task.analysis()).collect();
     if !analyses.is_empty() {
         c.add(Text, &["verdict", "findings", "form"]);
     }
@@ -249,7 +249,7 @@ fn fits(plan: &Plan, theta: &[String], comments: Vec<String>) -> TableSchema {
         }
     }
     c.add(Real, &["T_n_backward_euler", "K_n_backward_euler"]);
-    if analyses.iter().any(|asked| matches!(asked, Asked::Change(_))) {
+    if analyses.iter().any(|asked| matches!(asked, ResolvedRequest::Change(_))) {
         c.add(Real, &["change_found"]);
     }
     if plan.estimators.iter().any(|e| matches!(e.task, Task::Track(_))) {

@@ -1,6 +1,6 @@
 //! The true values of what is estimated.
 
-use hoid_analysis::Asked;
+use hoid_analysis::ResolvedRequest;
 use hoid_model::{
     remnant::{RemnantDiscretisation, RemnantFilter},
     schedule::Schedule,
@@ -20,7 +20,7 @@ pub fn true_value(cell: &Cell, estimator: &EstimatorCell, name: &str) -> f64 {
         Task::Track(_) => (scenario.measurement_s, scenario.measurement_s),
         _ => estimator.span_s.unwrap_or((0.0, scenario.measurement_s)),
     };
-    if let Some(Asked::Change(_)) = estimator.task.analysis() {
+    if let Some(ResolvedRequest::Change(_)) = estimator.task.analysis() {
         return of_change(cell, name);
     }
     let [first, last] = [from, to].map(|t| cell.resolved.parameters_at(t).operator);
@@ -84,8 +84,8 @@ fn of_change(cell: &Cell, name: &str) -> f64 {
 /// Coefficients of D and the innovation variance of the remnant as it is held over each sample.
 fn of_noise_model(cell: &Cell, estimator: &EstimatorCell, k_n: f64, name: &str) -> f64 {
     let remnant = cell.resolved.scenario().remnant;
-    let by_polynomials =
-        matches!(estimator.task, Task::Fit(_)) || matches!(estimator.task.analysis(), Some(Asked::Polynomials(_)));
+    let by_polynomials = matches!(estimator.task, Task::Fit(_))
+        || matches!(estimator.task.analysis(), Some(ResolvedRequest::Polynomials(_)));
     if estimator.decimate > 1 || !by_polynomials {
         return f64::NAN;
     }

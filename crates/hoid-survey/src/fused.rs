@@ -25,7 +25,7 @@ use hoid_ident::{IdentError, settings, settings::Bounds};
 use hoid_track::{
     Memory, MemoryOptions, Sample, StabilityOptions,
     building::{
-        About, Gain, Kernel, Plan, Recursion, RecursiveMethod, Scaled, Setup, StartState, StepOutcome, USUAL_LIMIT,
+        About, DEFAULT_LIMIT, Gain, Kernel, Plan, Recursion, RecursiveMethod, Scaled, Setup, StartState, StepOutcome,
         bounded, check_operator_orders, error_bars,
     },
 };
@@ -63,7 +63,7 @@ impl RecursiveMethod for FusedOptions {
         }
     }
 
-    fn usual_memory(&self, parameter: &str) -> Memory {
+    fn default_memory(&self, parameter: &str) -> Memory {
         if parameter.starts_with('b') {
             Memory::Seconds(2.56)
         } else {
@@ -98,7 +98,7 @@ impl RecursiveMethod for FusedOptions {
     }
 
     fn limit(&self) -> f64 {
-        self.limit.unwrap_or(USUAL_LIMIT)
+        self.limit.unwrap_or(DEFAULT_LIMIT)
     }
 
     fn stable(&self) -> Stable {

@@ -53,11 +53,11 @@ impl RecursiveMethod for LinearNetworkOptions {
     }
 
     /// It follows from the time constant of learning.
-    fn usual_memory(&self, _parameter: &str) -> Memory {
+    fn default_memory(&self, _parameter: &str) -> Memory {
         Memory::Infinite
     }
 
-    fn usual_nd(&self) -> Option<usize> {
+    fn default_nd(&self) -> Option<usize> {
         Some(1)
     }
 
@@ -105,7 +105,7 @@ impl RecursiveMethod for LinearNetworkOptions {
         true
     }
 
-    fn memory_in_words(&self) -> Option<String> {
+    fn memory_as_text(&self) -> Option<String> {
         Some(format!(
             "a weight is learned with a time constant of {} s",
             self.learning
@@ -317,7 +317,7 @@ mod tests {
         let simulator = Simulator::new(&scenario).unwrap();
         let options = TrackOptions {
             start: StartAt::Span(Some((0.0, 30.72))),
-            ..TrackOptions::usual(Method::from(LinearNetworkOptions::default()), 29)
+            ..TrackOptions::default_for(Method::from(LinearNetworkOptions::default()), 29)
         };
         let mut mean = 0.0;
         for replication in 0..RUNS {

@@ -178,7 +178,7 @@ mod tests {
         for method in methods() {
             for structure in Structure::ALL {
                 let orders = match structure {
-                    Structure::BoxJenkins => method.usual_orders(29),
+                    Structure::BoxJenkins => method.default_orders(29),
                     _ => structure.operator_orders(if structure.has_input() { 29 } else { 0 }),
                 };
                 let options = TrackOptions::new(method.clone(), structure, orders);

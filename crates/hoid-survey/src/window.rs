@@ -62,11 +62,11 @@ impl RecursiveMethod for WindowOptions {
     }
 
     /// Not used: the window is what it remembers.
-    fn usual_memory(&self, parameter: &str) -> Memory {
+    fn default_memory(&self, parameter: &str) -> Memory {
         short_for_b(parameter)
     }
 
-    fn memory_in_words(&self) -> Option<String> {
+    fn memory_as_text(&self) -> Option<String> {
         let window = self.window.text().unwrap_or_default();
         Some(format!("window of {window}, a fit every {} samples", self.refit))
     }

@@ -20,7 +20,7 @@ fn record(seed: u64) -> Record {
 }
 
 fn options(method: Method, guard: &str) -> TrackOptions {
-    let (structure, orders) = (method.usual_structure(), method.usual_orders(29));
+    let (structure, orders) = (method.default_structure(), method.default_orders(29));
     TrackOptions::new(method, structure, orders)
         .with(&[("guard", guard)])
         .unwrap()

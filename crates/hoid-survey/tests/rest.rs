@@ -126,16 +126,16 @@ fn through(options: &TrackOptions, record: &Record, stand: Stand, length_s: f64)
 fn all_options() -> Vec<TrackOptions> {
     let mut all: Vec<TrackOptions> = hoid_survey::methods()
         .into_iter()
-        .map(|method| TrackOptions::usual(method, DELAY))
+        .map(|method| TrackOptions::default_for(method, DELAY))
         .collect();
-    all.extend(TrackOptions::usual(Method::adaptive(), DELAY).with(&[("replay", "0")]));
+    all.extend(TrackOptions::default_for(Method::adaptive(), DELAY).with(&[("replay", "0")]));
     for (name, text) in [
         ("memory", "100"),
         ("forgetting", "directional"),
         ("forgetting", "variable"),
     ] {
         for method in [Method::rls(), Method::rpem()] {
-            all.extend(TrackOptions::usual(method, DELAY).with(&[(name, text)]));
+            all.extend(TrackOptions::default_for(method, DELAY).with(&[(name, text)]));
         }
     }
     all
@@ -240,7 +240,7 @@ fn the_time_without_excitation_is_a_finding() {
         hoid_survey::window(),
         hoid_survey::fused(),
     ] {
-        let options = TrackOptions::usual(method.clone(), DELAY);
+        let options = TrackOptions::default_for(method.clone(), DELAY);
         let trace = track(&with_rest, &options, 50).unwrap();
         let said = trace.verdict(&with_rest, None).unwrap();
         let said: Vec<&str> = said.reasons().collect();
@@ -250,7 +250,7 @@ fn the_time_without_excitation_is_a_finding() {
         );
         assert_eq!(track(&whole, &options, 50).unwrap().faults(), [], "{method}");
     }
-    let as_it_comes = TrackOptions::usual(Method::rls(), DELAY)
+    let as_it_comes = TrackOptions::default_for(Method::rls(), DELAY)
         .with(&[("guard", "no")])
         .unwrap();
     assert_eq!(track(&with_rest, &as_it_comes, 50).unwrap().faults(), []);

@@ -35,7 +35,7 @@ fn a_restored_tracker_goes_on_with_the_same_digits() {
         TrackOptions::new(Method::rls(), Structure::Arx, Structure::Arx.operator_orders(29)),
         of(physical()),
         of(multiple_model()),
-        TrackOptions::usual(Method::adaptive(), 29),
+        TrackOptions::default_for(Method::adaptive(), 29),
         of(fused()),
         of(ekf()),
         of(ukf()),
@@ -106,7 +106,7 @@ fn numbers_that_were_changed_and_sealed_again_end_nothing() {
         of(Method::rpem()),
         of(physical()).with(&[("track_delay", "0.2..0.35")]).unwrap(),
         of(multiple_model()),
-        TrackOptions::usual(Method::adaptive(), 29)
+        TrackOptions::default_for(Method::adaptive(), 29)
             .with(&[("replay", "5")])
             .unwrap(),
         of(ekf()),

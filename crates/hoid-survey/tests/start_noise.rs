@@ -25,7 +25,7 @@ fn span() -> Record {
 fn outside() -> TrackOptions {
     let mut own = MultipleModelOptions::default();
     own.bounds.bound = BTreeMap::from([("omega_nm".to_owned(), Constraint::Between(20.0, 30.0))]);
-    TrackOptions::usual(own.into(), 29)
+    TrackOptions::default_for(own.into(), 29)
 }
 
 #[test]

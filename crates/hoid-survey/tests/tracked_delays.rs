@@ -35,7 +35,7 @@ fn options(range: Option<&str>) -> TrackOptions {
     let options = TrackOptions {
         start: StartAt::Span(Some((0.0, 30.72))),
         at_rad_s: vec![2.5],
-        ..TrackOptions::usual(Method::rpem(), NK)
+        ..TrackOptions::default_for(Method::rpem(), NK)
     };
     match range {
         Some(range) => options.with(&[("track_delay", range)]).unwrap(),
@@ -100,7 +100,7 @@ fn the_response_of_physical_has_the_delay_of_its_row() {
     let physical = TrackOptions {
         start: StartAt::Span(Some((0.0, 30.72))),
         at_rad_s: vec![2.5],
-        ..TrackOptions::usual(hoid_survey::physical(), NK)
+        ..TrackOptions::default_for(hoid_survey::physical(), NK)
     };
     // A memory that lets the delay go.
     let options = physical

@@ -29,7 +29,7 @@ fn run(noise_level: f64, seed: u64) -> Record {
 fn options(method: Method) -> TrackOptions {
     TrackOptions {
         start: StartAt::Span(Some((0.0, 30.72))),
-        ..TrackOptions::usual(method, NK)
+        ..TrackOptions::default_for(method, NK)
     }
 }
 
@@ -142,7 +142,7 @@ fn what_cannot_choose_is_refused_with_what_to_do() {
 /// of a person who changes is better in what the text names, the oscillations.
 #[test]
 fn the_covariance_shrinks_where_less_is_explained() {
-    let (mut usual, mut updated, mut differs) = (0.0, 0.0, false);
+    let (mut default, mut updated, mut differs) = (0.0, 0.0, false);
     for seed in 20..26 {
         let (record, other) = (run(0.2, seed), run(0.2, seed + 100));
         let settings = [
@@ -163,15 +163,15 @@ fn the_covariance_shrinks_where_less_is_explained() {
             assert_eq!(plain.theta(k), left.theta(k), "{k}");
             differs |= plain.theta(k) != by_vaf.theta(k);
         }
-        usual += plain.vaf_of(&other).unwrap().0;
+        default += plain.vaf_of(&other).unwrap().0;
         updated += by_vaf.vaf_of(&other).unwrap().0;
     }
     println!(
         "VAF of the second run, mean of six: {:.2} %, with updates {:.2} %",
-        usual / 6.0,
+        default / 6.0,
         updated / 6.0
     );
-    assert!(differs && updated > usual, "{usual} {updated}");
+    assert!(differs && updated > default, "{default} {updated}");
     let (record, other) = (run(0.1, 30), run(0.1, 31).span(0.0, 60.0).unwrap());
     let says = |other: &Record, options: TrackOptions| {
         let updates = CovarianceUpdates::default();

@@ -4,10 +4,10 @@
 
 pub use crate::{
     gain::{Gain, ROOM_WITHOUT_FIT, Scaled, error_bars},
+    history::{History, bounded, weighted},
     kernel::{Kernel, Plan, scaled, too_many},
     method::{About, Boxed, RecursiveMethod, bad, check_delay, check_operator_orders},
-    methods::{USUAL_LIMIT, short_for_b},
-    past::{Past, bounded, weighted},
+    methods::{DEFAULT_LIMIT, short_for_b},
     predictor::Predictor,
     recursion::{Delay, Recursion, StepOutcome},
     reported::{OPERATOR, Reported},

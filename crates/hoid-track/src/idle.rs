@@ -59,7 +59,7 @@ pub fn idle_head(record: &Record) -> usize {
 
 /// The span of a record that gives the start fit when none is named, s: the first third behind the
 /// idle head.
-pub fn usual_start_span(record: &Record) -> (f64, f64) {
+pub fn default_start_span(record: &Record) -> (f64, f64) {
     let head = match idle_head(record) {
         all if all >= record.len() => 0,
         head => head,
@@ -99,13 +99,13 @@ mod tests {
             let record = simulator.run(seed, false).unwrap();
             assert_eq!(idle_head(&record), 0);
             let third = record.len() as f64 * 0.01 / 3.0;
-            assert_eq!(usual_start_span(&record), (0.0, third));
+            assert_eq!(default_start_span(&record), (0.0, third));
             let noise: Vec<f64> = (0..1500).map(|k| 1e-3 * (f64::from(k) * 12.9898).sin()).collect();
             let offset: Vec<f64> = noise.iter().map(|n| 0.3 + n * 0.1).collect();
             let idle = with_head(&record, &noise, &offset);
             let head = idle_head(&idle);
             assert!((1490..1540).contains(&head), "{head}");
-            let (from, to) = usual_start_span(&idle);
+            let (from, to) = default_start_span(&idle);
             assert!((from - 15.0).abs() < 0.5 && (to - from - third).abs() < 0.2);
             // Half a second is not worth a word, and e alone no rest.
             assert_eq!(idle_head(&with_head(&record, &noise[..50], &offset[..50])), 0);
@@ -119,6 +119,6 @@ mod tests {
         let still = |name: &str, x: f64| Channel::new(name, "", vec![x; 500]);
         let record = Record::new(hoid_model::SampleTime::HUNDREDTH, still("e", 0.0), still("u", 2.0)).unwrap();
         assert_eq!(idle_head(&record), 500);
-        assert_eq!(usual_start_span(&record).0, 0.0);
+        assert_eq!(default_start_span(&record).0, 0.0);
     }
 }

@@ -15,7 +15,7 @@
 //!
 //! let simulator = Simulator::new(&Scenario::condition(Condition::C4))?;
 //! let record = simulator.run(RunSeed::default(), false)?;
-//! let options = TrackOptions::usual(Method::rpem(), 29).with(&[("memory_of", "b=4s")])?;
+//! let options = TrackOptions::default_for(Method::rpem(), 29).with(&[("memory_of", "b=4s")])?;
 //! let trace = track(&record, &options, 100)?;
 //!
 //! // The task changes at 40.96 s, and K_e_dot rises from .036 to .084 s.
@@ -39,10 +39,10 @@
 //! | `tracker`, `outcome`, `saved` | [`Tracker`]: one sample at a time; a tracker as numbers, to go on elsewhere |
 //! | `live` | [`Live`]: the warm-up of a stream, then its tracker |
 //! | `guard` | samples and spans that no tracking makes, kept from the recursion |
-//! | `standing` | what a recursion without a guard does while nothing arrives |
+//! | `stationary` | what a recursion without a guard does while nothing arrives |
 //! | `idle` | what was recorded before a run began |
 //! | `over_record`, `two_sided` | [`track()`]: a record; the two-sided estimate of a recorded run |
-//! | `trace`, `columns`, `summary`, `in_words` | [`Trace`]: the estimate at every sample, as columns and in words |
+//! | `trace`, `columns`, `summary`, `as_text` | [`Trace`]: the estimate at every sample, as columns and in words |
 //! | `judgement` | what a trace, and the estimate of a moment, is worth: [`Trace::verdict`] |
 //! | `determined` | which parameters the data determine |
 //! | `delay_bank` | a delay in whole samples, followed beside any recursion |
@@ -65,12 +65,13 @@ mod change;
 mod columns;
 mod delay_bank;
 mod determined;
+mod diagnostics;
+mod display;
 mod forgetting;
 mod gain;
 mod guard;
+mod history;
 mod idle;
-mod in_words;
-mod judgement;
 mod kernel;
 mod live;
 mod memory;
@@ -80,7 +81,6 @@ mod open_loop;
 mod options;
 mod outcome;
 mod over_record;
-mod past;
 mod person_prior;
 mod plan;
 mod predictor;
@@ -92,9 +92,9 @@ mod saved;
 mod seal;
 mod setup;
 mod shared_options;
-mod standing;
 mod start;
 mod start_noise;
+mod stationary;
 mod summary;
 mod trace;
 mod tracker;
@@ -106,7 +106,7 @@ pub use columns::{Columns, value_of};
 pub use determined::Determined;
 pub use forgetting::ForgettingRule;
 pub use guard::{GuardAction, GuardChannel, GuardChoice, GuardEvent, GuardKind, GuardOptions, TrackFault};
-pub use idle::{idle_head, usual_start_span};
+pub use idle::{default_start_span, idle_head};
 pub use live::{Choose, Live, LiveOutcome, WarmUp};
 pub use memory::{CommonMemory, Memory, MemoryOptions};
 pub use method::RecursiveMethod;

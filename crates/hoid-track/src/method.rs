@@ -76,7 +76,7 @@ pub trait RecursiveMethod: Settings + Boxed + 'static {
     }
 
     /// Memory of a parameter when none is given.
-    fn usual_memory(&self, parameter: &str) -> Memory;
+    fn default_memory(&self, parameter: &str) -> Memory;
 
     /// Builds the recursion.
     ///
@@ -104,7 +104,7 @@ pub trait RecursiveMethod: Settings + Boxed + 'static {
     }
 
     /// Order of the noise model when none is named; none where that of the structure is taken.
-    fn usual_nd(&self) -> Option<usize> {
+    fn default_nd(&self) -> Option<usize> {
         None
     }
 
@@ -148,7 +148,7 @@ pub trait RecursiveMethod: Settings + Boxed + 'static {
     }
 
     /// What it remembers, in words, where that is no memory of parameters.
-    fn memory_in_words(&self) -> Option<String> {
+    fn memory_as_text(&self) -> Option<String> {
         None
     }
 

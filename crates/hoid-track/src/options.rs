@@ -5,11 +5,11 @@ use hoid_model::{ContinuousTransferFunction, Orders, Record, SampleTime, Structu
 
 use crate::{
     forgetting::ForgettingRule,
-    idle::usual_start_span,
+    idle::default_start_span,
     memory::Memory,
     method::bad,
     methods::Method,
-    setup::{Setup, StartAt, USUAL_DELAY_S, parameter_names, polynomial_orders},
+    setup::{DEFAULT_DELAY_S, Setup, StartAt, parameter_names, polynomial_orders},
     start::check_sample_time,
 };
 
@@ -57,14 +57,14 @@ impl TrackOptions {
     }
 
     /// The usual ones of a method that starts itself and is told nothing of the person.
-    pub fn told_nothing(method: Method, sample_time: SampleTime) -> Self {
-        Self::usual(method, sample_time.nk(USUAL_DELAY_S))
+    pub fn without_prior(method: Method, sample_time: SampleTime) -> Self {
+        Self::default_for(method, sample_time.nk(DEFAULT_DELAY_S))
     }
 
     /// Default options with the structure and the orders that the method takes when none are named,
     /// for a delay of nk samples.
-    pub fn usual(method: Method, nk: usize) -> Self {
-        let (structure, orders) = (method.usual_structure(), method.usual_orders(nk));
+    pub fn default_for(method: Method, nk: usize) -> Self {
+        let (structure, orders) = (method.default_structure(), method.default_orders(nk));
         Self::new(method, structure, orders)
     }
 
@@ -91,7 +91,7 @@ impl TrackOptions {
     /// The span of a record that gives the start fit, s; none where there is no such fit.
     pub fn start_span(&self, record: &Record) -> Option<(f64, f64)> {
         let StartAt::Span(span) = self.start else { return None };
-        Some(span.unwrap_or_else(|| usual_start_span(record)))
+        Some(span.unwrap_or_else(|| default_start_span(record)))
     }
 
     /// Range of tau_e in s where it is one of the parameters that the recursion moves.
@@ -126,7 +126,7 @@ impl TrackOptions {
         }
         let of = |name: &String| {
             let own = given.and_then(|given| given.given(name));
-            own.unwrap_or_else(|| method.usual_memory(name))
+            own.unwrap_or_else(|| method.default_memory(name))
         };
         Ok(names.iter().map(of).collect())
     }

@@ -44,7 +44,7 @@ impl PersonPrior {
     }
 
     /// Where the estimate starts, in words.
-    pub(crate) fn in_words(&self) -> String {
+    pub(crate) fn as_text(&self) -> String {
         match self {
             Self::Population => "what is usual of people".to_owned(),
             Self::Nothing => "next to nothing: what is usual of people, with wide errors".to_owned(),

@@ -10,7 +10,7 @@ use crate::{
     methods::Method,
     options::TrackOptions,
     person_prior::PersonPrior,
-    setup::{StartAt, USUAL_DELAY_S},
+    setup::{DEFAULT_DELAY_S, StartAt},
 };
 use hoid_ident::{
     Choice, IdentError, NamedOrders, OrderRanges,
@@ -40,7 +40,7 @@ impl TrackPlan {
         sample_time: SampleTime,
     ) -> Result<Self, IdentError> {
         let ranges = match options.method.starts_itself() {
-            true => usual_ranges(&options.method, &ranges, sample_time),
+            true => default_ranges(&options.method, &ranges, sample_time),
             false => ranges,
         };
         let combinations = ranges.combinations()?;
@@ -122,20 +122,20 @@ pub fn of_one_model() -> IdentError {
 }
 
 /// Ranges of a method that searches none: the orders that are usual, as near as the ranges allow.
-fn usual_ranges(method: &Method, ranges: &OrderRanges, sample_time: SampleTime) -> OrderRanges {
+fn default_ranges(method: &Method, ranges: &OrderRanges, sample_time: SampleTime) -> OrderRanges {
     let known = method.person_prior().and_then(PersonPrior::delay_s);
-    let nk = sample_time.nk(known.unwrap_or(USUAL_DELAY_S));
-    let usual = method.usual_orders(nk);
-    let only = |usual: usize, range: &RangeInclusive<usize>| {
-        let one = usual.clamp(*range.start(), (*range.end()).max(*range.start()));
+    let nk = sample_time.nk(known.unwrap_or(DEFAULT_DELAY_S));
+    let default = method.default_orders(nk);
+    let only = |default: usize, range: &RangeInclusive<usize>| {
+        let one = default.clamp(*range.start(), (*range.end()).max(*range.start()));
         one..=one
     };
     OrderRanges {
-        na: only(usual.na, &ranges.na),
-        nb: only(usual.nb, &ranges.nb),
-        nc: only(usual.nc, &ranges.nc),
-        nd: only(usual.nd, &ranges.nd),
-        nf: only(usual.nf, &ranges.nf),
+        na: only(default.na, &ranges.na),
+        nb: only(default.nb, &ranges.nb),
+        nc: only(default.nc, &ranges.nc),
+        nd: only(default.nd, &ranges.nd),
+        nf: only(default.nf, &ranges.nf),
         nk: only(nk, &ranges.nk),
     }
 }
@@ -154,9 +154,9 @@ pub fn ranges_of(
     start_names: &[String],
     sample_time: SampleTime,
 ) -> Result<OrderRanges, IdentError> {
-    let mut usual = default_operator_ranges(structure, sample_time);
-    if let Some(nd) = method.usual_nd() {
-        usual.nd = nd..=nd;
+    let mut default = default_operator_ranges(structure, sample_time);
+    if let Some(nd) = method.default_nd() {
+        default.nd = nd..=nd;
     }
     let delay = method.track_delay_s().filter(|_| !named.contains_key("nk"));
     let of_start = if named.keys().all(|name| name == "nk") {
@@ -164,7 +164,7 @@ pub fn ranges_of(
     } else {
         &[]
     };
-    Ok(narrowed(usual.with(named)?, delay, of_start, sample_time))
+    Ok(narrowed(default.with(named)?, delay, of_start, sample_time))
 }
 
 /// Narrows ranges to what is known besides.
@@ -247,11 +247,11 @@ mod tests {
     #[test]
     fn a_start_settles_the_orders_and_the_delay_those_of_the_input() {
         let ts = SampleTime::HUNDREDTH;
-        let usual = default_operator_ranges(Structure::BoxJenkins, ts);
+        let default = default_operator_ranges(Structure::BoxJenkins, ts);
         let start: Vec<String> = ["b0", "b1", "d1", "d2", "f1", "f2"].map(str::to_owned).to_vec();
-        let found = narrowed(usual.clone(), Some((0.2, 0.3)), &start, ts);
+        let found = narrowed(default.clone(), Some((0.2, 0.3)), &start, ts);
         assert_eq!((found.nd.clone(), found.nk.clone()), (2..=2, 21..=31));
-        assert_eq!(narrowed(usual.clone(), None, &[], ts), usual);
+        assert_eq!(narrowed(default.clone(), None, &[], ts), default);
     }
 
     #[test]
@@ -285,7 +285,7 @@ mod tests {
             nd: 16..=16,
             ..default_operator_ranges(Structure::BoxJenkins, ts)
         };
-        let options = TrackOptions::usual(Method::adaptive(), 29);
+        let options = TrackOptions::default_for(Method::adaptive(), 29);
         let plan = TrackPlan::new(options.clone(), ranges.clone(), Criterion::Bic, ts).unwrap();
         assert!(plan.is_settled());
         assert_eq!((plan.options().orders.nk, plan.options().orders.nd), (21, 16));
@@ -297,7 +297,7 @@ mod tests {
     #[test]
     fn a_start_belongs_to_one_model() {
         let ts = SampleTime::HUNDREDTH;
-        let usual = default_operator_ranges(Structure::BoxJenkins, ts);
+        let default = default_operator_ranges(Structure::BoxJenkins, ts);
         let options = TrackOptions {
             start: StartAt::Theta(vec![0.0; 5]),
             ..TrackOptions::new(
@@ -306,7 +306,7 @@ mod tests {
                 Structure::BoxJenkins.operator_orders(29),
             )
         };
-        let refused = TrackPlan::new(options, usual, Criterion::Bic, ts).unwrap_err();
+        let refused = TrackPlan::new(options, default, Criterion::Bic, ts).unwrap_err();
         assert!(refused.to_string().contains("one model"), "{refused}");
     }
 }

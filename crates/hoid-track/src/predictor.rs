@@ -12,7 +12,7 @@ use hoid_core::{
 };
 use hoid_model::Orders;
 
-use crate::past::bounded;
+use crate::history::bounded;
 
 /// Room for coefficients.
 const ROOM: usize = 64;

@@ -18,7 +18,7 @@ use crate::{
 pub enum RequestedStart {
     /// As the method does: from a batch fit, or from what is known of people.
     #[default]
-    Usual,
+    Default,
     /// From nothing.
     Nothing,
     /// From all coefficients, by name.
@@ -62,7 +62,7 @@ impl TrackRequest {
             structure: None,
             orders: NamedOrders::new(),
             delay: None,
-            start: RequestedStart::Usual,
+            start: RequestedStart::Default,
             criterion: Criterion::Bic,
             largest: TrackOptions::LARGEST,
             at_rad_s: Vec::new(),
@@ -72,7 +72,7 @@ impl TrackRequest {
 
     /// The structure that was asked for, else that of the method.
     pub fn structure(&self) -> Structure {
-        self.structure.unwrap_or_else(|| self.method.usual_structure())
+        self.structure.unwrap_or_else(|| self.method.default_structure())
     }
 
     /// Whether the recursion is of polynomials, or its delay is given in samples: such takes the samples as they are.
@@ -116,7 +116,7 @@ impl TrackRequest {
         // The largest of each order: what is not known there is not known at all.
         let largest = combinations[combinations.len() - 1];
         let start = match &self.start {
-            RequestedStart::Usual => StartAt::Span(None),
+            RequestedStart::Default => StartAt::Span(None),
             RequestedStart::Nothing => StartAt::Nothing,
             RequestedStart::Coefficients(_) if combinations.len() > 1 => return Err(of_one_model()),
             RequestedStart::Coefficients(named) => StartAt::Theta(

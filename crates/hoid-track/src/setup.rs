@@ -10,7 +10,7 @@ use hoid_model::{Orders, Structure};
 use crate::{forgetting::ForgettingRule, memory::Memory, shared_options::WindupGuard};
 
 /// Delay of people who track, s: what is supposed where none is given.
-pub(crate) const USUAL_DELAY_S: f64 = 0.2;
+pub(crate) const DEFAULT_DELAY_S: f64 = 0.2;
 
 /// Names of the operator's parameters in a physical recursion.
 pub(crate) const PHYSICAL_NAMES: [&str; 5] = ["K_e", "K_e_dot", "omega_nm", "zeta_nm", "tau_e"];

@@ -72,10 +72,10 @@ settings! {
 
 impl GainOptions {
     /// The limit in use: none for a sliding window, whose sums hold every sample as it came.
-    pub fn limit_or(&self, usual: f64) -> f64 {
+    pub fn limit_or(&self, default: f64) -> f64 {
         match self.forgetting {
             ForgettingRule::Window => f64::INFINITY,
-            _ => self.limit.unwrap_or(usual),
+            _ => self.limit.unwrap_or(default),
         }
     }
 

@@ -145,7 +145,7 @@ impl StartState {
 
     /// From the batch fit of a record.
     fn fitted(setup: &Setup, record: &Record, known: Option<&Fit>) -> Result<Self, IdentError> {
-        let Found {
+        let FittedStart {
             values,
             covariance,
             fit,
@@ -154,7 +154,7 @@ impl StartState {
             fit_physical(setup, record, known)?
         } else {
             let fit = polynomial_fit(setup, record, known)?;
-            Found {
+            FittedStart {
                 values: fit.model().theta().to_vec(),
                 covariance: fit.covariance().map(<[f64]>::to_vec),
                 variance: fit.innovation_variance(),
@@ -205,7 +205,7 @@ pub(crate) fn bounds(setup: &Setup, sample_time: SampleTime) -> Result<Vec<[f64;
             available: names.join(", "),
         });
     }
-    let usual = |name: &str| match name {
+    let default = |name: &str| match name {
         "omega_nm" => [SLOWEST_OMEGA, FASTEST_SHARE * sample_time.nyquist_rad_s()],
         "zeta_nm" => DAMPING,
         "tau_e" => setup.delay_parameter_s.map_or([0.0, 0.0], |(low, high)| [low, high]),
@@ -214,7 +214,7 @@ pub(crate) fn bounds(setup: &Setup, sample_time: SampleTime) -> Result<Vec<[f64;
     names
         .iter()
         .map(|name| {
-            let [low, high] = usual(name);
+            let [low, high] = default(name);
             let Some(constraint) = setup.bounds.get(name) else {
                 return Ok([low, high]);
             };
@@ -285,7 +285,7 @@ fn physical_values(setup: &Setup, theta: &[f64], sample_time: SampleTime) -> Res
 
 /// What a fit gives: the values, their covariance, the fit, and the variance of the innovations of
 /// the model with these values.
-struct Found {
+struct FittedStart {
     values: Vec<f64>,
     covariance: Option<Vec<f64>>,
     fit: Fit,
@@ -302,7 +302,7 @@ fn polynomial_fit(setup: &Setup, record: &Record, known: Option<&Fit>) -> Result
 
 /// The Box-Jenkins fit where it has physical parameters within the bounds, else the grey box, which
 /// always has, with a noise model of the order that was asked for.
-fn fit_physical(setup: &Setup, record: &Record, known: Option<&Fit>) -> Result<Found, IdentError> {
+fn fit_physical(setup: &Setup, record: &Record, known: Option<&Fit>) -> Result<FittedStart, IdentError> {
     if setup.delay_parameter_s.is_none()
         && let Some(start) = from_box_jenkins(setup, record, known)?
     {
@@ -311,7 +311,7 @@ fn fit_physical(setup: &Setup, record: &Record, known: Option<&Fit>) -> Result<F
     from_grey_box(setup, record)
 }
 
-fn from_box_jenkins(setup: &Setup, record: &Record, known: Option<&Fit>) -> Result<Option<Found>, IdentError> {
+fn from_box_jenkins(setup: &Setup, record: &Record, known: Option<&Fit>) -> Result<Option<FittedStart>, IdentError> {
     let sample_time = record.sample_time();
     let Ok(fit) = polynomial_fit(setup, record, known) else {
         return Ok(None);
@@ -340,7 +340,7 @@ fn from_box_jenkins(setup: &Setup, record: &Record, known: Option<&Fit>) -> Resu
         debug_assert_eq!(noise, setup.orders.nc + setup.orders.nd);
         congruence(&(0..p).map(row).collect::<Vec<_>>(), c, p)
     });
-    Ok(Some(Found {
+    Ok(Some(FittedStart {
         values: eta,
         covariance,
         variance: fit.innovation_variance(),
@@ -359,7 +359,7 @@ fn congruence(rows: &[Vec<(usize, f64)>], c: &[f64], width: usize) -> Vec<f64> {
         .collect()
 }
 
-fn from_grey_box(setup: &Setup, record: &Record) -> Result<Found, IdentError> {
+fn from_grey_box(setup: &Setup, record: &Record) -> Result<FittedStart, IdentError> {
     let ts = record.sample_time().s();
     let o = &setup.orders;
     let names = setup.names();
@@ -451,7 +451,7 @@ fn from_grey_box(setup: &Setup, record: &Record) -> Result<Found, IdentError> {
             }
         }
     }
-    Ok(Found {
+    Ok(FittedStart {
         values: eta,
         covariance,
         fit,

@@ -19,8 +19,8 @@ use crate::{
     recursion::{Recursion, Sample},
     response::Response,
     setup::StartAt,
-    standing::{Act, Standing},
     start::StartState,
+    stationary::{Act, StationaryWatch},
     trace::operator_of,
 };
 
@@ -42,7 +42,7 @@ pub struct Tracker {
     pub(crate) sample_time: SampleTime,
     pub(crate) recursion: Box<dyn Recursion>,
     pub(crate) guard: Option<Box<Guard>>,
-    pub(crate) standing: Option<Box<Standing>>,
+    pub(crate) stationary: Option<Box<StationaryWatch>>,
     /// True where the last sample moved the estimate.
     pub(crate) moved: bool,
     pub(crate) last_e: f64,
@@ -83,7 +83,7 @@ impl Tracker {
         let mut recursion = options.method.build(&setup, &start, sample_time)?;
         Ok(Self {
             guard: guard_of(options, &mut *recursion, span, sample_time),
-            standing: standing_of(options, sample_time),
+            stationary: stationary_watch(options, sample_time),
             moved: false,
             recursion,
             options: options.clone(),
@@ -130,8 +130,8 @@ impl Tracker {
             (true, true) => Act::Step,
             (true, false) => Act::Follow,
         };
-        let Guarded { outcome, held } = match &mut self.standing {
-            Some(standing) => standing.take(&mut *self.recursion, sample, act),
+        let Guarded { outcome, held } = match &mut self.stationary {
+            Some(stationary) => stationary.take(&mut *self.recursion, sample, act),
             None => Guarded {
                 outcome: act.on(&mut *self.recursion, sample),
                 held: false,
@@ -171,13 +171,17 @@ impl Tracker {
     /// What the guard found or did at the last sample.
     pub fn event(&self) -> Option<GuardEvent> {
         let of_guard = self.guard.as_ref().and_then(|guard| guard.event());
-        of_guard.or_else(|| self.standing.as_ref()?.event())
+        of_guard.or_else(|| self.stationary.as_ref()?.event())
     }
 
     /// True while the estimate stands still, by the guard or because nothing arrives.
     pub fn is_paused(&self) -> bool {
         let of_guard = self.guard.as_ref().is_some_and(|guard| guard.is_paused());
-        of_guard || self.standing.as_ref().is_some_and(|standing| standing.is_paused())
+        of_guard
+            || self
+                .stationary
+                .as_ref()
+                .is_some_and(|stationary| stationary.is_paused())
     }
 
     /// Seconds since the guard began the estimate again, where it has.
@@ -379,11 +383,11 @@ fn largest_nk(options: &TrackOptions, sample_time: SampleTime) -> usize {
 }
 
 /// The watch of a recursion without a guard, but where that was asked for.
-pub(crate) fn standing_of(options: &TrackOptions, sample_time: SampleTime) -> Option<Box<Standing>> {
+pub(crate) fn stationary_watch(options: &TrackOptions, sample_time: SampleTime) -> Option<Box<StationaryWatch>> {
     if options.method.guard().is_some() {
         return None;
     }
-    Standing::new(largest_nk(options, sample_time), sample_time).map(Box::new)
+    StationaryWatch::new(largest_nk(options, sample_time), sample_time).map(Box::new)
 }
 
 /// The guard of a recursion at its start, where the options ask for one.

@@ -36,7 +36,7 @@ fn bands_hold_from_the_second_second_on() {
         let element: ContinuousTransferFunction = plant.text().parse().unwrap();
         let options = TrackOptions {
             controlled_element: Some(element),
-            ..TrackOptions::usual(Method::adaptive(), 13)
+            ..TrackOptions::default_for(Method::adaptive(), 13)
         };
         let mut tracker = Tracker::new(&options, None, ts).unwrap();
         for k in 0..run.record.len() {

@@ -27,7 +27,7 @@ fn poles_and_delay_of_people_are_within_their_errors() {
             continue;
         };
         people += 1.0;
-        let mut tracker = Tracker::new(&TrackOptions::usual(Method::adaptive(), 13), None, ts).unwrap();
+        let mut tracker = Tracker::new(&TrackOptions::default_for(Method::adaptive(), 13), None, ts).unwrap();
         for k in 0..run.record.len() {
             tracker.step(run.record.input()[k], run.record.output()[k]);
             let t = run.record.time_s(k) - run.record.time_s(0);

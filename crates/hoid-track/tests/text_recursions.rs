@@ -45,7 +45,7 @@ fn of_the_text(method: Method, besides: &[(&str, &str)]) -> TrackOptions {
     let rpem = method == Method::rpem();
     let options = TrackOptions {
         start: StartAt::Span(Some((0.0, 30.72))),
-        ..TrackOptions::usual(method, NK)
+        ..TrackOptions::default_for(method, NK)
     };
     let options = options.with(&[("memory", "256"), ("covariance", "0.1")]).unwrap();
     let own: &[(&str, &str)] = if rpem {
@@ -244,11 +244,11 @@ fn a_guard_that_is_none_is_refused_with_what_to_do() {
 /// innovations, and structures that the text does not have.
 #[test]
 fn other_settings_keep_their_guard() {
-    let words = |options: TrackOptions| options.memory_in_words(hoid_model::SampleTime::HUNDREDTH);
+    let words = |options: TrackOptions| options.memory_as_text(hoid_model::SampleTime::HUNDREDTH);
     let is_off = |options: TrackOptions| words(options).ends_with("without a guard against windup");
     assert!(is_off(of_the_text(Method::rls(), &[])));
     assert!(is_off(of_the_text(Method::rpem(), &[])));
-    assert!(!is_off(TrackOptions::usual(Method::rpem(), NK)));
+    assert!(!is_off(TrackOptions::default_for(Method::rpem(), NK)));
     assert!(!is_off(of_the_text(Method::rpem(), &[("limit", "5")])));
     assert!(!is_off(of_the_text(Method::rls(), &[("windup_guard", "1e4")])));
     let fir = hoid_model::Structure::Fir;

@@ -11,7 +11,7 @@ use hoid::prelude::*;
 
 fn main() -> Result<(), Box<dyn Error>> {
     let run = Simulator::new(&Scenario::condition(Condition::C4))?.run(RunSeed::default(), false)?;
-    let options = TrackOptions::told_nothing(Method::default(), run.sample_time());
+    let options = TrackOptions::without_prior(Method::default(), run.sample_time());
     let mut tracker = Tracker::new(&options, None, run.sample_time())?;
     for (k, (e, u)) in run.input().iter().zip(run.output()).enumerate() {
         tracker.step(*e, *u);

@@ -23,7 +23,7 @@
 //! let choice = identify_box_jenkins(&records)?;             // polynomials; delay and noise order by BIC
 //! println!("{}", choice.fit.validate(&records[0])?);
 //!
-//! let options = TrackOptions::told_nothing(Method::default(), records[0].sample_time());
+//! let options = TrackOptions::without_prior(Method::default(), records[0].sample_time());
 //! let trace = track(&records[0], &options, 10)?;            // as `hoid track`: every tenth sample
 //! println!("{trace}");
 //!

@@ -30,7 +30,7 @@ fn run(condition: Condition, remnant_order: usize, noise_level: f64, replication
 fn options(method: Method) -> TrackOptions {
     TrackOptions {
         start: StartAt::Span(Some((0.0, START_S))),
-        ..TrackOptions::new(method.clone(), method.usual_structure(), method.usual_orders(29))
+        ..TrackOptions::new(method.clone(), method.default_structure(), method.default_orders(29))
     }
 }
 
@@ -186,7 +186,7 @@ fn what_has_a_model_of_the_change_takes_no_memory() {
     let other_orders = TrackOptions {
         orders: hoid::model::Orders {
             nf: 1,
-            ..hoid::survey::fused().usual_orders(29)
+            ..hoid::survey::fused().default_orders(29)
         },
         ..options(hoid::survey::fused())
     };

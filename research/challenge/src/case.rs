@@ -191,7 +191,7 @@ pub struct Case {
 impl Case {
     /// The case that all others are variants of: gain and lead on `1/s^2`, a disturbance, a steady
     /// remnant of first order, 100 Hz, 90 s, nobody changes.
-    pub(super) fn usual(theme: Theme, name: impl Into<String>, meaning: impl Into<String>) -> Self {
+    pub(super) fn baseline(theme: Theme, name: impl Into<String>, meaning: impl Into<String>) -> Self {
         Self {
             name: name.into(),
             theme,

@@ -15,7 +15,7 @@
 //! | `noise` | remnants, and the filters that whiten them |
 //! | `driving`, `world` | excitation and strength of the remnant; operator and plant between two samples |
 //! | `simulate` | [`simulate()`]: the loop of a case |
-//! | `contestant`, `contestants` | [`Contestant`]: one who takes part; the methods, and plain ones |
+//! | `entrant`, `entrants` | [`Entrant`]: one who takes part; the methods, and plain ones |
 //! | `oracle` | what could be known |
 //! | `measure` | [`Line`]: what a contestant was worth in a run |
 //! | `run` | [`challenge()`]: all of it, kept on disk |
@@ -25,10 +25,10 @@
 
 mod case;
 mod cases;
-mod contestant;
-mod contestants;
 mod draw;
 mod driving;
+mod entrant;
+mod entrants;
 mod error;
 mod measure;
 mod noise;
@@ -43,11 +43,11 @@ mod world;
 
 pub use case::{Blemish, Case, Course, DelayKnown, Forcing, Form, Shift, Sight, Spectrum, Theme};
 pub use cases::cases;
-pub use contestant::{Alarm, Answer, Contestant, Said, Seam, Task};
-pub use contestants::contestants;
 pub use draw::{Portion, RunOf, Seeds};
+pub use entrant::{Alarm, Entrant, EntrantResult, ReportedResponse, Seam, Task};
+pub use entrants::entrants;
 pub use error::ChallengeError;
-pub use measure::{Found, Line, Moment, Posed};
+pub use measure::{ChangeOutcome, Line, Moment, Posed};
 pub use operator::{Operator, Parameter, Plant, hold};
 pub use page::page;
 pub use people::{PeopleOptions, challenge_people};

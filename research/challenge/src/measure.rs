@@ -13,8 +13,8 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     case::{Blemish, Case},
-    contestant::{Answer, Contestant, Said, Task},
     draw::RunOf,
+    entrant::{Entrant, EntrantResult, ReportedResponse, Task},
     oracle::{batch, evidence},
     simulate::{Run, Truth, simulate},
 };
@@ -60,7 +60,7 @@ pub struct Line {
     /// Seconds in which an alarm is false.
     pub exposed_s: f64,
     /// The changes.
-    pub changes: Vec<Found>,
+    pub changes: Vec<ChangeOutcome>,
     /// What speaks against the result.
     pub findings: Vec<String>,
 }
@@ -82,7 +82,7 @@ pub struct Moment {
 
 /// A change, and whether it was found.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Found {
+pub struct ChangeOutcome {
     /// When it began, s.
     pub at_s: f64,
     /// Logarithm of the true likelihood ratio within 5 and 8 s.
@@ -127,7 +127,7 @@ pub struct Posed {
     task: Task,
     labels: Vec<String>,
     /// Changes that have a moment.
-    changes: Vec<Found>,
+    changes: Vec<ChangeOutcome>,
 }
 
 impl Posed {
@@ -146,7 +146,7 @@ impl Posed {
         let asked = asked(&changes_s, start_s.1, case.length_s, case.length_s > 200.0);
         let (labels, asked_s) = asked.into_iter().unzip();
         let changes = (changes_s.iter().enumerate())
-            .map(|(i, at_s)| Found {
+            .map(|(i, at_s)| ChangeOutcome {
                 at_s: *at_s,
                 evidence: FOUND_S.map(|seconds| evidence(case, &run, i, seconds)),
                 after_s: None,
@@ -174,8 +174,8 @@ impl Posed {
     }
 
     /// The line of a contestant.
-    pub fn line(&self, contestant: &dyn Contestant) -> Line {
-        let mut line = self.measured(contestant.name(), contestant.follow(&self.task));
+    pub fn line(&self, entrant: &dyn Entrant) -> Line {
+        let mut line = self.measured(entrant.name(), entrant.follow(&self.task));
         if !self.case.changes_at_once() {
             // While somebody changes slowly an alarm is neither false nor late.
             (line.false_alarms, line.exposed_s, line.of_remnant) = (None, 0.0, 0);
@@ -187,14 +187,14 @@ impl Posed {
     pub fn batch(&self) -> Line {
         let changes_s: Vec<f64> = self.changes.iter().map(|change| change.at_s).collect();
         let tau_e_s = self.run.truth.operator(0.0).tau_e_s;
-        let answer = Answer {
+        let answer = EntrantResult {
             said: batch(&self.task, &changes_s, tau_e_s),
-            ..Answer::default()
+            ..EntrantResult::default()
         };
         self.measured(BATCH.to_owned(), Ok(answer))
     }
 
-    fn measured(&self, method: String, answer: Result<Answer, String>) -> Line {
+    fn measured(&self, method: String, answer: Result<EntrantResult, String>) -> Line {
         let truth = &self.run.truth;
         let at = |omega: f64, t_s: f64| truth.response(omega, t_s);
         let mut line = scored(&self.task, &self.labels, &at, method, answer, &self.changes);
@@ -233,14 +233,14 @@ pub(super) fn scored(
     labels: &[String],
     truth: &dyn Fn(f64, f64) -> Complex64,
     method: String,
-    answer: Result<Answer, String>,
-    changes: &[Found],
+    answer: Result<EntrantResult, String>,
+    changes: &[ChangeOutcome],
 ) -> Line {
     let (answer, failed) = match answer {
         Ok(answer) => (answer, None),
-        Err(reason) => (Answer::default(), Some(reason)),
+        Err(reason) => (EntrantResult::default(), Some(reason)),
     };
-    let nothing = Said::default();
+    let nothing = ReportedResponse::default();
     let moments = (labels.iter().zip(&task.asked_s).enumerate())
         .map(|(i, (label, t_s))| {
             let said = answer.said.get(i).unwrap_or(&nothing);
@@ -274,7 +274,7 @@ pub(super) fn scored(
         let first = (answer.alarms.iter().flatten()).find(|alarm| !alarm.of_remnant && own(alarm.t_s));
         change.after_s = first.map(|alarm| alarm.t_s - change.at_s);
     }
-    let false_ones = |alarms: &Vec<super::contestant::Alarm>| {
+    let false_ones = |alarms: &Vec<super::entrant::Alarm>| {
         let outside = alarms.iter().filter(|a| a.t_s >= from && !of_change(a.t_s));
         let of_remnant = outside.clone().filter(|a| a.of_remnant).count();
         (outside.count(), of_remnant)
@@ -295,7 +295,7 @@ pub(super) fn scored(
 }
 
 /// Mean of |dH|/|H|, bands that hold and all.
-fn of_response(said: &Said, truths: &[Complex64]) -> (f64, [usize; 2]) {
+fn of_response(said: &ReportedResponse, truths: &[Complex64]) -> (f64, [usize; 2]) {
     if said.response.len() != truths.len() {
         return (1.0, [0, 0]);
     }
@@ -322,7 +322,7 @@ pub(super) fn posed_task(case: &Case, of: RunOf) -> Task {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::contestant::Alarm;
+    use crate::entrant::Alarm;
 
     #[test]
     fn what_is_asked_lies_between_changes() {
@@ -336,14 +336,14 @@ mod tests {
         assert!(asked(&[15.0], 30.0, 90.0, false).iter().all(|(_, t)| *t >= 30.0));
     }
 
-    struct Says(Answer);
+    struct Says(EntrantResult);
 
-    impl Contestant for Says {
+    impl Entrant for Says {
         fn name(&self) -> String {
             "says".to_owned()
         }
 
-        fn follow(&self, _: &Task) -> Result<Answer, String> {
+        fn follow(&self, _: &Task) -> Result<EntrantResult, String> {
             Ok(self.0.clone())
         }
     }
@@ -368,14 +368,14 @@ mod tests {
             .map(|t| {
                 let lines = posed.task.lines_rad_s.iter();
                 let response: Vec<Complex64> = lines.map(|w| posed.run.truth.response(*w, *t)).collect();
-                Said {
+                ReportedResponse {
                     covariance: Some(vec![[1e-12, 1e-12, 0.0]; response.len()]),
                     response,
                     parameters: vec![("K_e", posed.run.truth.operator(*t).gain, Some(0.1))],
                 }
             })
             .collect();
-        let answer = Answer {
+        let answer = EntrantResult {
             said,
             alarms: Some(vec![alarm(33.0), alarm(48.5), alarm(56.0), alarm(80.0)]),
             findings: Vec::new(),
@@ -386,7 +386,7 @@ mod tests {
         assert_eq!(line.changes[0].after_s, Some(3.5));
         assert_eq!(line.false_alarms, Some(2));
         assert!((line.exposed_s - 48.0).abs() < 0.05, "{}", line.exposed_s);
-        let silent = posed.line(&Says(Answer::default()));
+        let silent = posed.line(&Says(EntrantResult::default()));
         assert!(silent.moments.iter().all(|m| m.error == 1.0) && silent.false_alarms.is_none());
     }
 }

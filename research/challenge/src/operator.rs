@@ -223,7 +223,7 @@ impl Canonical {
 mod tests {
     use super::*;
 
-    fn usual() -> Operator {
+    fn typical() -> Operator {
         Operator {
             gain: 1.5,
             lead_s: 0.6,
@@ -239,7 +239,7 @@ mod tests {
 
     #[test]
     fn the_response_is_that_of_the_transfer_function() {
-        let operator = usual();
+        let operator = typical();
         let open_loop = operator.open_loop(Plant::Lagged).unwrap();
         for omega in [0.1, 1.0, 5.0, 20.0] {
             let here = operator.response(omega) * Plant::Lagged.response(omega);
@@ -251,7 +251,7 @@ mod tests {
     fn a_stepped_system_answers_a_sine_with_its_response() {
         let operator = Operator {
             tau_e_s: 0.0,
-            ..usual()
+            ..typical()
         };
         let (num, den, h, omega) = (operator.numerator(), operator.denominator(), 0.001, 3.0);
         let mut system = Canonical::at_rest();
@@ -274,9 +274,9 @@ mod tests {
             lag_s: 0.0,
             third_s: 0.0,
             stick_rad_s: 0.0,
-            ..usual()
+            ..typical()
         };
-        assert!(lead.is_lead() && !usual().is_lead());
+        assert!(lead.is_lead() && !typical().is_lead());
         let parameters = [
             Parameter::KE,
             Parameter::KEDot,

@@ -16,7 +16,7 @@ use hoid_model::{Orders, Structure};
 
 use super::{
     case::Case,
-    contestant::{Said, Task, of_complex},
+    entrant::{ReportedResponse, Task, of_complex},
     noise::density,
     simulate::Run,
 };
@@ -65,7 +65,7 @@ pub fn evidence(case: &Case, run: &Run, change: usize, seconds: f64) -> f64 {
 
 /// What the batch fit says at the times that are asked for, `changes_s` known; nothing where it has
 /// too few seconds or fails.
-pub fn batch(task: &Task, changes_s: &[f64], tau_e_s: f64) -> Vec<Said> {
+pub fn batch(task: &Task, changes_s: &[f64], tau_e_s: f64) -> Vec<ReportedResponse> {
     let nk = (tau_e_s / task.sample_time.s()).round() as usize + 1;
     let structure = Structure::BoxJenkins;
     let orders = Orders {
@@ -73,7 +73,7 @@ pub fn batch(task: &Task, changes_s: &[f64], tau_e_s: f64) -> Vec<Said> {
         ..structure.operator_orders(nk)
     };
     let estimator = Estimator::new(structure, orders);
-    let at = |t_s: &f64| -> Option<Said> {
+    let at = |t_s: &f64| -> Option<ReportedResponse> {
         // What changes takes half a second.
         let from = (changes_s.iter().rev().find(|c| *c < t_s)).map_or(task.start_s.0, |c| c + 0.5);
         if t_s - from < LEAST_S {
@@ -97,7 +97,7 @@ pub fn batch(task: &Task, changes_s: &[f64], tau_e_s: f64) -> Vec<Said> {
             .map(|(name, e)| (name, e.value, e.standard_error))
             .into()
         });
-        Some(Said {
+        Some(ReportedResponse {
             response: each.into_iter().map(|(h, _)| h).collect(),
             covariance,
             parameters,

@@ -18,9 +18,9 @@ use hoid_model::{Complex64, SampleTime};
 use rayon::prelude::*;
 
 use super::{
-    contestant::{Contestant, Seam, Task},
     draw::Portion,
-    measure::{Found, Line, asked, scored},
+    entrant::{Entrant, Seam, Task},
+    measure::{ChangeOutcome, Line, asked, scored},
     run::{chosen_contestants, kept, refused},
 };
 use crate::ChallengeError;
@@ -73,7 +73,7 @@ type Cells = BTreeMap<(String, String), Vec<Trial>>;
 /// [`ChallengeError`] for recordings that cannot be read, names that are none, files.
 pub fn challenge_people(options: &PeopleOptions, each: &(dyn Fn(&str) + Sync)) -> Result<Vec<Line>, ChallengeError> {
     let cells = read_all(&options.recordings)?;
-    let (contestants, _) = chosen_contestants(&options.methods)?;
+    let (entrants, _) = chosen_contestants(&options.methods)?;
     let mut all = Vec::new();
     for (person, plant) in cells.keys() {
         let count = cells[&(person.clone(), plant.clone())].len();
@@ -102,11 +102,9 @@ pub fn challenge_people(options: &PeopleOptions, each: &(dyn Fn(&str) + Sync)) -
                 .join("people")
                 .join(&joined.person)
                 .join(joined.kind());
-            let lines = kept(&folder, joined.first.1 as u64, &contestants, false, &mut || {
+            let lines = kept(&folder, joined.first.1 as u64, &entrants, false, &mut || {
                 let posed = joined.posed(&cells)?;
-                Ok(Box::new(move |contestant: Option<&dyn Contestant>| {
-                    posed.line(contestant)
-                }))
+                Ok(Box::new(move |entrant: Option<&dyn Entrant>| posed.line(entrant)))
             });
             each(&format!("{} {} {}", joined.person, joined.kind(), joined.first.1));
             lines
@@ -245,7 +243,7 @@ impl Joined {
         // A seam is asked about at the same times as a change.
         let at_s: &[f64] = if self.second.is_some() { &[TRIAL_S] } else { &[] };
         let (labels, asked_s): (Vec<String>, Vec<f64>) = asked(at_s, start_s.1, length_s, false).into_iter().unzip();
-        let found = Found {
+        let found = ChangeOutcome {
             at_s: TRIAL_S,
             evidence: [SURE; 2],
             after_s: None,
@@ -277,13 +275,13 @@ struct Posed {
     number: u64,
     task: Task,
     labels: Vec<String>,
-    changes: Vec<Found>,
+    changes: Vec<ChangeOutcome>,
     /// The response at the lines before and after the seam.
     truths: [Vec<Complex64>; 2],
 }
 
 impl Posed {
-    fn line(&self, contestant: Option<&dyn Contestant>) -> Line {
+    fn line(&self, entrant: Option<&dyn Entrant>) -> Line {
         let truth = |omega: f64, t_s: f64| {
             let at = self
                 .task
@@ -293,8 +291,8 @@ impl Posed {
                 .unwrap_or(0);
             self.truths[usize::from(t_s >= TRIAL_S && self.task.seam.is_some())][at]
         };
-        let (name, answer) = match contestant {
-            Some(contestant) => (contestant.name(), contestant.follow(&self.task)),
+        let (name, answer) = match entrant {
+            Some(entrant) => (entrant.name(), entrant.follow(&self.task)),
             None => (String::new(), Err("nobody".to_owned())),
         };
         let mut line = scored(&self.task, &self.labels, &truth, name, answer, &self.changes);

@@ -12,9 +12,9 @@ use rayon::prelude::*;
 use super::{
     case::Case,
     cases::cases,
-    contestant::Contestant,
-    contestants::contestants,
     draw::{Portion, RunOf, Seeds},
+    entrant::Entrant,
+    entrants::entrants,
     measure::{BATCH, Line, Posed},
 };
 use crate::ChallengeError;
@@ -40,8 +40,8 @@ pub struct ChallengeOptions {
 ///
 /// # Errors
 /// [`ChallengeError::Refused`] for a name that is none.
-pub(super) fn chosen_contestants(names: &[String]) -> Result<(Vec<Box<dyn Contestant>>, bool), ChallengeError> {
-    let mut all = contestants();
+pub(super) fn chosen_contestants(names: &[String]) -> Result<(Vec<Box<dyn Entrant>>, bool), ChallengeError> {
+    let mut all = entrants();
     let known: Vec<String> = all.iter().map(|c| c.name()).chain(["batch".to_owned()]).collect();
     if let Some(unknown) = names.iter().find(|name| !known.contains(name)) {
         return Err(refused(format!(
@@ -86,7 +86,7 @@ pub(super) fn refused(reason: String) -> ChallengeError {
 /// [`ChallengeError`] for names that are none, files, and cases that nobody bears.
 pub fn challenge(options: &ChallengeOptions, each: &(dyn Fn(&str) + Sync)) -> Result<Vec<Line>, ChallengeError> {
     let cases = chosen_cases(&options.cases)?;
-    let (contestants, batch) = chosen_contestants(&options.methods)?;
+    let (entrants, batch) = chosen_contestants(&options.methods)?;
     let all: Vec<(&Case, u64)> = (cases.iter())
         .flat_map(|case| (0..options.runs).map(move |number| (case, number)))
         .collect();
@@ -98,14 +98,14 @@ pub fn challenge(options: &ChallengeOptions, each: &(dyn Fn(&str) + Sync)) -> Re
         .into_par_iter()
         .map(|(case, number)| {
             let folder = options.directory.join(options.seeds.to_string()).join(&case.name);
-            let lines = kept(&folder, number, &contestants, batch, &mut || {
+            let lines = kept(&folder, number, &entrants, batch, &mut || {
                 let of = RunOf {
                     seeds: options.seeds,
                     number,
                 };
                 let posed = Posed::new(case, of).map_err(refused)?;
-                Ok(Box::new(move |contestant: Option<&dyn Contestant>| match contestant {
-                    Some(contestant) => posed.line(contestant),
+                Ok(Box::new(move |entrant: Option<&dyn Entrant>| match entrant {
+                    Some(entrant) => posed.line(entrant),
                     None => posed.batch(),
                 }))
             });
@@ -117,20 +117,20 @@ pub fn challenge(options: &ChallengeOptions, each: &(dyn Fn(&str) + Sync)) -> Re
 }
 
 /// Gives the line of a contestant, or of the batch fit.
-pub(super) type LineOf = Box<dyn Fn(Option<&dyn Contestant>) -> Line>;
+pub(super) type LineOf = Box<dyn Fn(Option<&dyn Entrant>) -> Line>;
 
 /// The lines of a run: those of the file, and those that are not there computed and added.
 pub(super) fn kept(
     folder: &Path,
     number: u64,
-    contestants: &[Box<dyn Contestant>],
+    entrants: &[Box<dyn Entrant>],
     batch: bool,
     pose: &mut dyn FnMut() -> Result<LineOf, ChallengeError>,
 ) -> Result<Vec<Line>, ChallengeError> {
     let path = folder.join(format!("{number}.jsonl"));
     let mut lines = if path.exists() { read(&path)? } else { Vec::new() };
-    let mut wanted: Vec<(String, Option<&dyn Contestant>)> =
-        contestants.iter().map(|c| (c.name(), Some(c.as_ref()))).collect();
+    let mut wanted: Vec<(String, Option<&dyn Entrant>)> =
+        entrants.iter().map(|c| (c.name(), Some(c.as_ref()))).collect();
     if batch {
         wanted.push((BATCH.to_owned(), None));
     }
@@ -139,7 +139,7 @@ pub(super) fn kept(
         .collect();
     if !missing.is_empty() {
         let line_of = pose()?;
-        lines.extend(missing.into_iter().map(|(_, contestant)| line_of(*contestant)));
+        lines.extend(missing.into_iter().map(|(_, entrant)| line_of(*entrant)));
         write(&path, folder, &lines)?;
         // As they will be read: the last digit of a number may differ from what was written.
         lines = read(&path)?;
@@ -192,8 +192,8 @@ mod tests {
     #[test]
     fn what_is_there_is_not_computed_again() {
         let directory = tempfile::tempdir().unwrap();
-        let usual = options(directory.path());
-        let all = challenge(&usual, &|_| ()).unwrap();
+        let default = options(directory.path());
+        let all = challenge(&default, &|_| ()).unwrap();
         assert_eq!(all.len(), 4);
         assert!(all.iter().all(|line| line.failed.is_none()), "{all:?}");
         let path = directory.path().join("open/change-K_e_dot-100/0.jsonl");
@@ -201,7 +201,7 @@ mod tests {
             .unwrap()
             .replace("\"exposed_s\":", "\"exposed_s\":1");
         std::fs::write(&path, text).unwrap();
-        let again = challenge(&usual, &|_| ()).unwrap();
+        let again = challenge(&default, &|_| ()).unwrap();
         assert!(again[0].exposed_s > 100.0 && again[2..] == all[2..]);
         // One thread, another directory.
         let other = tempfile::tempdir().unwrap();

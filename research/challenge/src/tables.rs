@@ -347,7 +347,7 @@ mod tests {
     use std::collections::BTreeMap;
 
     use super::*;
-    use crate::measure::{Found, Moment};
+    use crate::measure::{ChangeOutcome, Moment};
 
     #[test]
     fn numbers_are_where_they_belong() {
@@ -367,7 +367,7 @@ mod tests {
             false_alarms: Some(3),
             of_remnant: 1,
             exposed_s: 1800.0,
-            changes: vec![Found {
+            changes: vec![ChangeOutcome {
                 at_s: 45.0,
                 evidence: [11.0, 20.0],
                 after_s: found,

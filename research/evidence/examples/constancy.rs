@@ -123,9 +123,9 @@ fn of_person(kind: RemnantKind, plant: Plant, seed: u64) -> Vec<Row> {
 
 fn main() {
     let arguments: Vec<String> = env::args().skip(1).collect();
-    let number = |name: &str, usual: u64| {
+    let number = |name: &str, default: u64| {
         let at = arguments.iter().position(|a| a == name);
-        at.and_then(|at| arguments.get(at + 1)?.parse().ok()).unwrap_or(usual)
+        at.and_then(|at| arguments.get(at + 1)?.parse().ok()).unwrap_or(default)
     };
     let (runs, first) = (number("--runs", 10), number("--seed", 5000));
     let all: Vec<Row> = (first..first + runs)

@@ -69,7 +69,7 @@ fn record(
                 .sum()
         })
         .collect();
-    let u = passed(&operator.hold(ts)?, &e);
+    let u = passed(&operator.zoh(ts)?, &e);
     let logged = |x: &[f64]| -> Vec<f64> {
         x[RUN_IN_S * made_hz..]
             .iter()

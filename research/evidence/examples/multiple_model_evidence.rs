@@ -50,7 +50,7 @@ fn run(simulator: &Simulator, condition: Condition, order: usize, level: usize, 
 }
 
 /// What one run of one method gave.
-struct Found {
+struct RunResult {
     /// RMS of the relative error over t in [10, 81.92] s, per cent.
     errors: [f64; 5],
     /// Share of samples after the start fit, and within 5 s after the change, in which 1.96
@@ -63,7 +63,7 @@ struct Found {
     settling_s: [f64; 2],
 }
 
-fn follow(record: &Record, options: &TrackOptions) -> Found {
+fn follow(record: &Record, options: &TrackOptions) -> RunResult {
     let truth = COLUMNS.map(|c| record.channel(c).unwrap());
     let span = record.span(0.0, START_S).unwrap();
     let mut tracker = Tracker::new(options, Some(&span), record.sample_time()).unwrap();
@@ -115,7 +115,7 @@ fn follow(record: &Record, options: &TrackOptions) -> Found {
             }
         }
     }
-    Found {
+    RunResult {
         errors: squares.map(|s: f64| 100.0 * (s / rows).sqrt()),
         covered: covered.map(|c| c / counts[0]),
         covered_through: through.map(|c| c / counts[1]),
@@ -341,7 +341,7 @@ fn set(runs: usize) {
     );
     println!("|---|---|---|---|---|---|---|---|");
     for (name, conditions, change) in &groups {
-        let mut found: Vec<Vec<Found>> = Vec::new();
+        let mut found: Vec<Vec<RunResult>> = Vec::new();
         for (c, condition) in conditions.iter().enumerate() {
             let order = match (name.starts_with("sudden"), conditions[0] == conditions[1]) {
                 (true, _) => [1, 4][c],
@@ -363,8 +363,8 @@ fn set(runs: usize) {
             }
         }
         let columns = [0, 1, 2, 3, 4];
-        let means = |i: usize, of: fn(&Found) -> [f64; 5]| {
-            let mean = |cell: &Vec<Found>| 100.0 * cell.iter().map(|f| of(f)[i]).sum::<f64>() / runs as f64;
+        let means = |i: usize, of: fn(&RunResult) -> [f64; 5]| {
+            let mean = |cell: &Vec<RunResult>| 100.0 * cell.iter().map(|f| of(f)[i]).sum::<f64>() / runs as f64;
             found.iter().map(mean).collect::<Vec<f64>>()
         };
         let errors = columns.map(|i| {
@@ -428,7 +428,7 @@ fn joined(files: &[String]) {
         // The delay of the least innovation variance of the start fit.
         let fits = (8..=26).filter_map(|nk| {
             let m = hoid_survey::multiple_model();
-            let options = TrackOptions::new(m.clone(), m.usual_structure(), m.usual_orders(nk));
+            let options = TrackOptions::new(m.clone(), m.default_structure(), m.default_orders(nk));
             Tracker::new(&options, Some(&span), sample_time).ok()
         });
         let Some(mut tracker) = fits.min_by(|a, b| a.innovation_variance().total_cmp(&b.innovation_variance())) else {

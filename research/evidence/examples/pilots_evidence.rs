@@ -128,7 +128,7 @@ fn run(name: &str, folder: &Path, references: &References, method: &str) -> Run 
         method.set(key, value).unwrap();
     }
     let nk = record.sample_time().nk(0.2);
-    let mut options = TrackOptions::usual(method.clone(), nk);
+    let mut options = TrackOptions::default_for(method.clone(), nk);
     let of_the_text = matches!(name, "rls" | "rpem");
     if of_the_text {
         let mut settings = vec![("memory", "256"), ("covariance", "0.1"), ("limit", "inf")];

@@ -34,7 +34,7 @@ struct Recording {
 
 fn told(recording: &Recording, e: &[f64], u: &[f64], method: &str) -> Vec<(usize, GuardEvent)> {
     let method = hoid_survey::method(method).unwrap();
-    let options = TrackOptions::told_nothing(method, recording.sample_time);
+    let options = TrackOptions::without_prior(method, recording.sample_time);
     let mut tracker = Tracker::new(&options, None, recording.sample_time).unwrap();
     let mut all = Vec::new();
     for (k, (e, u)) in e.iter().zip(u).enumerate() {

@@ -58,7 +58,7 @@ fn on_all_cores<T: Send>(runs: usize, one: impl Fn(u64) -> T + Sync) -> Vec<T> {
 }
 
 fn options(method: Method) -> TrackOptions {
-    let structure = method.usual_structure();
+    let structure = method.default_structure();
     TrackOptions {
         start: StartAt::Span(Some((0.0, 30.72))),
         ..TrackOptions::new(method, structure, structure.operator_orders(NK))

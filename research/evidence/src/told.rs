@@ -11,7 +11,7 @@ const NK: usize = 29;
 pub fn options(method: Method) -> TrackOptions {
     TrackOptions {
         start: StartAt::Span(Some((0.0, START_S))),
-        ..TrackOptions::new(method.clone(), method.usual_structure(), method.usual_orders(NK))
+        ..TrackOptions::new(method.clone(), method.default_structure(), method.default_orders(NK))
     }
 }
 

@@ -3,8 +3,8 @@
 
 use hoid_ident::{
     SearchOptions,
+    diagnostics::second_opinion,
     family::{FamilyEstimator, FamilyFit, Intersample},
-    judgement::second_opinion,
     settings::MethodSpec,
 };
 use hoid_model::{Detrend, FaultHandling, Structure, Verdict};
@@ -80,15 +80,15 @@ impl BatchEstimator for FamilyEstimator {
             },
             ..with.estimator.clone()
         };
-        let mut fit = estimator.fit_beside(&data.records, of_lines(&described, &with.excitation))?;
+        let mut fit = estimator.fit_with_response(&data.records, of_lines(&described, &with.excitation))?;
         fit.lead_s = data.input_lead_s();
         let element = with.controlled_element.as_ref();
         let mut verdict = fit.verdict.clone();
         if with.faults != FaultHandling::Keep {
-            verdict = verdict.and(second_opinion::of_family(&estimator, &fit, &data.records, element));
+            verdict = verdict.append(second_opinion::of_family(&estimator, &fit, &data.records, element));
         }
         if let Some(element) = element {
-            verdict = verdict.and(fit.loop_finding(0, element));
+            verdict = verdict.append(fit.loop_finding(0, element));
         }
         let described = described.ok().flatten();
         let channel = described.as_ref().and_then(|d| d.channel.clone());

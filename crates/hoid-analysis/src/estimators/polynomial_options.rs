@@ -76,12 +76,12 @@ impl BatchOptions for Polynomials {
 
 /// Orders and delay.
 fn searched() -> Vec<BatchOption<Polynomials>> {
-    let usual = "the operator's: bj nb=2,nd=1..4,nf=2; arx na=2,nb=2";
+    let default = "the operator's: bj nb=2,nd=1..4,nf=2; arx na=2,nb=2";
     let nk =
         "Delay of b0 in samples (29), or dead time in s (0.28s); a number or a range (20..40, 0.1s..0.4s) to search";
     let criterion = "What decides between candidates when something is searched";
     vec![
-        BatchOption::new(shared::orders(usual), |how: &mut Polynomials, option, text| {
+        BatchOption::new(shared::orders(default), |how: &mut Polynomials, option, text| {
             for (name, range) in option.read::<NamedOrders>(text)? {
                 how.order(option, name, range)?;
             }
@@ -171,7 +171,7 @@ fn by_prediction() -> Vec<BatchOption<Polynomials>> {
             (!all.is_empty()).then(|| all.join(", "))
         }),
         BatchOption::new(
-            Setting::new("robust", Kind::NumberOrUsual("1.345"), robust).bounds(Bounds::Positive),
+            Setting::new("robust", Kind::NumberOrDefault("1.345"), robust).bounds(Bounds::Positive),
             |how: &mut Polynomials, option, text| {
                 let threshold = match text {
                     "true" => HUBER,

@@ -3,7 +3,7 @@
 
 use hoid_ident::{
     Choice, Estimator, Fit, IdentError, InitialState, InstrumentalVariable, Instruments, IvMethod, Loss, SearchOptions,
-    judgement::second_opinion,
+    diagnostics::second_opinion,
     order_selection::{OrderRanges, default_operator_ranges, fit_or_choose},
     progress,
     settings::MethodSpec,
@@ -65,8 +65,8 @@ impl Polynomials {
         let options = |error: hoid_ident::IdentError| AnalysisError::Options {
             reason: error.to_string(),
         };
-        let usual = default_operator_ranges(self.template.structure, sample_time);
-        let ranges = usual.with(&orders).map_err(options)?;
+        let default = default_operator_ranges(self.template.structure, sample_time);
+        let ranges = default.with(&orders).map_err(options)?;
         ranges.candidates().map_err(options)?;
         Ok(ranges)
     }
@@ -174,7 +174,10 @@ impl BatchEstimator for Polynomials {
             other => other?,
         };
         if let Some(method) = how.method {
-            let instruments = how.instruments.clone().unwrap_or_else(|| Instruments::usual(records));
+            let instruments = how
+                .instruments
+                .clone()
+                .unwrap_or_else(|| Instruments::default_for(records));
             found.push(Setting::new("method", format!("{method}, {instruments}")).given(true));
             if choice.is_some() {
                 found.push(Setting::new("orders chosen by", "the prediction error method"));
@@ -202,10 +205,10 @@ impl BatchEstimator for Polynomials {
             how.method.is_none() && estimator.loss == Loss::Quadratic && !steps && fit.rounding().is_none();
         if with.faults != FaultHandling::Keep && is_asked_again {
             let element = with.controlled_element.as_ref();
-            verdict = verdict.and(second_opinion::of_polynomials(&estimator, &fit, records, element));
+            verdict = verdict.append(second_opinion::of_polynomials(&estimator, &fit, records, element));
             // Where the level is not estimated it may matter.
             if level.is_kept() && !data.were_detrended() {
-                verdict = verdict.and(second_opinion::of_level(&estimator, &fit, records));
+                verdict = verdict.append(second_opinion::of_level(&estimator, &fit, records));
             }
         }
         found.extend(level.told(data, |_, record| fit.level(record)));

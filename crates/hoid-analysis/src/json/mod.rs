@@ -36,7 +36,7 @@ use serde::Serialize;
 use serde_json::{Map, Value, json};
 
 pub use polynomials::{PolynomialAnswer, of_family};
-pub use result::{Answer, BatchAnswer};
+pub use result::{BatchAnswer, BatchResult};
 pub use trace::{change, open_loop, responses, track_fault, tracked_operator};
 
 use crate::{found::FoundFault, recordings::Account, settings::Setting};
@@ -120,7 +120,7 @@ pub fn answers(all: &[(String, Verdict)]) -> Map<String, Value> {
 
 /// What makes a result doubtful, or is worth knowing.
 pub fn finding(f: &Finding) -> Value {
-    json!({"kind": f.kind, "severity": f.severity.name(), "message": f.words, "words": f.words})
+    json!({"kind": f.kind, "severity": f.severity.name(), "message": f.message, "words": f.message})
 }
 
 /// Orders by name.

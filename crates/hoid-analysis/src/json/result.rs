@@ -1,7 +1,7 @@
 //! A result to its JSON and back.
 
 use hoid_ident::{GreyBoxFit, SigmoidFit};
-use hoid_io::{Place, QualityIssue, QualityIssueKind};
+use hoid_io::{QualityIssue, QualityIssueKind, RowSpan};
 use hoid_model::{ContinuousTransferFunction, Decimation, Detrend, Fault, Verdict, uncertainty::Estimate};
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use serde_json::{Map, Value, json};
@@ -36,7 +36,7 @@ pub trait BatchAnswer: Answers + Serialize + DeserializeOwned {
 
 /// Any result of a batch fit.
 #[derive(Debug, Clone)]
-pub enum Answer {
+pub enum BatchResult {
     /// The operator of a person, its form by evidence.
     Operator(Identified),
     /// A gain with a lead, and its remnant of order m.
@@ -47,7 +47,7 @@ pub enum Answer {
     Polynomials(Identified<PolynomialFit>),
 }
 
-impl Answer {
+impl BatchResult {
     /// Reads a result that [`Identified::to_json`] wrote.
     ///
     /// # Errors
@@ -87,7 +87,7 @@ struct IssueFields {
     share: f64,
     size: f64,
     unit: String,
-    places: Vec<Place>,
+    places: Vec<RowSpan>,
     text: String,
 }
 
@@ -108,7 +108,7 @@ struct Written<'a, F> {
 }
 
 #[derive(Deserialize)]
-struct Read<F> {
+struct SavedResult<F> {
     fit: F,
     verdict: Verdict,
     names: Vec<String>,
@@ -225,7 +225,7 @@ fn restored<F: BatchAnswer>(object: Map<String, Value>) -> Result<Identified<F>,
     }
     let text = object.get("state").and_then(Value::as_str);
     let text = text.ok_or_else(|| not_a_result("it has no state".to_owned()))?;
-    let read: Read<F> = state::read(text).map_err(not_a_result)?;
+    let read: SavedResult<F> = state::read(text).map_err(not_a_result)?;
     Ok(Identified {
         fit: read.fit,
         verdict: read.verdict,

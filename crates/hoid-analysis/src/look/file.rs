@@ -7,8 +7,8 @@ use hoid_model::Record;
 
 use super::{
     columns::Roles,
-    known::Known,
     lag::{self, Lag},
+    options::LookOptions,
     periods::{self, Periods},
 };
 
@@ -20,13 +20,13 @@ pub struct Look {
     /// Error and control.
     pub roles: Roles,
     /// What these columns hold; why they make no record where they make none.
-    pub seen: Result<Seen, IoError>,
-    pub(super) known: Known,
+    pub seen: Result<RecordSummary, IoError>,
+    pub(super) known: LookOptions,
 }
 
 /// What is found in the record of a file.
 #[derive(Debug)]
-pub struct Seen {
+pub struct RecordSummary {
     /// The record, as it was recorded.
     pub record: Record,
     /// The excitation and its span of whole periods, or why there is none.
@@ -41,7 +41,7 @@ impl Look {
     ///
     /// # Errors
     /// Those of [`survey`], where the file cannot be read at all.
-    pub fn at(path: &Path, known: &Known) -> Result<Self, IoError> {
+    pub fn at(path: &Path, known: &LookOptions) -> Result<Self, IoError> {
         let found = survey(path)?;
         let roles = Roles::of(&names(&found), known.input.as_deref(), known.output.as_deref());
         Ok(Self {
@@ -77,7 +77,7 @@ fn unit_of(column: &ColumnSurvey) -> Option<&str> {
     })
 }
 
-fn seen(path: &Path, roles: &Roles, known: &Known) -> Result<Seen, IoError> {
+fn seen(path: &Path, roles: &Roles, known: &LookOptions) -> Result<RecordSummary, IoError> {
     let options = ReadOptions {
         input: Some(roles.input.column.parse()?),
         output: roles.output.column.parse()?,
@@ -101,5 +101,5 @@ fn seen(path: &Path, roles: &Roles, known: &Known) -> Result<Seen, IoError> {
         (None, Err(_), Some(_)) => Some(Err("no excitation was found by whose lines it could be seen".to_owned())),
         _ => None,
     };
-    Ok(Seen { record, periods, lag })
+    Ok(RecordSummary { record, periods, lag })
 }

@@ -18,15 +18,15 @@
 mod advice;
 mod columns;
 mod file;
-mod known;
 mod lag;
+mod options;
 mod other_columns;
 mod periods;
 
 pub use advice::{Advice, typed};
 pub use columns::{Role, Roles};
-pub use file::{Look, Seen};
-pub use known::Known;
+pub use file::{Look, RecordSummary};
 pub use lag::Lag;
+pub use options::LookOptions;
 pub use other_columns::{OtherColumns, other_columns};
 pub use periods::Periods;

@@ -84,9 +84,9 @@ pub fn other_columns(error: &IoError, path: &Path, options: &ReadOptions) -> Opt
     let found = survey(path).ok()?;
     let names = names(&found);
     // Only the usual names stand for what is not known; another name was meant as it was typed.
-    let of = |column: &ColumnExpression, usual: &str| {
+    let of = |column: &ColumnExpression, default: &str| {
         let found = column.is_among(&names).then(|| column.to_string());
-        (found.is_some() || column.to_string() == usual).then_some(found)
+        (found.is_some() || column.to_string() == default).then_some(found)
     };
     let input = match &options.input {
         Some(column) => Some(of(column, "e")?),

@@ -3,8 +3,8 @@
 use hoid_ident::IdentError;
 use hoid_model::{Decimation, Record, SampleTime};
 use hoid_track::{
-    CovarianceUpdates, RequestedStart, StartAt, Trace, TrackOptions, TrackPlan, TrackRequest, choose_covariance, track,
-    track_validated, usual_start_span,
+    CovarianceUpdates, RequestedStart, StartAt, Trace, TrackOptions, TrackPlan, TrackRequest, choose_covariance,
+    default_start_span, track, track_validated,
 };
 
 use super::{
@@ -102,7 +102,7 @@ impl Tracking {
         .max(1);
         let plan = plan_of(&self.recursion, record.sample_time())?;
         self.check(&plan, record)?;
-        let span_s = self.start_span_s.unwrap_or_else(|| usual_start_span(record));
+        let span_s = self.start_span_s.unwrap_or_else(|| default_start_span(record));
         let span = record.span(span_s.0, span_s.1);
         let (planned, choice) = if plan.is_settled() {
             (plan.options().clone(), None)
@@ -138,13 +138,13 @@ impl Tracking {
         let rows = self.averaged_rows(every, record)?;
         let trace: Trace = trace.moving_average(rows);
         let verdict = trace.verdict(record, choice.as_ref())?;
-        let verdict = verdict.behind(findings_of_quality(account, record, Of::Person));
+        let verdict = verdict.prepend(findings_of_quality(account, record, Of::Person));
         let mut settings = settings_of_recursion(&self.recursion, &plan, &used, choice.as_ref());
         let own = OwnSettings {
             trace: &trace,
             options: &used,
             covariance: covariance.as_ref(),
-            start_given: self.start_span_s.is_some() || self.recursion.start != RequestedStart::Usual,
+            start_given: self.start_span_s.is_some() || self.recursion.start != RequestedStart::Default,
             update_given: self.update_from_s.is_some(),
             rows,
             every: (every, self.every != 1),

@@ -35,7 +35,7 @@ pub fn settings_of_recursion(
     if let Some(delay @ DelayRange::Seconds(..)) = &asked.delay {
         list.push(Setting::new("delay", delay.to_string()).given(true));
     }
-    list.push(Setting::new("memory", options.memory_in_words(plan.sample_time())).given(memory_given));
+    list.push(Setting::new("memory", options.memory_as_text(plan.sample_time())).given(memory_given));
     for one in &listed {
         // The memory stands above with the defaults of all parameters.
         if let Some(text) = value(one.name) {
@@ -104,7 +104,7 @@ impl OwnSettings<'_> {
             None => {}
         }
         let words = match &options.start {
-            _ if options.method.starts_itself() => options.start_in_words(),
+            _ if options.method.starts_itself() => options.start_as_text(),
             StartAt::Span(Some((from, to))) => format!("batch fit of {from:.2} to {to:.2} s"),
             StartAt::Span(None) => "batch fit of the first third".to_owned(),
             StartAt::Theta(_) => "given".to_owned(),

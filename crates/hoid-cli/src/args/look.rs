@@ -1,7 +1,7 @@
 //! What is known of a file before it is looked at, as `hoid info` and `hoid group init` take it.
 
 use clap::Args;
-use hoid::analysis::Known;
+use hoid::analysis::LookOptions;
 use hoid::io::{TimeChoice, TrialChoice};
 use hoid::model::ContinuousTransferFunction;
 
@@ -24,7 +24,7 @@ pub struct LookArgs {
     #[arg(long, value_name = "ELEMENT", value_parser = parse_element, allow_hyphen_values = true)]
     pub controlled_element: Option<(String, ContinuousTransferFunction)>,
     /// Column of the time, and its unit behind a colon: s, ms, us, ns, min, h, iso, sec+nanosec
-    /// [default: t, or a usual name of a time]
+    /// [default: t, or a default name of a time]
     #[arg(long, value_name = "COLUMN[:UNIT]", value_parser = parse_time)]
     pub time: Option<TimeChoice>,
     /// Column that counts the trials of a file, each a record of its own (t: where the time starts again),
@@ -44,8 +44,8 @@ pub struct LookArgs {
 
 impl LookArgs {
     /// What was typed.
-    pub fn known(&self) -> Known {
-        Known {
+    pub fn known(&self) -> LookOptions {
+        LookOptions {
             input: self.input.clone(),
             output: self.output.clone(),
             excitation: self.excitation.clone(),

@@ -16,7 +16,7 @@ pub struct ReadArgs {
     #[arg(long, value_name = "COLUMN", default_value = "u", allow_hyphen_values = true)]
     pub output: String,
     /// Column of the time, and its unit behind a colon where it is not found by itself: s, ms, us, ns,
-    /// min, h, iso (dates and times), sec+nanosec [default: t, or a usual name of a time]
+    /// min, h, iso (dates and times), sec+nanosec [default: t, or a default name of a time]
     #[arg(long, value_name = "COLUMN[:UNIT]", value_parser = parse_time)]
     pub time: Option<TimeChoice>,
     /// Column that counts the trials of a file, each a record of its own (t: where the time starts again),

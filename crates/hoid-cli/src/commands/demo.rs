@@ -15,7 +15,7 @@ use hoid::report::{BatchLine, ModelSection, Report, TraceSection, TrackReport, k
 use hoid::sim::{RunSeed, Simulator};
 use hoid::track::{Method, OPERATOR_COLUMNS, StartAt, Trace, TrackOptions, track};
 
-use crate::{args::DemoArgs, commands::places, error::CliError, output, text};
+use crate::{args::DemoArgs, commands::output_paths, error::CliError, output, text};
 
 /// The spans of the reference text (V.B) that lie wholly before and wholly after the change, s.
 const SPANS: [(&str, f64, f64); 2] = [("before", 0.0, 30.72), ("after", 51.2, 81.92)];
@@ -28,7 +28,7 @@ struct Stage {
 }
 
 pub fn run(args: &DemoArgs) -> Result<(), CliError> {
-    places::check(&[], &[], &[Some(&args.out)])?;
+    output_paths::check(&[], &[], &[Some(&args.out)])?;
     let scenario = Scenario::condition(Condition::C4);
     let run_seed = RunSeed {
         seed: args.seed,
@@ -71,9 +71,9 @@ fn tracked(record: &Record, stages: &[Stage]) -> Result<Vec<(String, Trace)>, Cl
     [Method::adaptive(), Method::rls(), Method::rpem()]
         .into_iter()
         .map(|method| {
-            let structure = method.usual_structure();
+            let structure = method.default_structure();
             let (options, told) = if method.starts_itself() {
-                let options = TrackOptions::told_nothing(method.clone(), record.sample_time());
+                let options = TrackOptions::without_prior(method.clone(), record.sample_time());
                 (options, "told nothing".to_owned())
             } else {
                 let options = TrackOptions {

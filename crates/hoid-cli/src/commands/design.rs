@@ -12,7 +12,7 @@ use hoid::model::{
 };
 use serde_json::{Map, Value, json};
 
-use super::{paper_table, places};
+use super::{output_paths, paper_table};
 use crate::{args::DesignArgs, error::CliError, json, output, text};
 
 /// `--against` of the ten sines of the text.
@@ -26,7 +26,7 @@ struct Other {
 
 pub fn run(args: &DesignArgs) -> Result<(), CliError> {
     paper_table::check(&args.show)?;
-    places::check(&[&args.people], &[args.show.table.as_deref()], &[])?;
+    output_paths::check(&[&args.people], &[args.show.table.as_deref()], &[])?;
     if let Some(out) = &args.out {
         hoid::io::check_output_directory(out, &[&args.people])?;
     }

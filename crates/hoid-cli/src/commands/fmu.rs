@@ -13,7 +13,7 @@ use hoid::io::{
 use hoid::model::SampleTime;
 use hoid::sim::{FamilyOperatorRun, FamilySimulator, RunSeed, Simulator};
 
-use super::places;
+use super::output_paths;
 use crate::{
     args::{FmuArgs, OperatorChoice},
     error::CliError,
@@ -31,7 +31,7 @@ pub fn run(args: &FmuArgs) -> Result<(), CliError> {
         None => of_tracker(args)?,
     };
     let inputs: Vec<&Path> = libraries.iter().chain(&read).map(PathBuf::as_path).collect();
-    places::check(&inputs, &[Some(&args.out)], &[])?;
+    output_paths::check(&inputs, &[Some(&args.out)], &[])?;
     let loaded: Vec<Library> = (libraries.iter())
         .map(|path| Library::read(path))
         .collect::<Result<_, IoError>>()?;

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use hoid::analysis::{Look, Role};
-use hoid::ident::faults::mend;
+use hoid::ident::faults::repair;
 use hoid::io::{ColumnSurvey, FileSurvey, SamplingSurvey, ValueSurvey};
 use hoid::model::{Fault, FaultHandling};
 use hoid::report::numbers;
@@ -37,8 +37,8 @@ pub fn run(args: &InfoArgs) -> Result<(), CliError> {
 /// The faults of error and control, where the file has them and they make a record.
 fn faults_of(look: &Look) -> Vec<Fault> {
     let seen = look.seen.as_ref().ok();
-    let mended = seen.and_then(|seen| mend(&seen.record, FaultHandling::Report).ok());
-    mended.map_or_else(Vec::new, |mended| mended.faults)
+    let repaired = seen.and_then(|seen| repair(&seen.record, FaultHandling::Report).ok());
+    repaired.map_or_else(Vec::new, |repaired| repaired.faults)
 }
 
 /// What the file looks like, and the command to type next.
@@ -74,12 +74,12 @@ fn looks_like(look: &Look, file: &str) -> String {
     }
     text.push_str(&match look.advice() {
         Some(advice) => {
-            let mended = if look.seen.is_ok() {
+            let repaired = if look.seen.is_ok() {
                 ""
             } else {
                 ", with the remedy above"
             };
-            format!("Next{mended}: {}\n", advice.command("identify", file))
+            format!("Next{repaired}: {}\n", advice.command("identify", file))
         }
         None => {
             "Next: hoid identify with the columns of error and control: --input COLUMN --output COLUMN\n".to_owned()

@@ -13,12 +13,12 @@ use crate::{
 
 /// How files are read, as was typed.
 pub fn of(args: &ReadArgs, mask: Option<&MaskArgs>, with_input: bool) -> Result<Reading, CliError> {
-    let usual = Reading::default();
+    let default = Reading::default();
     Ok(Reading {
         options: options(args, with_input)?,
         preparation: preparation(args)?,
         mask: mask.map_or_else(Vec::new, |args| args.mask.clone()),
-        shortest_s: mask.map_or(usual.shortest_s, |args| args.shortest),
+        shortest_s: mask.map_or(default.shortest_s, |args| args.shortest),
     })
 }
 

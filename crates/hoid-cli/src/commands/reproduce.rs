@@ -7,7 +7,7 @@ use hoid::thesis::{
     reproduction::{CLAIMS, Reproduction, ReproductionEvent, items, reproduce},
 };
 
-use super::{places, study::stop_at_interrupt};
+use super::{output_paths, study::stop_at_interrupt};
 use crate::{args::ReproduceArgs, error::CliError, output};
 
 pub fn run(args: &ReproduceArgs) -> Result<(), CliError> {
@@ -23,7 +23,7 @@ pub fn run(args: &ReproduceArgs) -> Result<(), CliError> {
         output::print(&lines.collect::<String>())?;
         return Ok(());
     }
-    places::check(&[], &[], &[Some(&args.out)])?;
+    output_paths::check(&[], &[], &[Some(&args.out)])?;
     let wanted = Reproduction {
         only: args.only.clone(),
         replications: args.replications,

@@ -8,12 +8,12 @@ use hoid::numerics::statistics::root_mean_square;
 use hoid::report::numbers;
 use hoid::sim::{FamilySimulator, RunSeed, Simulator};
 
-use super::{places, scenario::chosen_scenario};
+use super::{output_paths, scenario::chosen_scenario};
 use crate::{args::SimulateArgs, error::CliError, output};
 
 pub fn run(args: &SimulateArgs) -> Result<(), CliError> {
     let inputs: Vec<&Path> = args.base.scenario.as_deref().into_iter().collect();
-    places::check(&inputs, &[Some(&args.out)], &[])?;
+    output_paths::check(&inputs, &[Some(&args.out)], &[])?;
     let run_seed = RunSeed {
         seed: args.seed,
         cell: args.cell,

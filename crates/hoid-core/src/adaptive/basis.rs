@@ -31,7 +31,7 @@
 use super::{
     f64x2::F64x2,
     signal_history::{Paired, paired},
-    sizes::{GAINS, DYNAMICS, LINEAR, SIGNALS, STATES},
+    sizes::{DYNAMICS, GAINS, LINEAR, SIGNALS, STATES},
 };
 
 /// Frequency at which each response has a gain of one, rad/s.

@@ -15,13 +15,13 @@
 use super::{
     basis::{Basis, Complex, Point, Regressors},
     blocks::Row,
+    f64x2::F64x2,
     last_blocks::LastBlocks,
     mixture::{ChangePrior, Mixture, NoiseScales, Segments},
     moments::Moments,
     noise::NoiseModel,
-    f64x2::F64x2,
     signal_history::{Paired, SignalHistory, paired},
-    sizes::{GAINS, DYNAMICS, LARGEST_ORDER, LINEAR, PARAMETERS, SIGNALS, STATES},
+    sizes::{DYNAMICS, GAINS, LARGEST_ORDER, LINEAR, PARAMETERS, SIGNALS, STATES},
     volatility::Volatility,
 };
 use crate::state::{State, visit_all};

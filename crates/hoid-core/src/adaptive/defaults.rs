@@ -146,7 +146,7 @@ impl DefaultOperator {
                 least: blocks(BEFORE_S[0]),
                 most: blocks(BEFORE_S[1]),
                 threshold: self.threshold(),
-                held: [OMEGA_RAD_S * SPREAD[0], ZETA * SPREAD[1], DELAY_CHANGE_S],
+                dynamics: [OMEGA_RAD_S * SPREAD[0], ZETA * SPREAD[1], DELAY_CHANGE_S],
                 refractory: blocks(REFRACTORY_S) as u64,
             },
         }

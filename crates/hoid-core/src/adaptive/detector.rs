@@ -30,10 +30,10 @@
 
 use super::{
     blocks::Block,
-    contrast::{MODEL_ONLY, Contrast, EMPIRICAL_SHARE},
+    contrast::{Contrast, EMPIRICAL_SHARE, MODEL_ONLY},
     difference::Difference,
     last_blocks::{BLOCK_S, BLOCKS, LastBlocks},
-    sizes::{GAINS, DYNAMICS, LINEAR},
+    sizes::{DYNAMICS, GAINS, LINEAR},
 };
 
 /// Expectation of the logarithm of a chi-square with one pair of degrees of freedom, `ln 2 - gamma`.
@@ -67,7 +67,7 @@ pub struct Detection {
     /// What a difference must have against chance, nats.
     pub threshold: f64,
     /// Standard deviations that are supposed of what is held, in its units.
-    pub held: [f64; DYNAMICS],
+    pub dynamics: [f64; DYNAMICS],
     /// Blocks after a change in which none is declared.
     pub refractory: u64,
 }
@@ -143,7 +143,7 @@ impl Detector {
         let [short, long] = settings.recent;
         let present = short > 0 && short <= long;
         let room = present && settings.least > 0 && settings.least <= settings.most && long + settings.most <= BLOCKS;
-        let sound = settings.held.iter().all(|d| *d > 0.0 && d.is_finite());
+        let sound = settings.dynamics.iter().all(|d| *d > 0.0 && d.is_finite());
         (room && sound).then_some(Self {
             settings,
             statistics: [Statistic::new(); 2],
@@ -156,9 +156,9 @@ impl Detector {
         })
     }
 
-    /// Looks at blocks of which the last is new. `held` is where what is held is now, about the basis of the
+    /// Looks at blocks of which the last is new. `dynamics` is where what is held is now, about the basis of the
     /// blocks.
-    pub(super) fn test(&mut self, last: &LastBlocks, held: [f64; DYNAMICS]) {
+    pub(super) fn test(&mut self, last: &LastBlocks, dynamics: [f64; DYNAMICS]) {
         self.declared = false;
         self.since += 1;
         // What was before the last change is no measure of what comes.
@@ -168,7 +168,7 @@ impl Detector {
             .min(usize::try_from(self.since).unwrap_or(BLOCKS) + self.ago);
         let blocks = &last.all()[last.all().len() - known..];
         for present in 0..self.statistics.len() {
-            match self.wald_statistic(blocks, last.fresh(), held, present) {
+            match self.wald_statistic(blocks, last.fresh(), dynamics, present) {
                 Some(t) => self.statistics[present].take(t),
                 None => self.statistics[present].log_significance = 0.0,
             }
@@ -177,12 +177,12 @@ impl Detector {
             self.declared = true;
             self.since = 0;
             let [_, long] = self.settings.recent;
-            self.locate_change(blocks, held, long.min(last.fresh()));
+            self.locate_change(blocks, dynamics, long.min(last.fresh()));
         }
     }
 
     /// T of a present; `None` where there is too little to compare.
-    fn wald_statistic(&self, blocks: &[Block], fresh: usize, held: [f64; DYNAMICS], present: usize) -> Option<f64> {
+    fn wald_statistic(&self, blocks: &[Block], fresh: usize, dynamics: [f64; DYNAMICS], present: usize) -> Option<f64> {
         let Detection {
             recent, least, most, ..
         } = self.settings;
@@ -193,19 +193,20 @@ impl Detector {
             return None;
         }
         let sides = [&blocks[before.saturating_sub(most)..before], &blocks[now..]];
-        self.compare(sides, EMPIRICAL_SHARE, held)?.wald_statistic(OPERATOR_STATES)
+        self.compare(sides, EMPIRICAL_SHARE, dynamics)?
+            .wald_statistic(OPERATOR_STATES)
     }
 
     /// The change is supposed to be at the block that leaves least where all is free before it and behind it.
     /// What changed is told in the metric of the noise model, whose covariance is raised by how much more the
     /// scores show in the mean between the halves of what was before: that of the scores alone is too uncertain to
     /// tell gains from a delay, and those behind the change have the change in them.
-    fn locate_change(&mut self, blocks: &[Block], held: [f64; DYNAMICS], recent: usize) {
+    fn locate_change(&mut self, blocks: &[Block], dynamics: [f64; DYNAMICS], recent: usize) {
         let mut best: Option<Contrast> = None;
         self.ago = recent.min(blocks.len().saturating_sub(1));
         for after in 1..=self.ago {
             let (past, present) = blocks.split_at(blocks.len() - after);
-            let Some(contrast) = self.compare([past, present], MODEL_ONLY, held) else {
+            let Some(contrast) = self.compare([past, present], MODEL_ONLY, dynamics) else {
                 continue;
             };
             if best.is_none_or(|best| contrast.left < best.left) {
@@ -214,7 +215,7 @@ impl Detector {
         }
         let (past, present) = blocks.split_at(blocks.len() - self.ago);
         let halves = past.split_at(past.len() / 2);
-        let [by_model, shown] = [MODEL_ONLY, EMPIRICAL_SHARE].map(|w| self.compare([halves.0, halves.1], w, held));
+        let [by_model, shown] = [MODEL_ONLY, EMPIRICAL_SHARE].map(|w| self.compare([halves.0, halves.1], w, dynamics));
         let dispersion = shown.zip(by_model).and_then(|(shown, model)| shown.dispersion(&model));
         self.declared_contrast = best.unwrap_or_default().times(dispersion.unwrap_or(1.0).max(1.0));
         self.innovation_variances = [past, present].map(|side| Block::of(side).innovation_variance());
@@ -222,9 +223,9 @@ impl Detector {
     }
 
     /// Gains, level and what is held, now against before.
-    fn compare(&self, sides: [&[Block]; 2], shown: f64, held: [f64; DYNAMICS]) -> Option<Contrast> {
-        let deviations = self.settings.held;
-        Contrast::between(sides, shown, |sum| sum.with_prior(held, deviations))
+    fn compare(&self, sides: [&[Block]; 2], shown: f64, dynamics: [f64; DYNAMICS]) -> Option<Contrast> {
+        let deviations = self.settings.dynamics;
+        Contrast::between(sides, shown, |sum| sum.with_prior(dynamics, deviations))
     }
 
     /// How long ago the change that was declared last had been, when it was declared, s.

@@ -19,7 +19,7 @@ use super::{
     noise::NoiseModel,
     prior::AdaptivePrior,
     saturation::Saturation,
-    sizes::{GAINS, DYNAMICS, LINEAR, STATES},
+    sizes::{DYNAMICS, GAINS, LINEAR, STATES},
 };
 use crate::{
     recursion::Step,
@@ -200,11 +200,11 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
                 Mixture::at(changes, state, covariance, known.variance)
             }
             None => {
-                let held = match self.replays_anything() {
+                let dynamics = match self.replays_anything() {
                     true => trusted(point),
                     false => variances(&self.prior),
                 };
-                Mixture::new(changes, &basis, &scales, held)
+                Mixture::new(changes, &basis, &scales, dynamics)
             }
         };
         let start = self.history.samples().saturating_sub(self.window());
@@ -349,8 +349,8 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
 
     /// What the detector says of the last blocks.
     fn test_for_change(&mut self) {
-        let held = core::array::from_fn(|j| self.live.mixture.mean()[LINEAR + j]);
-        self.detector.test(&self.live.blocks, held);
+        let dynamics = core::array::from_fn(|j| self.live.mixture.mean()[LINEAR + j]);
+        self.detector.test(&self.live.blocks, dynamics);
     }
 
     /// Starts again where a signal has overflowed.

@@ -25,7 +25,13 @@ pub(super) enum Use {
 }
 
 impl Use {
-    const ALL: [Self; 5] = [Self::FilterOnly, Self::Update, Self::Missing, Self::AtUpperLimit, Self::AtLowerLimit];
+    const ALL: [Self; 5] = [
+        Self::FilterOnly,
+        Self::Update,
+        Self::Missing,
+        Self::AtUpperLimit,
+        Self::AtLowerLimit,
+    ];
 
     fn of(number: f64) -> Self {
         Self::ALL.get(number as usize).copied().unwrap_or(Self::FilterOnly)

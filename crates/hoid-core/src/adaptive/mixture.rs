@@ -24,9 +24,9 @@ use hoid_numerics::elimination;
 
 use super::{
     basis::Basis,
-    hypothesis::{Covariance, Hypothesis, BlockResidual, Segment},
+    hypothesis::{BlockResidual, Covariance, Hypothesis, Segment},
     moments::Moments,
-    sizes::{CLASSES, GAINS, DYNAMICS, HYPOTHESES, LINEAR, SEGMENTS, STATES},
+    sizes::{CLASSES, DYNAMICS, GAINS, HYPOTHESES, LINEAR, SEGMENTS, STATES},
 };
 
 /// What is supposed of changes. Gains are in units of |Y| at the reference frequency.
@@ -110,11 +110,11 @@ pub(super) struct Mixture {
 crate::state!([] Mixture { hypotheses, count, blocks, mean });
 
 impl Mixture {
-    /// One hypothesis of each class about a state. `held` are the variances of the corrections.
-    pub fn new(prior: &ChangePrior, basis: &Basis, scales: &NoiseScales, held: [f64; DYNAMICS]) -> Self {
+    /// One hypothesis of each class about a state. `dynamics` are the variances of the corrections.
+    pub fn new(prior: &ChangePrior, basis: &Basis, scales: &NoiseScales, dynamics: [f64; DYNAMICS]) -> Self {
         let mut p = [[0.0; STATES]; STATES];
         p[GAINS][GAINS] = scales.size * scales.size;
-        for (j, variance) in held.into_iter().enumerate() {
+        for (j, variance) in dynamics.into_iter().enumerate() {
             p[LINEAR + j][LINEAR + j] = variance;
         }
         Self::of(prior, |class| {
@@ -495,7 +495,7 @@ fn inflate_gains(p: &mut Covariance, basis: &Basis, class: usize, [gain, lead]: 
 mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
-    use crate::adaptive::{basis::Point, sizes::SIGNALS, defaults::DefaultOperator};
+    use crate::adaptive::{basis::Point, defaults::DefaultOperator, sizes::SIGNALS};
 
     /// The sample of the change: two before the end of block 56.
     const CHANGE: usize = 32 * 56 - 2;

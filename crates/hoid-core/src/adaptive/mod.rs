@@ -72,30 +72,30 @@
 
 pub mod basis;
 pub mod contrast;
+pub mod defaults;
 pub mod detector;
 pub mod difference;
 pub mod initial_estimate;
 pub mod mixture;
 pub mod noise;
-pub mod defaults;
 
 mod alternatives;
 mod blocks;
 mod candidate;
+mod f64x2;
 mod filter;
 mod history;
 mod hypothesis;
 mod last_blocks;
 mod moments;
 mod operator;
-mod f64x2;
-mod signal_history;
 mod prior;
 mod saturation;
+mod signal_history;
 mod sizes;
 mod volatility;
 
 pub use filter::{AdaptiveFilter, REPLAYED, errors_needed, least_memory, memory_needed};
 pub use operator::through;
 pub use prior::AdaptivePrior;
-pub use sizes::{GAINS, DYNAMICS, HYPOTHESES, LARGEST_ORDER, LINEAR, PARAMETERS, SIGNALS, STARTS, STATES};
+pub use sizes::{DYNAMICS, GAINS, HYPOTHESES, LARGEST_ORDER, LINEAR, PARAMETERS, SIGNALS, STARTS, STATES};

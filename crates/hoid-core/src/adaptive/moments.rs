@@ -15,7 +15,7 @@
 
 use super::{
     basis::Basis,
-    sizes::{GAINS, DYNAMICS, INPUTS, LINEAR, SIGNALS, STATES},
+    sizes::{DYNAMICS, GAINS, INPUTS, LINEAR, SIGNALS, STATES},
 };
 
 const ALL: usize = INPUTS + 1;

@@ -15,7 +15,7 @@
 
 use hoid_numerics::{cholesky, elimination};
 
-use super::{f64x2::F64x2, sizes::LARGEST_ORDER, defaults::ORDER};
+use super::{defaults::ORDER, f64x2::F64x2, sizes::LARGEST_ORDER};
 
 const WIDTH: usize = LARGEST_ORDER + 1;
 /// The same in pairs, a whole number of them.

@@ -12,8 +12,8 @@
 use super::{
     AdaptiveFilter,
     candidate::NEAR_RAD_S,
-    sizes::{GAINS, DYNAMICS, LINEAR, PARAMETERS, STATES},
     defaults::HOLD_S,
+    sizes::{DYNAMICS, GAINS, LINEAR, PARAMETERS, STATES},
 };
 
 /// In the first seconds the noise model has not been seen for long, and the errors of what it whitens are

@@ -48,7 +48,7 @@ const LIMIT: f64 = 2.5;
 const HEAVIEST: f64 = 12.0;
 /// Largest mean magnitude, in units of the inner quantile, of a signal that moves as usual: Gaussian errors have
 /// .49 and Laplacian ones .43, and those of a signal five times as large 2.4 and 2.2.
-const USUAL: f64 = 1.3;
+const TYPICAL: f64 = 1.3;
 /// Blocks over which the tails are averaged.
 const AVERAGED: u32 = 20;
 /// Inner quantile over the outer one, of Gaussian errors.
@@ -134,7 +134,7 @@ impl ChannelGuard {
 
     /// First values of quantiles that are not known, from the mean magnitudes of the differences; they are
     /// learnt from then on, and nothing is an outlier until [`ChannelGuard::watch`].
-    pub fn begin_learning(&mut self, means: [f64; ORDERS]) {
+    pub fn start_learning(&mut self, means: [f64; ORDERS]) {
         for (j, mean) in means.into_iter().enumerate() {
             if self.quantiles[j] <= 0.0 {
                 self.quantiles[j] = QUANTILE_OVER_MEAN * mean;
@@ -174,7 +174,7 @@ impl ChannelGuard {
             }
         }
         let counted = count as f64 - self.order as f64 - 1.0;
-        counted > 0.0 && sum <= USUAL * self.inner[self.order] * counted
+        counted > 0.0 && sum <= TYPICAL * self.inner[self.order] * counted
     }
 
     /// The first difference from which on a sample is a jump.
@@ -521,10 +521,10 @@ mod tests {
     fn while_quantiles_are_learnt_nothing_is_held_back() {
         let mut channel = ChannelGuard::new(0.01);
         channel.follow(0.0, &[0.0; ORDERS]);
-        channel.begin_learning([0.0; ORDERS]);
+        channel.start_learning([0.0; ORDERS]);
         channel.watch();
         assert!(!channel.is_known());
-        channel.begin_learning([0.1; ORDERS]);
+        channel.start_learning([0.1; ORDERS]);
         assert!(!channel.is_outlier(&channel.errors(1e9)));
         channel.watch();
         assert!(channel.is_known() && channel.is_outlier(&channel.errors(1e9)));

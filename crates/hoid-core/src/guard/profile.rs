@@ -169,7 +169,7 @@ pub enum Trouble {
 
 impl Trouble {
     /// True for what may have become usual; nobody tracks in silence.
-    pub fn may_be_the_new_usual(self) -> bool {
+    pub fn may_be_the_new_level(self) -> bool {
         !matches!(self, Self::FrozenInput | Self::FrozenOutput | Self::Idle)
     }
 
@@ -189,7 +189,7 @@ impl Trouble {
 /// The long-run values, and how long something has been wrong.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Profile {
-    usual: Block,
+    typical: Block,
     /// Blocks that it was learnt from.
     blocks: u32,
     frozen_u: u32,
@@ -205,7 +205,7 @@ pub struct Profile {
     innovation: f64,
 }
 
-crate::state!([] Profile { usual, blocks, frozen_u, idle, larger, rescaled, swapped, misfits, ratio, ratios, innovation });
+crate::state!([] Profile { typical, blocks, frozen_u, idle, larger, rescaled, swapped, misfits, ratio, ratios, innovation });
 
 impl Default for Profile {
     fn default() -> Self {
@@ -217,7 +217,7 @@ impl Profile {
     /// Nothing is known.
     pub fn new() -> Self {
         Self {
-            usual: Block::default(),
+            typical: Block::default(),
             blocks: 0,
             frozen_u: 0,
             idle: 0,
@@ -232,9 +232,9 @@ impl Profile {
     }
 
     /// With long-run values that are known.
-    pub fn of(usual: &Block) -> Self {
+    pub fn of(typical: &Block) -> Self {
         Self {
-            usual: *usual,
+            typical: *typical,
             blocks: LEARNT,
             ..Self::new()
         }
@@ -269,18 +269,18 @@ impl Profile {
     }
 
     /// The long-run values.
-    pub fn usual(&self) -> &Block {
-        &self.usual
+    pub fn typical(&self) -> &Block {
+        &self.typical
     }
 
     /// Lets the means of a sound block enter the long-run values.
-    pub fn learn(&mut self, block: &Block) {
+    pub fn update(&mut self, block: &Block) {
         let known = self.is_known();
         self.blocks = self.blocks.saturating_add(1);
         let weight = if known { WEIGHT } else { 1.0 / f64::from(self.blocks) };
-        let toward = |usual: &mut f64, found: f64, least: f64, most: f64| {
+        let toward = |typical: &mut f64, found: f64, least: f64, most: f64| {
             let bounded = if known { within(found, [least, most]) } else { found };
-            *usual += weight * (bounded - *usual);
+            *typical += weight * (bounded - *typical);
         };
         // Signals whose squares underflow have no ratio.
         let sound = |ratio: &f64| ratio.is_finite() && block.innovation.is_finite();
@@ -303,14 +303,19 @@ impl Profile {
             self.innovation += weight * (bounded - self.innovation);
         }
         for c in 0..CHANNELS {
-            for (usual, found) in self.usual.differences[c].iter_mut().zip(block.differences[c]) {
-                let now = *usual;
-                toward(usual, found, 0.5 * now, 2.0 * now);
+            for (typical, found) in self.typical.differences[c].iter_mut().zip(block.differences[c]) {
+                let now = *typical;
+                toward(typical, found, 0.5 * now, 2.0 * now);
             }
-            let size = self.usual.magnitude[c];
-            toward(&mut self.usual.magnitude[c], block.magnitude[c], 0.5 * size, 2.0 * size);
-            let mean = self.usual.mean[c];
-            toward(&mut self.usual.mean[c], block.mean[c], mean - size, mean + size);
+            let size = self.typical.magnitude[c];
+            toward(
+                &mut self.typical.magnitude[c],
+                block.magnitude[c],
+                0.5 * size,
+                2.0 * size,
+            );
+            let mean = self.typical.mean[c];
+            toward(&mut self.typical.mean[c], block.mean[c], mean - size, mean + size);
         }
     }
 
@@ -329,16 +334,16 @@ impl Profile {
             return None;
         }
         // A channel that never moved (there is no input, or it was never recorded) is not frozen.
-        let below = |found: f64, share: f64, usual: f64| usual > 0.0 && found <= share * usual;
-        let still = |c: usize| below(block.differences[c][0], STILL, self.usual.differences[c][0]);
-        let silent = |c: usize| below(block.range[c][1] - block.range[c][0], IDLE, self.usual.magnitude[c]);
+        let below = |found: f64, share: f64, typical: f64| typical > 0.0 && found <= share * typical;
+        let still = |c: usize| below(block.differences[c][0], STILL, self.typical.differences[c][0]);
+        let silent = |c: usize| below(block.range[c][1] - block.range[c][0], IDLE, self.typical.magnitude[c]);
         let count = |run: u32, is: bool| if is { run.saturating_add(1) } else { 0 };
         let frozen_e = still(0);
         self.frozen_u = count(self.frozen_u, still(1));
         self.idle = count(self.idle, silent(0) && silent(1));
         let grown = |c: usize, j: usize| {
-            let usual = self.usual.differences[c][j];
-            usual > 0.0 && block.differences[c][j] > LARGER * usual
+            let typical = self.typical.differences[c][j];
+            typical > 0.0 && block.differences[c][j] > LARGER * typical
         };
         self.larger = count(self.larger, [0, 2].iter().all(|j| grown(0, *j) && grown(1, *j)));
         let ratios = [0, 1].map(|c| self.ratios_of(block, c));
@@ -380,8 +385,8 @@ impl Profile {
     /// The least and the largest ratio of the differences of a channel to what is usual.
     fn ratios_of(&self, block: &Block, c: usize) -> [f64; 2] {
         let mut ends = [f64::INFINITY, 0.0];
-        for (found, usual) in block.differences[c].iter().zip(&self.usual.differences[c]) {
-            let ratio = if found == usual { 1.0 } else { found / usual };
+        for (found, typical) in block.differences[c].iter().zip(&self.typical.differences[c]) {
+            let ratio = if found == typical { 1.0 } else { found / typical };
             ends = [ends[0].min(ratio), ends[1].max(ratio)];
         }
         ends
@@ -390,14 +395,14 @@ impl Profile {
     /// Distance of a block from the long-run values, those of `of[c]` for channel c.
     fn distance(&self, block: &Block, of: [usize; CHANNELS]) -> f64 {
         let mut sum = 0.0;
-        for (c, usual) in of.into_iter().enumerate() {
+        for (c, typical) in of.into_iter().enumerate() {
             for j in [0, 2] {
-                let (found, usual) = (block.differences[c][j], self.usual.differences[usual][j]);
+                let (found, typical) = (block.differences[c][j], self.typical.differences[typical][j]);
                 // Zero against zero is no difference.
-                let log = if found == usual {
+                let log = if found == typical {
                     0.0
                 } else {
-                    libm::log(found / usual).abs()
+                    libm::log(found / typical).abs()
                 };
                 sum += if log < LARGEST_LOG { log } else { LARGEST_LOG };
             }
@@ -426,9 +431,9 @@ mod tests {
     fn known() -> Profile {
         let mut profile = Profile::new();
         for _ in 0..20 {
-            let usual = block([0.02, 0.1], [0.1, 1.1]);
-            assert_eq!(profile.judge(&usual, false), None);
-            profile.learn(&usual);
+            let typical = block([0.02, 0.1], [0.1, 1.1]);
+            assert_eq!(profile.judge(&typical, false), None);
+            profile.update(&typical);
         }
         profile
     }
@@ -442,14 +447,14 @@ mod tests {
                 innovation,
                 ..block([0.02, 0.1], [0.1, 1.1])
             };
-            profile.learn(&found);
+            profile.update(&found);
             assert!(profile.ratio.is_finite() && profile.innovation.is_finite());
         }
     }
 
     #[test]
     fn each_trouble_has_its_name_and_ends() {
-        let usual = block([0.02, 0.1], [0.1, 1.1]);
+        let typical = block([0.02, 0.1], [0.1, 1.1]);
         let cases = [
             (block([0.0, 0.1], [0.1, 1.1]), Trouble::FrozenInput, 1),
             (block([0.02, 0.0], [0.1, 1.1]), Trouble::FrozenOutput, 3),
@@ -461,7 +466,7 @@ mod tests {
             (
                 Block {
                     innovation: 1.0,
-                    ..usual
+                    ..typical
                 },
                 Trouble::Misfit,
                 2,
@@ -473,7 +478,7 @@ mod tests {
                 let found = profile.judge(&bad, false);
                 assert_eq!(found, (n >= after).then_some(trouble), "{n} {trouble:?}");
             }
-            let left = (0..30).find(|_| profile.judge(&usual, false).is_none());
+            let left = (0..30).find(|_| profile.judge(&typical, false).is_none());
             assert!(left.is_some_and(|n| n <= 12), "{trouble:?}: {left:?}");
         }
     }
@@ -506,10 +511,10 @@ mod tests {
     #[test]
     fn a_block_moves_the_long_run_values_by_a_sixtieth() {
         let mut profile = known();
-        let before = *profile.usual();
-        profile.learn(&block([20.0, 100.0], [0.1, 1.1]));
+        let before = *profile.typical();
+        profile.update(&block([20.0, 100.0], [0.1, 1.1]));
         for c in 0..CHANNELS {
-            let ratio = profile.usual().differences[c][0] / before.differences[c][0];
+            let ratio = profile.typical().differences[c][0] / before.differences[c][0];
             assert!((1.0..1.02).contains(&ratio), "{ratio}");
         }
     }
@@ -521,7 +526,7 @@ mod tests {
         for n in 0..200 {
             let found = block([size, size], [0.9, 0.9]);
             assert_eq!(profile.judge(&found, false), None, "{n}");
-            profile.learn(&found);
+            profile.update(&found);
             size *= if n % 7 < 4 { 1.5 } else { 0.6 };
         }
     }

@@ -10,7 +10,7 @@ use super::{
     contrast::{Contrast, Resolved, conditions_of, contrasts},
     d_z,
     factor::Factor,
-    group_estimates::Known,
+    group_estimates::EstimatedValue,
     hedges_g,
     learning::Practice,
     meta_mean, meta_regression,
@@ -50,7 +50,7 @@ pub struct Comparing {
     pub factors: Vec<Factor>,
     /// Where they vary; found from the group where it is not said.
     pub variation: Option<Variation>,
-    /// What is compared; [`Quantity::usual`], as far as it is there, where there is nothing.
+    /// What is compared; [`Quantity::defaults`], as far as it is there, where there is nothing.
     pub of: Vec<Quantity>,
     /// What is taken out of the estimates.
     pub covariate: Option<Covariate>,
@@ -77,7 +77,7 @@ impl Comparing {
         let factors: Vec<Resolved> = asked.iter().map(resolve).collect::<Result<_, _>>()?;
         let contrasts = contrasts(&factors, group)?;
         let quantities = match self.of.is_empty() {
-            true => Quantity::usual(),
+            true => Quantity::defaults(),
             false => self.of.clone(),
         };
         if !group.has_runs() {
@@ -177,7 +177,7 @@ struct Work<'a> {
 }
 
 /// The estimate of a cell, or why there is none, and its change a run.
-type OfCell = (String, String, Result<(Known, Option<Coefficient>), String>);
+type OfCell = (String, String, Result<(EstimatedValue, Option<Coefficient>), String>);
 
 impl Work<'_> {
     fn compare(&mut self, quantity: &Quantity, contrasts: &[Contrast]) {
@@ -207,7 +207,7 @@ impl Work<'_> {
                     None => Ok((known, None)),
                     Some(practice) => {
                         let [at_middle, slope] = practice.of_cell(self.group, cell, quantity)?;
-                        let known = Known {
+                        let known = EstimatedValue {
                             value: at_middle.value,
                             standard_error: Some(at_middle.standard_error),
                             ..known
@@ -304,7 +304,7 @@ impl Work<'_> {
             ));
         }
         let own = self.result.estimates.iter().filter(|e| e.quantity == *quantity);
-        let mut places: Vec<(String, String, Vec<Known>)> = Vec::new();
+        let mut places: Vec<(String, String, Vec<EstimatedValue>)> = Vec::new();
         for e in own {
             let known = known_of(e);
             match places.iter_mut().find(|(c, g, _)| (c, g) == (&e.condition, &e.group)) {
@@ -328,11 +328,11 @@ impl Work<'_> {
     }
 
     fn learning(&mut self, quantity: &Quantity, cells: &[OfCell]) {
-        let slopes = |condition: Option<&String>| -> Vec<Known> {
+        let slopes = |condition: Option<&String>| -> Vec<EstimatedValue> {
             let of = cells
                 .iter()
                 .filter(|(_, c, _)| condition.is_none_or(|condition| condition == c));
-            let slope = |c: &Coefficient| Known {
+            let slope = |c: &Coefficient| EstimatedValue {
                 value: c.value,
                 standard_error: Some(c.standard_error),
                 determined: true,
@@ -358,7 +358,7 @@ impl Work<'_> {
     /// One difference, of the people who have all that it takes.
     fn difference(&mut self, quantity: &Quantity, contrast: &Contrast, cells: &[OfCell]) {
         let mut people: Vec<(String, usize)> = Vec::new();
-        let mut of: Vec<Known> = Vec::new();
+        let mut of: Vec<EstimatedValue> = Vec::new();
         for (subject, weights, group) in &contrast.people {
             let mut sum = known(0.0, Some(0.0));
             let mut whole = true;
@@ -473,19 +473,19 @@ fn fitted(
 }
 
 /// With the squares of the errors; where somebody has none each counts the same.
-fn observations(all: &[Known]) -> Vec<Observation> {
+fn observations(all: &[EstimatedValue]) -> Vec<Observation> {
     let known = all
         .iter()
         .all(|k| k.standard_error.is_some_and(|e| e > 0.0 && e.is_finite()));
-    let one = |k: &Known| Observation {
+    let one = |k: &EstimatedValue| Observation {
         value: k.value,
         variance: k.standard_error.filter(|_| known).map_or(0.0, |e| e * e),
     };
     all.iter().map(one).collect()
 }
 
-fn known(value: f64, standard_error: Option<f64>) -> Known {
-    Known {
+fn known(value: f64, standard_error: Option<f64>) -> EstimatedValue {
+    EstimatedValue {
         value,
         standard_error,
         determined: true,
@@ -494,7 +494,7 @@ fn known(value: f64, standard_error: Option<f64>) -> Known {
     }
 }
 
-fn known_of(e: &PersonEstimate) -> Known {
+fn known_of(e: &PersonEstimate) -> EstimatedValue {
     known(e.value, e.standard_error)
 }
 

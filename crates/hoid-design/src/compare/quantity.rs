@@ -32,7 +32,7 @@ pub enum Quantity {
 
 impl Quantity {
     /// What is compared where nothing is asked for.
-    pub fn usual() -> Vec<Self> {
+    pub fn defaults() -> Vec<Self> {
         vec![Self::Crossover, Self::PhaseMargin, Self::Parameter(DELAY.to_owned())]
     }
 

@@ -7,8 +7,8 @@ use std::{
     slice,
 };
 
-use super::{given::Done, instance::Instance};
-use crate::status::said;
+use super::{instance::Instance, values::Done};
+use crate::status::panic_message;
 
 /// Statuses, of both interfaces.
 pub(super) const OK: i32 = 0;
@@ -80,7 +80,7 @@ pub struct Component {
 /// `logger` is that of the importer.
 pub(super) unsafe fn made(name: &str, logger: Logger, instance: impl FnOnce() -> Done<Instance>) -> *mut Component {
     let name = CString::new(name.replace('\0', " ")).unwrap_or_default();
-    let made = catch_unwind(AssertUnwindSafe(instance)).unwrap_or_else(|panic| Err(said(&*panic)));
+    let made = catch_unwind(AssertUnwindSafe(instance)).unwrap_or_else(|panic| Err(panic_message(&*panic)));
     match made {
         Ok(instance) => Box::into_raw(Box::new(Component {
             instance,
@@ -127,7 +127,7 @@ pub(super) unsafe fn with(component: *mut Component, call: impl FnOnce(&mut Inst
         Ok(Err(message)) => (ERROR, message),
         Err(panic) => {
             component.is_broken = true;
-            (FATAL, said(&*panic))
+            (FATAL, panic_message(&*panic))
         }
     };
     // SAFETY: the logger is that of the importer.

@@ -11,8 +11,8 @@ use hoid_io::fmu::FmuStart;
 
 use super::{
     component::{Component, ERROR, Fmi2Logger, Logger, folder, free, list, list_mut, made, with, words},
-    given::Done,
     instance::Instance,
+    values::Done,
 };
 
 /// `fmi2CallbackFunctions`; memory is allocated by Rust.

@@ -9,8 +9,8 @@ use std::{ffi::CString, fs, path::Path};
 use hoid_io::fmu::{FMU_SETTINGS, FmuKind, FmuSettings, FmuStart, FmuVariable, Role};
 
 use super::{
-    given::{Done, Given},
     model::Model,
+    values::{Done, VariableValues},
 };
 
 /// Share of the sample time by which a time may be off.
@@ -159,8 +159,8 @@ impl Instance {
     }
 
     /// What stands for the parameters and inputs.
-    fn given(&self) -> Given<'_> {
-        Given {
+    fn given(&self) -> VariableValues<'_> {
+        VariableValues {
             variables: &self.variables,
             values: &self.values,
         }
@@ -177,7 +177,7 @@ impl Instance {
 
     /// Goes from a time on by a step, both in s.
     pub fn step(&mut self, t_s: f64, step_s: f64) -> Done {
-        let given = Given {
+        let given = VariableValues {
             variables: &self.variables,
             values: &self.values,
         };

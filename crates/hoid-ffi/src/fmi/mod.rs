@@ -16,8 +16,8 @@
 mod component;
 pub mod fmi2;
 pub mod fmi3;
-mod given;
 mod instance;
 mod model;
 mod operator;
 pub mod state;
+mod values;

@@ -5,8 +5,8 @@ use hoid_track::Sample;
 use serde_json::{Map, Value};
 
 use super::{
-    given::{Done, Given},
     operator::OperatorModel,
+    values::{Done, VariableValues},
 };
 use crate::{
     packed::{as_bytes, as_numbers},
@@ -31,7 +31,7 @@ pub(super) struct TrackerModel {
 
 impl Model {
     /// Of the parameters, from a time in s on.
-    pub fn new(settings: &FmuSettings, given: &Given<'_>, start_s: f64) -> Done<Self> {
+    pub fn new(settings: &FmuSettings, given: &VariableValues<'_>, start_s: f64) -> Done<Self> {
         Ok(match settings.kind()? {
             FmuKind::Tracker => Self::Tracker(Box::new(TrackerModel::new(settings, given)?)),
             FmuKind::Operator => Self::Operator(Box::new(OperatorModel::new(settings, given, start_s)?)),
@@ -52,7 +52,7 @@ impl Model {
     /// The model of the same parameters that [`Model::saved`] was asked of.
     pub fn restored(
         settings: &FmuSettings,
-        given: &Given<'_>,
+        given: &VariableValues<'_>,
         start_s: f64,
         beside: &[f64],
         bytes: &[u8],
@@ -95,7 +95,7 @@ impl Model {
     }
 
     /// Takes the sample at a time in s.
-    pub fn take(&mut self, given: &Given<'_>, t_s: f64) {
+    pub fn take(&mut self, given: &VariableValues<'_>, t_s: f64) {
         match self {
             Self::Tracker(tracker) => tracker.take(given, t_s),
             Self::Operator(operator) => operator.take(given.real("e")),
@@ -125,7 +125,7 @@ impl Model {
 }
 
 impl TrackerModel {
-    fn new(settings: &FmuSettings, given: &Given<'_>) -> Done<Self> {
+    fn new(settings: &FmuSettings, given: &VariableValues<'_>) -> Done<Self> {
         let text = given.text("options");
         let mut options: Map<String, Value> = serde_json::from_str(if text.is_empty() { "{}" } else { text })
             .map_err(|error| format!("options: no object in JSON ({error})"))?;
@@ -157,7 +157,7 @@ impl TrackerModel {
         })
     }
 
-    fn take(&mut self, given: &Given<'_>, t_s: f64) {
+    fn take(&mut self, given: &VariableValues<'_>, t_s: f64) {
         let reference = given.real("f_t");
         let sample = Sample {
             e: given.real("e"),

@@ -3,7 +3,7 @@
 use hoid_io::{AnyScenario, fmu::FmuSettings, parse_any_scenario};
 use hoid_sim::{FamilyOperatorRun, FamilySimulator, OperatorRun, RunSeed, Simulator};
 
-use super::given::{Done, Given};
+use super::values::{Done, VariableValues};
 
 /// An operator that is at work.
 pub(super) struct OperatorModel {
@@ -17,7 +17,7 @@ enum Run {
 }
 
 impl OperatorModel {
-    pub fn new(settings: &FmuSettings, given: &Given<'_>, start_s: f64) -> Done<Self> {
+    pub fn new(settings: &FmuSettings, given: &VariableValues<'_>, start_s: f64) -> Done<Self> {
         let text = settings.scenario.as_deref();
         let text = text.ok_or("the unit has no scenario; make it by hoid fmu --operator SCENARIO")?;
         let seed = RunSeed {

@@ -15,9 +15,9 @@ use serde_json::{Value, json};
 
 use super::{
     component::{Component, list, list_mut, with},
-    given::{Done, Given},
     instance::{Instance, Phase},
     model::Model,
+    values::{Done, VariableValues},
 };
 use crate::packed::{opened, packed};
 
@@ -80,7 +80,7 @@ impl Instance {
             beside => {
                 let beside = beside.as_array().ok_or_else(wrong)?;
                 let beside: Vec<f64> = beside.iter().map(number).collect::<Done<_>>()?;
-                let given = Given {
+                let given = VariableValues {
                     variables: &self.variables,
                     values: &values,
                 };

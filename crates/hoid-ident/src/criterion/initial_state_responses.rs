@@ -41,7 +41,7 @@ pub(crate) struct InitialStateResponses {
 }
 
 /// What the past of a record may have been.
-pub(crate) struct Past<'a> {
+pub(crate) struct InitialHistory<'a> {
     pub c: &'a [f64],
     /// The polynomial that whitens v together with C.
     pub d: &'a [f64],
@@ -63,8 +63,8 @@ impl InitialStateResponses {
     ///
     /// Any free response of 1/F is a combination of its impulse response `h` started at the first
     /// nf samples (that basis stays independent even where f_nf = 0).
-    pub fn of(past: &Past<'_>, rows: usize) -> Self {
-        let Past { c, d, f, lead, .. } = *past;
+    pub fn of(past: &InitialHistory<'_>, rows: usize) -> Self {
+        let InitialHistory { c, d, f, lead, .. } = *past;
         let mut columns: Vec<Vec<f64>> = Vec::new();
         let mut h = Vec::new();
         if !f.is_empty() {

@@ -7,7 +7,7 @@ use hoid_core::filter::divide;
 
 use super::{
     initial_state::InitialState,
-    initial_state_responses::{InitialStateResponses, Past},
+    initial_state_responses::{InitialHistory, InitialStateResponses},
     polynomials::{Block, Polynomials},
     prediction_error::{Criterion, Data},
     stationary_noise::StationaryNoise,
@@ -61,7 +61,7 @@ impl Criterion<'_> {
             if self.initial == InitialState::Backcast {
                 states.noise = StationaryNoise::of(parts.c, self.noise_poles(&parts));
             }
-            let past = Past {
+            let past = InitialHistory {
                 c: parts.c,
                 d: parts.d,
                 f: parts.f,

@@ -2,7 +2,7 @@ use hoid_model::Orders;
 
 use super::{
     Criterion, Data, InitialState, Workspace, first_residual,
-    initial_state_responses::{InitialStateResponses, Past},
+    initial_state_responses::{InitialHistory, InitialStateResponses},
     polynomials::{Block, Polynomials},
     signals::EliminatedStates,
 };
@@ -184,7 +184,7 @@ fn estimated_states_leave_nothing_to_gain() {
         let c = criterion(orders, vec![data], InitialState::Estimate);
         let eps = c.residuals_of(&theta, 0, &mut Workspace::default());
         let parts = Polynomials::split(&orders, &theta);
-        let past = Past {
+        let past = InitialHistory {
             c: parts.c,
             d: parts.d,
             f: parts.f,

@@ -12,10 +12,10 @@ use super::{
     agreement::{Agreement, AgreementMethod, Side, agreement, with_level},
     choice::FormFigures,
     covariances::response_errors,
+    diagnostics::{DiagnosticInputs, LARGEST_RESPONSE_ERROR, findings},
     estimated::{Errors, Estimated, in_form, operator_of},
     instrumental::{Instrumental, InstrumentalFit},
     joint::with_lines,
-    judgement::{Judged, LARGEST_RESPONSE_ERROR, findings},
     line_fit::LineFit,
     lines::LineData,
     prediction::Prediction,
@@ -26,12 +26,12 @@ use super::{
 use crate::{
     IdentError, SearchOptions,
     criterion::{Criterion, Workspace},
-    frequency::DescribingFunction,
-    grey_box::parametrisation::Parametrisation,
-    judgement::{
+    diagnostics::{
         constancy::{Constancy, Direction, physical_blocks},
         residuals::ResidualMeasures,
     },
+    frequency::DescribingFunction,
+    grey_box::parametrisation::Parametrisation,
     optimize::minimise,
 };
 
@@ -131,7 +131,7 @@ impl<'a> Chosen<'_, 'a> {
         let residuals = residuals(fit, workspace);
         let of_delay = layout.delays().first().copied().unwrap_or(0);
         let all_parameters: Vec<_> = operators.iter().flat_map(|o| o.parameters.clone()).collect();
-        let verdict = Verdict::of(findings(&Judged {
+        let verdict = Verdict::of(findings(&DiagnosticInputs {
             termination: fit.minimum.termination,
             delay: (found.eta()[of_delay], layout.limits()[of_delay]),
             parameters: &all_parameters,

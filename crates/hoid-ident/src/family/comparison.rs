@@ -11,7 +11,7 @@ use hoid_numerics::statistics::upper_median;
 use super::{
     choice::{FormFigures, weigh},
     covariances::{self, Covariances},
-    judgement::MOST_DAMPED,
+    diagnostics::MOST_DAMPED,
     line_fit::LineFit,
     prediction::Prediction,
     prediction_fit::PredictionFit,

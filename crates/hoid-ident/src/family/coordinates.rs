@@ -42,7 +42,7 @@ pub(crate) fn limits(
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Grid {
     /// For people: the prior holds their neuromuscular system near to what is usual.
-    Usual,
+    Default,
     /// For a response that is known exactly, of whom it may be.
     Dense,
 }
@@ -100,7 +100,7 @@ mod tests {
         for form in Form::ALL {
             for neuromuscular in [true, false] {
                 let limits = limits(form, neuromuscular, (0.05, 0.6), SampleTime::HUNDREDTH);
-                let grid = start_grid(form, neuromuscular, &limits, Grid::Usual);
+                let grid = start_grid(form, neuromuscular, &limits, Grid::Default);
                 assert!(!grid.is_empty());
                 for start in grid {
                     assert_eq!(start.len(), limits.len());

@@ -5,7 +5,7 @@ use hoid_model::{FamilyOperator, NotConvertible, PolynomialModel, Structure, ope
 use super::{
     clusters::{ClusterKind, quantile},
     covariances::{self, Covariances},
-    parameter::{Known, Parameter},
+    parameter::{CoordinateEstimate, Parameter},
     prediction_fit::PredictionFit,
     profile::profile_interval,
     result::{OperatorInForm, OperatorOfRecord, WeighedForm, title},
@@ -115,7 +115,7 @@ impl Estimated {
             of_all
         });
         let limits: Vec<(f64, f64)> = places.iter().map(|&i| layout.limits()[i]).collect();
-        let known = Known {
+        let known = CoordinateEstimate {
             operator: &operator,
             covariance: of_parameters.as_deref(),
             prior_share: &places

@@ -56,7 +56,7 @@ impl FamilyEstimator {
             };
             describe_runs(records, &options).map(|found| found.function)
         });
-        self.fit_beside(records, described)
+        self.fit_with_response(records, described)
     }
 
     /// As [`FamilyEstimator::fit`], with a describing function that was made elsewhere, or the
@@ -65,7 +65,7 @@ impl FamilyEstimator {
     ///
     /// # Errors
     /// As [`FamilyEstimator::fit`].
-    pub fn fit_beside(
+    pub fn fit_with_response(
         &self,
         records: &[Record],
         describing: Option<Result<DescribingFunction, IdentError>>,
@@ -90,7 +90,7 @@ impl FamilyEstimator {
         let mut workspace = Workspace::of_thread();
         let mut starts = Vec::new();
         for &form in &forms {
-            starts.push(self.start(form, lines.as_ref(), (&response, Grid::Usual), &prediction)?);
+            starts.push(self.start(form, lines.as_ref(), (&response, Grid::Default), &prediction)?);
         }
         let noise = match self.with_little_noise(&prediction, &records, &mut starts, &mut workspace)? {
             Some(found) => {

@@ -72,8 +72,8 @@ impl Intersample {
         match (self, sample) {
             (Self::Auto, Some(sample)) => operator.interpolate_within(sample, sample_time),
             (Self::Auto, None) => operator.interpolate(sample_time),
-            (Self::Zoh, Some(sample)) => operator.hold_within(sample, sample_time),
-            (Self::Zoh, None) => operator.hold(sample_time),
+            (Self::Zoh, Some(sample)) => operator.zoh_within(sample, sample_time),
+            (Self::Zoh, None) => operator.zoh(sample_time),
             (Self::Foh, _) => {
                 let mut earlier = operator.coordinates().to_vec();
                 if let Some(delay) = earlier.last_mut() {

@@ -142,7 +142,7 @@ impl LoopShape {
         if self.is_stable() != Some(false) {
             return None;
         }
-        let at = self.in_words();
+        let at = self.as_text();
         Some(if self.distance.is_some_and(|distance| distance < CHI_SQUARED) {
             Finding::note(
                 "unstable-loop",
@@ -162,7 +162,7 @@ impl LoopShape {
     }
 
     /// Every crossover with its margin.
-    fn in_words(&self) -> String {
+    fn as_text(&self) -> String {
         let each = self.crossovers.iter();
         let each =
             each.map(|(omega, margin)| format!("{:.1} rad/s, phase margin {:.0} deg", omega.value, margin.value));
@@ -226,7 +226,11 @@ mod tests {
             (doubt.kind, doubt.severity),
             ("unstable-loop", hoid_model::Severity::Doubt)
         );
-        assert!(doubt.words.contains("is not stable (gain one at"), "{}", doubt.words);
+        assert!(
+            doubt.message.contains("is not stable (gain one at"),
+            "{}",
+            doubt.message
+        );
         // Large errors: it may be stable.
         let note = shape(resonant, Some(0.3)).doubt(1.0).unwrap();
         assert_eq!(note.severity, hoid_model::Severity::Note);

@@ -196,7 +196,7 @@ impl Search<'_, '_> {
         let (prediction, neuromuscular) = (self.prediction, self.neuromuscular);
         let criterion = prediction.criterion((form, neuromuscular), (0, 0));
         let limits = coordinates::limits(form, neuromuscular, prediction.delay_range_s, prediction.sample_time);
-        let mut grid = coordinates::start_grid(form, neuromuscular, &limits, Grid::Usual);
+        let mut grid = coordinates::start_grid(form, neuromuscular, &limits, Grid::Default);
         // The last coordinates of all forms are these.
         let tail = 1 + if neuromuscular { 2 } else { 0 };
         let of_other = &beside.1[beside.1.len() - tail..];
@@ -293,7 +293,7 @@ mod tests {
     #[test]
     fn an_operator_without_noise_is_found_with_its_level_and_its_course() {
         let ts = SampleTime::new(0.025).unwrap();
-        let held = fitted(record(&truth().hold(ts).unwrap(), 0.0));
+        let held = fitted(record(&truth().zoh(ts).unwrap(), 0.0));
         assert!(worst(&held, 0.243) < 1e-10);
         assert_eq!(
             (held.intersample, held.delay_if_straight_s(0)),
@@ -317,7 +317,7 @@ mod tests {
     #[test]
     fn a_little_noise_is_modelled_and_says_no_more_than_it_can() {
         let ts = SampleTime::new(0.025).unwrap();
-        let fit = fitted(record(&truth().hold(ts).unwrap(), 1e-3));
+        let fit = fitted(record(&truth().zoh(ts).unwrap(), 1e-3));
         let c = fit.operator(0).covariance.clone().unwrap();
         for (i, (x, t)) in fit.operator(0).operator.coordinates().iter().zip(X).enumerate() {
             let error = c[i * 6].sqrt();

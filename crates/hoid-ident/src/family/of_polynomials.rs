@@ -293,7 +293,7 @@ impl<'a> Nearest<'a> {
     /// Responses of the exact model with their derivatives along the coordinates.
     fn responses(&self, x: &[f64]) -> Option<Vec<(Complex64, Vec<Complex64>)>> {
         let operator = FamilyOperator::new(self.form, self.reading.neuromuscular.is_some(), x).ok()?;
-        let held = operator.hold(self.sample_time).ok()?;
+        let held = operator.zoh(self.sample_time).ok()?;
         let of = |point: &Point| response(&held, point.omega_rad_s * self.sample_time.s(), x.len());
         Some(self.points.iter().map(of).collect())
     }
@@ -414,7 +414,7 @@ mod tests {
     }
 
     fn exact(operator: &FamilyOperator) -> PolynomialModel {
-        let held = operator.hold(ts()).unwrap();
+        let held = operator.zoh(ts()).unwrap();
         polynomials(held.nk, &held.b, &held.f)
     }
 

@@ -110,7 +110,7 @@ impl FamilyEstimator {
 
 impl BatchOptions for FamilyEstimator {
     fn options() -> Vec<BatchOption<Self>> {
-        let usual = Self::default();
+        let default = Self::default();
         let mut all = vec![
             shared::noise(|how: &mut Self, _, text| {
                 if text == "arma" {
@@ -121,7 +121,7 @@ impl BatchOptions for FamilyEstimator {
             }),
             shared::change(),
             shared::form(|how: &mut Self, form| how.forms = form.map_or(Form::ALL.to_vec(), |form| vec![form]))
-                .printed("form", |how, _| Some(how.forms_in_words())),
+                .printed("form", |how, _| Some(how.forms_as_text())),
             shared::neuromuscular(|how: &mut Self| &mut how.neuromuscular)
                 .printed("neuromuscular", |how, _| Some(shared::yes_words(how.neuromuscular))),
             shared::prior("population", |how: &mut Self| &mut how.prior)
@@ -142,7 +142,7 @@ impl BatchOptions for FamilyEstimator {
                 Some(format!("nc={nc}, nd={nd}, by AIC"))
             }),
             shared::delay_range(
-                usual.delay_range_s,
+                default.delay_range_s,
                 |how: &mut Self| &mut how.delay_range_s,
                 |how| how.delay_range_s,
             ),
@@ -151,7 +151,7 @@ impl BatchOptions for FamilyEstimator {
                 Ok(())
             })
             .printed("e between samples", |how, _| Some(how.intersample.name().to_owned())),
-            BatchOption::new(run_to_run(usual.run_to_run), |how: &mut Self, option, text| {
+            BatchOption::new(run_to_run(default.run_to_run), |how: &mut Self, option, text| {
                 how.run_to_run = option.read(text)?;
                 Ok(())
             })
@@ -173,13 +173,13 @@ impl BatchOptions for FamilyEstimator {
                 Ok(())
             }),
         ];
-        all.extend(shared::search(usual.search, |how: &mut Self| &mut how.search));
+        all.extend(shared::search(default.search, |how: &mut Self| &mut how.search));
         all
     }
 }
 
 impl FamilyEstimator {
-    fn forms_in_words(&self) -> String {
+    fn forms_as_text(&self) -> String {
         let names: Vec<&str> = self.forms.iter().map(|form| form.name()).collect();
         match names.as_slice() {
             [only] => (*only).to_owned(),
@@ -194,10 +194,10 @@ fn intersample() -> Setting {
     Setting::new("intersample", Kind::Choice(&Intersample::NAMES), help).default("auto")
 }
 
-fn run_to_run(usual: f64) -> Setting {
+fn run_to_run(default: f64) -> Setting {
     let help =
         "What a person's gain varies by from run to run, as a part of it: in the error bars of fewer than five records";
     Setting::new("run_to_run", Kind::Number, help)
-        .default(&usual.to_string())
+        .default(&default.to_string())
         .bounds(Bounds::AtLeast(0.0))
 }

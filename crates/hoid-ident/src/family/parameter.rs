@@ -125,7 +125,7 @@ impl Parameter {
 }
 
 /// What is known of the coordinates of one operator.
-pub(super) struct Known<'a> {
+pub(super) struct CoordinateEstimate<'a> {
     pub operator: &'a FamilyOperator,
     pub covariance: Option<&'a [f64]>,
     /// For each coordinate.
@@ -140,7 +140,7 @@ pub(super) struct Known<'a> {
     pub run_to_run: f64,
 }
 
-impl Known<'_> {
+impl CoordinateEstimate<'_> {
     pub fn parameters(&self) -> Vec<Parameter> {
         let made = |named: &NamedParameter| {
             let made = self.parameter(named);
@@ -338,7 +338,7 @@ mod tests {
         for (i, s) in [0.2, 0.03, error, 0.1, 0.45, 0.01].iter().enumerate() {
             covariance[i * 7] = s * s;
         }
-        Known {
+        CoordinateEstimate {
             operator: &operator,
             covariance: Some(&covariance),
             prior_share: &[0.0, 0.0, 0.0, 0.1, 0.8, 0.05],

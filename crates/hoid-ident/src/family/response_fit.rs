@@ -108,7 +108,7 @@ impl<'p> ResponseCriterion<'p> {
     /// # Errors
     /// [`IdentError::NoFiniteLoss`].
     pub fn fit(&self, search: &SearchOptions) -> Result<ResponseMinimum, IdentError> {
-        self.fit_from_grid(search, Grid::Usual)
+        self.fit_from_grid(search, Grid::Default)
     }
 
     /// As [`Self::fit`], from the best points of another grid.

@@ -47,8 +47,8 @@ pub(super) fn wrong_direction(record: &Record) -> Option<(FaultKind, f64)> {
     if e.len() < FEWEST {
         return None;
     }
-    let of_output = Answer::of(&u, &e)?;
-    let of_input = Answer::of(&e, &u)?;
+    let of_output = CrossResponse::of(&u, &e)?;
+    let of_input = CrossResponse::of(&e, &u)?;
     if of_output.at_once > AT_ONCE && of_output.at_once > TIMES * of_input.at_once {
         return Some((FaultKind::Exchanged, of_output.at_once / of_input.at_once));
     }
@@ -56,14 +56,14 @@ pub(super) fn wrong_direction(record: &Record) -> Option<(FaultKind, f64)> {
 }
 
 /// How a channel answers another.
-struct Answer {
+struct CrossResponse {
     /// Growth of the loss without the first lag.
     at_once: f64,
     /// Sum of the coefficients in standard errors.
     sum: f64,
 }
 
-impl Answer {
+impl CrossResponse {
     /// Of y to x; `None` where the regression is singular.
     fn of(y: &[f64], x: &[f64]) -> Option<Self> {
         let first = OWN.max(OTHER);

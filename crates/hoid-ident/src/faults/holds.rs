@@ -55,13 +55,13 @@ pub(super) fn frozen(values: &[f64], other: Option<&[f64]>, sample_time_s: f64) 
     let rests = |run: &Range<usize>| rest.is_some_and(|rest| rest.value == values[run.start]);
     let moving = runs.iter().filter(|run| !rests(run));
     let mut lengths: Vec<f64> = moving.map(|run| run.len() as f64).collect();
-    let usual = quantile(&mut lengths, 0.9);
+    let typical = quantile(&mut lengths, 0.9);
     let mut changes: Vec<f64> = values.windows(2).map(|w| (w[1] - w[0]).abs()).collect();
     let large = 2.0 * quantile(&mut changes, 0.999);
     let deviation_of_other = other.map(|o| level_and_deviation(o).1);
-    let longest = |usual: f64| ((RESTING_S / sample_time_s) as usize).max((LONGER * usual) as usize);
-    let in_use = if in_steps { longest(usual) } else { FROZEN };
-    let at_rest = rest.map_or(in_use, |rest| longest(rest.usual_samples));
+    let longest = |typical: f64| ((RESTING_S / sample_time_s) as usize).max((LONGER * typical) as usize);
+    let in_use = if in_steps { longest(typical) } else { FROZEN };
+    let at_rest = rest.map_or(in_use, |rest| longest(rest.typical_samples));
     let is_fault = |run: &Range<usize>| -> Option<Hold> {
         if run.len() < FROZEN {
             return None;

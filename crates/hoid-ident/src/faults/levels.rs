@@ -46,7 +46,7 @@ pub(super) struct Wrap {
     pub unwrapped: Vec<f64>,
 }
 
-fn usual_change(values: &[f64]) -> f64 {
+fn typical_change(values: &[f64]) -> f64 {
     quantile(
         &mut values.windows(2).map(|w| (w[1] - w[0]).abs()).collect::<Vec<_>>(),
         0.99,
@@ -55,15 +55,15 @@ fn usual_change(values: &[f64]) -> f64 {
 
 /// The wraps of a channel.
 pub(super) fn wrap(values: &[f64], sample_time_s: f64) -> Option<Wrap> {
-    let usual = usual_change(values);
-    if values.len() < 100 || usual <= 0.0 {
+    let typical = typical_change(values);
+    if values.len() < 100 || typical <= 0.0 {
         return None;
     }
     let jumps: Vec<(usize, f64)> = values
         .windows(2)
         .enumerate()
         .map(|(t, w)| (t + 1, w[1] - w[0]))
-        .filter(|(_, change)| change.abs() > LARGE * usual)
+        .filter(|(_, change)| change.abs() > LARGE * typical)
         .collect();
     if jumps.is_empty() || 20 * jumps.len() > values.len() {
         return None;
@@ -71,7 +71,7 @@ pub(super) fn wrap(values: &[f64], sample_time_s: f64) -> Option<Wrap> {
     let near = |modulus: f64| {
         jumps
             .iter()
-            .all(|(_, change)| (change.abs() - modulus).abs() <= 2.0 * usual)
+            .all(|(_, change)| (change.abs() - modulus).abs() <= 2.0 * typical)
     };
     let known = MODULI.iter().copied().find(|m| near(*m));
     let own = || {
@@ -101,15 +101,15 @@ pub(super) fn wrap(values: &[f64], sample_time_s: f64) -> Option<Wrap> {
 /// Steps of the level: the first sample behind each, and by how much.
 pub(super) fn steps(values: &[f64], sample_time_s: f64) -> Vec<(usize, f64, f64)> {
     let beside = (BESIDE_S / sample_time_s) as usize;
-    let usual = usual_change(values);
+    let typical = typical_change(values);
     let n = values.len();
-    if beside < 10 || n < 2 * beside || usual <= 0.0 {
+    if beside < 10 || n < 2 * beside || typical <= 0.0 {
         return Vec::new();
     }
     let mut found: Vec<(usize, f64, f64)> = Vec::new();
     for t in beside..n - beside {
         let change = values[t] - values[t - 1];
-        if change.abs() <= LARGE * usual || found.last().is_some_and(|(last, ..)| t - last < beside) {
+        if change.abs() <= LARGE * typical || found.last().is_some_and(|(last, ..)| t - last < beside) {
             continue;
         }
         let (before, one) = level_and_deviation(&values[t - beside..t]);
@@ -141,22 +141,22 @@ pub(super) fn scales(values: &[f64], sample_time_s: f64) -> Vec<(Range<usize>, f
         .copied()
         .filter(|size| rest.is_none() || *size > 0.0)
         .collect();
-    let usual = median(&moved);
-    if usual <= 0.0 {
+    let typical = median(&moved);
+    if typical <= 0.0 {
         return Vec::new();
     }
     let mut all: Vec<(Range<usize>, f64)> = Vec::new();
     for (k, size) in sizes.iter().enumerate() {
-        if *size <= UNITS * usual {
+        if *size <= UNITS * typical {
             continue;
         }
         let rows = k * block..((k + 1) * block).min(n);
         match all.last_mut() {
             Some((last, factor)) if last.end == rows.start => {
                 last.end = rows.end;
-                *factor = factor.max(size / usual);
+                *factor = factor.max(size / typical);
             }
-            _ => all.push((rows, size / usual)),
+            _ => all.push((rows, size / typical)),
         }
     }
     let inside = |t: usize| all.iter().any(|(rows, _)| rows.contains(&t));

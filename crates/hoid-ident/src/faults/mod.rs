@@ -22,7 +22,7 @@
 //! is needed. What people do is no fault: their remnant comes in pulses and bursts, but through
 //! their muscles, and the statistics of the spikes tell pushes from faults.
 //!
-//! [`mend`] looks at a record and does what [`FaultHandling`](hoid_model::FaultHandling) says: by default it bridges what lasts
+//! [`repair`] looks at a record and does what [`FaultHandling`](hoid_model::FaultHandling) says: by default it bridges what lasts
 //! up to [`BRIDGED_S`], cuts the record at what is longer, and leaves segments of [`SHORTEST_S`] or
 //! more, each a record. Faults of more than [`MOST_SPIKES`] of the samples of a channel are told and
 //! not bridged: then the channel is not what is assumed of it.
@@ -33,7 +33,7 @@ mod holds;
 mod interpolation;
 mod levels;
 mod limits;
-mod mending;
+mod repairing;
 mod resistant;
 mod rest;
 mod robust;
@@ -46,7 +46,7 @@ mod test_signals;
 mod tests;
 
 pub use limits::{BRIDGED_S, MOST_SPIKES, SHORTEST_S};
-pub use mending::{Mended, SLOWEST_S, mend};
+pub use repairing::{RepairedRecord, SLOWEST_S, repair};
 pub use resistant::{held, resistant};
 pub use rest::Rest;
 pub use slow::{PERIOD_S, without_slow};

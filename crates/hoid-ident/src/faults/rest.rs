@@ -27,7 +27,7 @@ pub struct Rest {
     /// How often it is come to.
     pub visits: usize,
     /// Samples that nine of ten visits do not exceed.
-    pub usual_samples: f64,
+    pub typical_samples: f64,
 }
 
 impl Rest {
@@ -55,7 +55,7 @@ impl Rest {
             value,
             share,
             visits,
-            usual_samples: quantile(&mut lengths, 0.9),
+            typical_samples: quantile(&mut lengths, 0.9),
         })
     }
 }
@@ -84,7 +84,7 @@ mod tests {
         let rest = Rest::of(&zone(1.5)).unwrap();
         let at_rest = zone(1.5).iter().filter(|v| **v == 0.0).count();
         assert_eq!((rest.value, rest.share), (0.0, at_rest as f64 / 6000.0));
-        assert!(rest.visits > 50 && rest.usual_samples > 2.0, "{rest:?}");
+        assert!(rest.visits > 50 && rest.typical_samples > 2.0, "{rest:?}");
         let pulses: Vec<f64> = u
             .iter()
             .map(|v| if v.abs() < 4.0 { 0.7 } else { 0.7 + v.signum() })

@@ -17,7 +17,7 @@ use hoid_model::{ContinuousTransferFunction, Detrend, Record, Verdict, uncertain
 
 use super::{
     describe::{DescribingFunction, describe},
-    doubts::{Judged, doubts},
+    diagnostics::{DiagnosticInputs, doubts},
     excitation::{Excitation, LineSearch, refuse},
     gain_lead_delay::GainLeadDelayOptions,
     open_loop::DescribingMargins,
@@ -28,7 +28,7 @@ use super::{
 use crate::IdentError;
 
 /// Names of channels that usually hold the excitation, in the order in which they are looked for.
-pub const USUAL_EXCITATIONS: [&str; 8] = ["f_t", "d", "r", "f_d", "target", "disturbance", "reference", "forcing"];
+pub const COMMON_EXCITATIONS: [&str; 8] = ["f_t", "d", "r", "f_d", "target", "disturbance", "reference", "forcing"];
 
 /// Runs from which on their scatter alone gives the errors.
 const RUNS_ENOUGH: usize = 3;
@@ -134,7 +134,7 @@ pub fn describe_runs(records: &[Record], options: &DescriptionOptions) -> Result
         .as_ref()
         .map(|element| function.open_loop(element));
     let margins = open_loop.as_ref().map(|l| l.margins_with_delay(delay_s));
-    let judged = Judged {
+    let judged = DiagnosticInputs {
         function: &function,
         excitation: &excitation,
         channel: channel.as_deref(),
@@ -197,7 +197,7 @@ fn excitation_of(record: &Record, options: &DescriptionOptions) -> Result<(Excit
         return Ok((found, Some(channel.clone())));
     }
     let there = || {
-        USUAL_EXCITATIONS
+        COMMON_EXCITATIONS
             .into_iter()
             .filter(|name| record.channel(name).is_some())
     };

@@ -42,7 +42,7 @@
 
 mod describe;
 mod description;
-mod doubts;
+mod diagnostics;
 mod excitation;
 mod gain_lead_delay;
 mod open_loop;
@@ -61,8 +61,8 @@ mod simulated_runs;
 mod synthetic_records;
 
 pub use describe::{DescribingFunction, Line, RunSummary, describe};
-pub use description::{Description, DescriptionOptions, USUAL_EXCITATIONS, describe_runs};
-pub use doubts::chance_coherence;
+pub use description::{COMMON_EXCITATIONS, Description, DescriptionOptions, describe_runs};
+pub use diagnostics::chance_coherence;
 pub use excitation::{Excitation, LineSearch};
 pub use gain_lead_delay::{GainLeadDelay, GainLeadDelayOptions, LineWeights};
 pub use open_loop::{Crossover, DescribingMargins, OpenLoop};

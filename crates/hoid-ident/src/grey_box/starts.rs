@@ -23,9 +23,9 @@ use super::{
 /// respond to.
 const GRID_DELAY_S: f64 = 0.04;
 /// Neuromuscular frequency with which the delays are ranked, rad/s.
-const USUAL_OMEGA: f64 = 11.0;
+const DEFAULT_OMEGA: f64 = 11.0;
 /// Damping ratio with which the delays are ranked.
-const USUAL_ZETA: f64 = 0.4;
+const DEFAULT_ZETA: f64 = 0.4;
 /// Delays at which the other frequencies and dampings are tried.
 const BEST_DELAYS: usize = 2;
 /// Neuromuscular frequencies of the grid, rad/s.
@@ -106,7 +106,7 @@ pub(crate) fn grid(criterion: &PhysicalCriterion<'_, Layout>, starts: usize, wor
     let by_loss = |points: &mut Vec<(Start, f64)>| points.sort_by(|a, b| a.1.total_cmp(&b.1));
     let mut points: Vec<(Start, f64)> = delays
         .into_iter()
-        .filter_map(|tau| ranked(tau, USUAL_OMEGA, USUAL_ZETA))
+        .filter_map(|tau| ranked(tau, DEFAULT_OMEGA, DEFAULT_ZETA))
         .collect();
     by_loss(&mut points);
     let best: Vec<f64> = (leading(&points, BEST_DELAYS).iter()).map(|s| s.slots[DELAY]).collect();

@@ -22,7 +22,7 @@ use super::columns::{Columns, orthonormal, with_past};
 use crate::{
     IdentError,
     criterion::Data,
-    criterion::initial_state_responses::{InitialStateResponses, Past},
+    criterion::initial_state_responses::{InitialHistory, InitialStateResponses},
     linalg::least_squares::{LeastSquares, add_scaled, dot},
 };
 
@@ -220,7 +220,7 @@ impl<'a> IvProblem<'a> {
     /// Initial-state responses of 1/(C F) in each record, with its rows.
     fn initial_state_responses(&self, filter: Prefilter<'_>) -> Vec<(InitialStateResponses, usize)> {
         let poles = product(&monic(filter.c), &monic(filter.f));
-        let past = Past {
+        let past = InitialHistory {
             c: &[],
             d: &[],
             f: &poles[1..],

@@ -30,7 +30,7 @@ impl Instruments {
 
     /// The forcing function f_t where all records have it: in a closed loop it is the signal that
     /// the noise does not reach. Else those that are simulated.
-    pub fn usual(records: &[Record]) -> Self {
+    pub fn default_for(records: &[Record]) -> Self {
         if records.iter().all(|r| r.channel(FORCING_CHANNEL).is_some()) {
             Self::External(FORCING_CHANNEL.to_owned())
         } else {

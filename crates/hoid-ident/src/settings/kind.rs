@@ -16,7 +16,7 @@ pub enum Kind {
     /// A number, or `off`.
     NumberOrOff,
     /// A number, or the word alone for this one.
-    NumberOrUsual(&'static str),
+    NumberOrDefault(&'static str),
     /// A transfer function of s, as `90/(s(s+6))`.
     Element,
     /// `LO..HI`, two finite numbers in order.

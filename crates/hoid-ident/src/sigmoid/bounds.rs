@@ -54,9 +54,9 @@ pub(crate) fn limits(
     }
     let mut result = Vec::with_capacity(names.len());
     for (place, (name, element)) in names.iter().zip(layout.elements()).enumerate() {
-        let (widest, usual) = ranges(layout, frame, element)?;
+        let (widest, default) = ranges(layout, frame, element)?;
         let asked = constraints.get(name).copied();
-        let (low, high) = asked.map_or(usual, Constraint::limits);
+        let (low, high) = asked.map_or(default, Constraint::limits);
         let within = (low.max(widest.0), high.min(widest.1));
         let moved = low == high && within != (low, high);
         if asked.is_some_and(|c| !c.is_sound()) || within.0 > within.1 || moved {
@@ -128,11 +128,11 @@ mod tests {
     fn limits_hold_what_has_a_meaning() {
         let none = BTreeMap::new();
         let layout = Layout::new(Form::Lead, true, 1);
-        let usual = limits(&layout, &frame(), &none).unwrap();
-        assert_eq!(usual.len(), 10);
-        assert_eq!(usual[layout.midpoint], (4.0, 76.0));
-        assert_eq!(usual[layout.delay], (0.05, 0.6));
-        assert!((usual[layout.log_rate].1.exp() - 200.0).abs() < 1e-9);
+        let default = limits(&layout, &frame(), &none).unwrap();
+        assert_eq!(default.len(), 10);
+        assert_eq!(default[layout.midpoint], (4.0, 76.0));
+        assert_eq!(default[layout.delay], (0.05, 0.6));
+        assert!((default[layout.log_rate].1.exp() - 200.0).abs() < 1e-9);
         let with = |name: &str, c: Constraint| limits(&layout, &frame(), &BTreeMap::from([(name.to_owned(), c)]));
         assert_eq!(
             with("t_M", Constraint::Fixed(79.0)).unwrap()[layout.midpoint],
@@ -166,8 +166,8 @@ mod tests {
         assert_eq!(with(Constraint::Fixed(5.0)).unwrap()[place], (0.2, 0.2));
         assert_eq!(with(Constraint::Between(2.0, 8.0)).unwrap()[place], (0.125, 0.5));
         assert!(with(Constraint::Fixed(-5.0)).is_err());
-        let usual = limits(&layout, &frame(), &BTreeMap::new()).unwrap();
-        let (low, high) = usual[place];
+        let default = limits(&layout, &frame(), &BTreeMap::new()).unwrap();
+        let (low, high) = default[place];
         assert!((low - 1e-3).abs() < 1e-15 && (high - 30.0).abs() < 1e-12);
     }
 }

@@ -58,7 +58,7 @@ impl ChangedOperator {
 
 /// What theta is known to.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Known<'a> {
+pub(super) struct ThetaEstimate<'a> {
     pub layout: &'a Layout,
     pub theta: &'a [f64],
     /// Of theta, by rows; `None` for an exact fit.
@@ -67,7 +67,7 @@ pub(super) struct Known<'a> {
     pub change_point: Option<f64>,
 }
 
-impl Known<'_> {
+impl ThetaEstimate<'_> {
     /// The operator before (0) or after (1) the change.
     pub fn end(&self, end: usize) -> Result<ChangedOperator, ModelError> {
         let mut values = [0.0; MOST_VARYING];

@@ -3,7 +3,7 @@
 use hoid_model::{Form, Record, SampleTime, Structure, uncertainty::Estimate};
 
 use super::{
-    ends::{ChangedOperator, Known, NamedEstimate, estimate},
+    ends::{ChangedOperator, NamedEstimate, ThetaEstimate, estimate},
     inference::{Comparison, Remark, constant_operator, inference},
     layout::Layout,
     objective::{ChangeCriterion, Data},
@@ -96,7 +96,7 @@ impl SigmoidFit {
         levels: Option<[f64; 2]>,
     ) -> Result<Self, IdentError> {
         let found = inference(criterion, minimum, constant)?;
-        let known = Known {
+        let known = ThetaEstimate {
             layout: &criterion.layout,
             theta: &minimum.theta,
             covariance: found.covariance.as_deref(),
@@ -268,7 +268,7 @@ impl SigmoidFit {
     /// the sigmoid is no line over the interval of t_M, `step^2 p (1 - p)` stands for the latter,
     /// with p the probability that the change has happened.
     pub fn gains_at(&self, time_s: f64) -> GainsAt {
-        let known = Known {
+        let known = ThetaEstimate {
             layout: &self.layout,
             theta: &self.theta,
             covariance: self.covariance.as_deref(),

@@ -9,7 +9,7 @@ use std::fmt;
 
 use super::{
     bounds::FASTEST,
-    ends::{ChangedOperator, Known},
+    ends::{ChangedOperator, ThetaEstimate},
     layout::Layout,
     objective::ChangeCriterion,
     prior,
@@ -228,7 +228,7 @@ pub(super) fn constant_operator(
         inverse.iter_mut().for_each(|c| *c *= variance);
         Some(inverse)
     };
-    let known = Known {
+    let known = ThetaEstimate {
         layout,
         theta,
         covariance: covariance.as_deref(),

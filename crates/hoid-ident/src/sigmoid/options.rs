@@ -92,7 +92,7 @@ impl SigmoidChange {
 
 impl BatchOptions for SigmoidChange {
     fn options() -> Vec<BatchOption<Self>> {
-        let usual = Self::default();
+        let default = Self::default();
         let mut all = vec![
             shared::noise(|_: &mut Self, _, _| Ok(())),
             shared::change().printed("change", |_, _| Some("sigmoid".to_owned())),
@@ -108,7 +108,7 @@ impl BatchOptions for SigmoidChange {
             })
             .printed("orders", |how, _| Some(format!("nd={}", how.nd))),
             shared::delay_range(
-                usual.delay_range_s,
+                default.delay_range_s,
                 |how: &mut Self| &mut how.delay_range_s,
                 |how| how.delay_range_s,
             ),
@@ -124,7 +124,7 @@ impl BatchOptions for SigmoidChange {
             |how: &mut Self| &mut how.constraints,
             |how| &how.constraints,
         ));
-        all.extend(shared::search(usual.search, |how: &mut Self| &mut how.search));
+        all.extend(shared::search(default.search, |how: &mut Self| &mut how.search));
         all
     }
 }

@@ -12,7 +12,7 @@
 use std::ops::Range;
 
 use super::grid::Grid;
-use super::issue::{Place, QualityIssue, QualityIssueKind, at};
+use super::issue::{QualityIssue, QualityIssueKind, RowSpan, at};
 use super::signals::{Signal, Signals};
 use super::values::Levels;
 use crate::wording::{counted, short};
@@ -42,7 +42,7 @@ pub(super) fn standing(signals: &Signals<'_>, grid: &Grid, found: &mut Vec<Quali
         (QualityIssueKind::Repeated, repeated),
         (QualityIssueKind::Unordered, others),
     ] {
-        let places: Vec<Place> = rows.iter().map(|row| signals.place(&(*row..row + 1))).collect();
+        let places: Vec<RowSpan> = rows.iter().map(|row| signals.place(&(*row..row + 1))).collect();
         let Some(first) = places.first() else { continue };
         let what = if kind == QualityIssueKind::Repeated {
             "there twice, time included"
@@ -128,8 +128,8 @@ pub(super) fn stalls(signals: &Signals<'_>, levels: &[Levels], grid: Option<&Gri
         .into_iter()
         .filter(|run| run.len() > limit)
         .collect();
-    let places: Vec<Place> = stalled.iter().map(|run| signals.place(run)).collect();
-    let seconds = |place: &Place| place.to_s.zip(place.from_s).map_or(0.0, |(to, from)| to - from);
+    let places: Vec<RowSpan> = stalled.iter().map(|run| signals.place(run)).collect();
+    let seconds = |place: &RowSpan| place.to_s.zip(place.from_s).map_or(0.0, |(to, from)| to - from);
     let Some(longest) = places.iter().max_by(|a, b| {
         (a.rows, seconds(a))
             .partial_cmp(&(b.rows, seconds(b)))

@@ -76,7 +76,7 @@ hoid_model::named_choice!(QualityIssueKind, "kind of fault", 11, {
 
 /// Rows that follow each other.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Place {
+pub struct RowSpan {
     /// The first row, counted from 1 without header and comments; of a gap the row before it.
     pub row: usize,
     /// How many rows; of a gap those that are missing.
@@ -105,7 +105,7 @@ pub struct QualityIssue {
     /// Unit of the size.
     pub unit: String,
     /// Where.
-    pub places: Vec<Place>,
+    pub places: Vec<RowSpan>,
     /// A sentence without a full stop.
     pub text: String,
 }
@@ -129,7 +129,7 @@ impl Serialize for QualityIssue {
             text: &'a str,
             remedy: &'static str,
             place_count: usize,
-            places: &'a [Place],
+            places: &'a [RowSpan],
         }
         Written {
             kind: self.kind,
@@ -148,7 +148,7 @@ impl Serialize for QualityIssue {
 }
 
 /// "row 12 (0.11 s)".
-pub(super) fn at(place: &Place) -> String {
+pub(super) fn at(place: &RowSpan) -> String {
     match place.from_s {
         Some(s) => format!("row {} ({} s)", place.row, decimal(s)),
         None => format!("row {}", place.row),

@@ -27,7 +27,7 @@ mod values;
 
 pub(crate) use grid::Grid;
 pub(crate) use in_table::{issues_of_record, issues_of_signals};
-pub use issue::{Place, QualityIssue, QualityIssueKind};
+pub use issue::{QualityIssue, QualityIssueKind, RowSpan};
 pub use search::quality_of_record;
 pub(crate) use search::{issues_of, names_a_clock};
 pub(crate) use signals::{Signal, Signals};

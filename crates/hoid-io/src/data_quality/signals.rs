@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::issue::Place;
+use super::issue::RowSpan;
 use crate::table::Precision;
 
 /// A column as it is looked at.
@@ -43,8 +43,8 @@ impl Signals<'_> {
         }
     }
 
-    pub(super) fn place(&self, rows: &Range<usize>) -> Place {
-        Place {
+    pub(super) fn place(&self, rows: &Range<usize>) -> RowSpan {
+        RowSpan {
             row: self.before + rows.start + 1,
             rows: rows.len(),
             from_s: self.at_s(rows.start),

@@ -13,7 +13,7 @@
 
 use std::ops::Range;
 
-use super::issue::{Place, QualityIssue, QualityIssueKind, at};
+use super::issue::{QualityIssue, QualityIssueKind, RowSpan, at};
 use super::signals::{Signal, Signals};
 use crate::wording::{counted, short};
 
@@ -191,8 +191,8 @@ pub(super) fn find(signals: &Signals<'_>, signal: Signal<'_>, levels: &Levels, f
         return;
     }
     for rail in rails(values, levels) {
-        let places: Vec<Place> = rail.stays.iter().map(|stay| signals.place(stay)).collect();
-        let seconds = |place: &Place| place.to_s.zip(place.from_s).map_or(0.0, |(to, from)| to - from);
+        let places: Vec<RowSpan> = rail.stays.iter().map(|stay| signals.place(stay)).collect();
+        let seconds = |place: &RowSpan| place.to_s.zip(place.from_s).map_or(0.0, |(to, from)| to - from);
         let longest = places.iter().map(seconds).fold(0.0, f64::max);
         let text = format!(
             "{name} stays at its {} value, {}, in {} ({} %), in {}; the first is {}",
@@ -221,7 +221,7 @@ pub(super) fn find(signals: &Signals<'_>, signal: Signal<'_>, levels: &Levels, f
 fn missing(
     signals: &Signals<'_>,
     signal: Signal<'_>,
-    tell: &mut impl FnMut(QualityIssueKind, usize, f64, &str, Vec<Place>, String),
+    tell: &mut impl FnMut(QualityIssueKind, usize, f64, &str, Vec<RowSpan>, String),
 ) {
     let mut gone: Vec<Range<usize>> = Vec::new();
     for (row, _) in signal.values.iter().enumerate().filter(|(_, v)| !v.is_finite()) {
@@ -230,7 +230,7 @@ fn missing(
             _ => gone.push(row..row + 1),
         }
     }
-    let places: Vec<Place> = gone.iter().map(|run| signals.place(run)).collect();
+    let places: Vec<RowSpan> = gone.iter().map(|run| signals.place(run)).collect();
     let Some(first) = places.first() else { return };
     let rows: usize = gone.iter().map(Range::len).sum();
     let text = format!(

@@ -16,7 +16,7 @@ pub struct FmuSettings {
     kind: String,
     /// Parameters that start with other values than usual.
     #[serde(default)]
-    parameters: BTreeMap<String, Given>,
+    parameters: BTreeMap<String, SettingValue>,
     /// Text of the scenario file of an operator.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub scenario: Option<String>,
@@ -27,7 +27,7 @@ pub struct FmuSettings {
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(untagged)]
-enum Given {
+enum SettingValue {
     Boolean(bool),
     Integer(i32),
     Real(f64),
@@ -64,10 +64,10 @@ impl FmuSettings {
     /// With another start of a parameter.
     pub fn with(mut self, parameter: &str, start: FmuStart) -> Self {
         let given = match start {
-            FmuStart::Real(value) => Given::Real(value),
-            FmuStart::Integer(value) => Given::Integer(value),
-            FmuStart::Boolean(value) => Given::Boolean(value),
-            FmuStart::Text(text) => Given::Text(text),
+            FmuStart::Real(value) => SettingValue::Real(value),
+            FmuStart::Integer(value) => SettingValue::Integer(value),
+            FmuStart::Boolean(value) => SettingValue::Boolean(value),
+            FmuStart::Text(text) => SettingValue::Text(text),
         };
         self.parameters.insert(parameter.to_owned(), given);
         self
@@ -109,11 +109,11 @@ impl FmuSettings {
                 .find(|variable| variable.role == Role::Parameter && variable.name == name)
                 .ok_or_else(|| format!("{FMU_SETTINGS}: the unit has no parameter {name}"))?;
             parameter.start = match (&parameter.start, given) {
-                (FmuStart::Real(_), Given::Real(value)) => FmuStart::Real(*value),
-                (FmuStart::Real(_), Given::Integer(value)) => FmuStart::Real(f64::from(*value)),
-                (FmuStart::Integer(_), Given::Integer(value)) => FmuStart::Integer(*value),
-                (FmuStart::Boolean(_), Given::Boolean(value)) => FmuStart::Boolean(*value),
-                (FmuStart::Text(_), Given::Text(text)) => FmuStart::Text(text.clone()),
+                (FmuStart::Real(_), SettingValue::Real(value)) => FmuStart::Real(*value),
+                (FmuStart::Real(_), SettingValue::Integer(value)) => FmuStart::Real(f64::from(*value)),
+                (FmuStart::Integer(_), SettingValue::Integer(value)) => FmuStart::Integer(*value),
+                (FmuStart::Boolean(_), SettingValue::Boolean(value)) => FmuStart::Boolean(*value),
+                (FmuStart::Text(_), SettingValue::Text(text)) => FmuStart::Text(text.clone()),
                 _ => return Err(format!("{FMU_SETTINGS}: the parameter {name} is of another type")),
             };
         }

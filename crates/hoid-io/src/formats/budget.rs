@@ -90,11 +90,11 @@ impl Settings {
 
     /// Its greatest length, bytes.
     pub(crate) fn longest(self) -> u64 {
-        let usual = match self {
+        let typical = match self {
             Self::Json => 10 << 20,
             Self::Toml => 2 << 20,
         };
-        raised().map_or(usual, |raised| usual.max(raised / self.share()))
+        raised().map_or(typical, |raised| typical.max(raised / self.share()))
     }
 }
 

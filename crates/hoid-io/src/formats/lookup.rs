@@ -193,7 +193,7 @@ mod tests {
     }
 
     #[test]
-    fn endings_in_words() {
+    fn endings_as_text() {
         assert_eq!(endings(&[&csv::CSV]), ".csv (also as .txt)");
         assert_eq!(
             endings(&[&csv::CSV, &csv::TSV, &csv::TSV]),

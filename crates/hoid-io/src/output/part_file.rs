@@ -21,17 +21,17 @@ const SUFFIX: &str = ".part";
 const ATTEMPTS: usize = 16;
 
 /// What this process has on its way, and which directories it has swept.
-struct Known {
+struct PartFiles {
     parts: BTreeSet<PathBuf>,
     swept: BTreeSet<PathBuf>,
 }
 
-static KNOWN: Mutex<Known> = Mutex::new(Known {
+static KNOWN: Mutex<PartFiles> = Mutex::new(PartFiles {
     parts: BTreeSet::new(),
     swept: BTreeSet::new(),
 });
 
-fn known() -> MutexGuard<'static, Known> {
+fn known() -> MutexGuard<'static, PartFiles> {
     KNOWN.lock().unwrap_or_else(PoisonError::into_inner)
 }
 

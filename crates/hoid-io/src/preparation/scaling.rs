@@ -49,12 +49,12 @@ const OTHER_NAMES: [(&[&str], &str); 9] = [
 ];
 
 /// A unit by its usual name; one that is not known as it is.
-fn usual(unit: &str) -> &str {
+fn canonical(unit: &str) -> &str {
     let small = unit.to_lowercase();
     let other = OTHER_NAMES
         .into_iter()
         .find(|(names, _)| names.contains(&small.as_str()));
-    other.map_or(unit, |(_, usual)| usual)
+    other.map_or(unit, |(_, canonical)| canonical)
 }
 
 /// What a channel is multiplied by, and the unit that it has then.
@@ -83,7 +83,7 @@ impl Scaling {
         Ok(Self {
             factor,
             from: None,
-            to: unit.map(usual).map(str::to_owned),
+            to: unit.map(canonical).map(str::to_owned),
         })
     }
 
@@ -109,7 +109,7 @@ impl FromStr for Scaling {
             Some((left, right)) => (left.trim(), Some(right.trim())),
             None => (text.trim(), None),
         };
-        let known = |name: &str| UNITS.into_iter().find(|(unit, ..)| *unit == usual(name));
+        let known = |name: &str| UNITS.into_iter().find(|(unit, ..)| *unit == canonical(name));
         // A number is a number: "1:deg" names a unit and changes no value.
         if let Ok(factor) = left.parse::<f64>() {
             if right == Some("") {
@@ -162,9 +162,9 @@ impl RecordParts {
         const STEP: &str = "unit";
         let named = units.iter().map(|(name, unit)| (name.clone(), unit.as_str()));
         for (channel, unit) in self.find(STEP, named)? {
-            let unit = usual(unit);
+            let unit = canonical(unit);
             let known = self.channels[channel].unit.clone();
-            if !known.is_empty() && usual(&known) != unit {
+            if !known.is_empty() && canonical(&known) != unit {
                 let name = &self.channels[channel].name;
                 return Err(self.error(
                     STEP,
@@ -182,7 +182,10 @@ impl RecordParts {
         let named = scale.iter().map(|(name, scaling)| (name.clone(), scaling));
         for (channel, scaling) in self.find(STEP, named)? {
             let found = self.channels[channel].unit.clone();
-            if let Some(from) = scaling.from.filter(|from| !found.is_empty() && *from != usual(&found)) {
+            if let Some(from) = scaling
+                .from
+                .filter(|from| !found.is_empty() && *from != canonical(&found))
+            {
                 return Err(self.error(
                     STEP,
                     format!(

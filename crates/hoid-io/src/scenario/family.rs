@@ -186,11 +186,11 @@ impl Source<'_> {
                     self.checked(&format!("{name}.{key}"), value, limits)?;
                 }
             }
-            let usual = MultiSine::default();
+            let default = MultiSine::default();
             let sum = MultiSine {
-                period_s: given.period_s.unwrap_or(usual.period_s),
-                largest: given.largest_multiple.unwrap_or(usual.largest),
-                rms: given.rms.unwrap_or(usual.rms),
+                period_s: given.period_s.unwrap_or(default.period_s),
+                largest: given.largest_multiple.unwrap_or(default.largest),
+                rms: given.rms.unwrap_or(default.rms),
             };
             let mut excitation = sum.excitation().map_err(|error| self.model(error))?;
             excitation.random_phases = given.random_phases.unwrap_or(true);

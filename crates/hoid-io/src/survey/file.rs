@@ -7,7 +7,7 @@
 
 use std::path::Path;
 
-use super::read::{Read, of_arrays, of_table};
+use super::read::{RawColumn, of_arrays, of_table};
 use super::sampling::{SamplingSurvey, sampling};
 use super::values::{ValueSurvey, values};
 use crate::IoError;
@@ -57,14 +57,14 @@ pub fn survey(path: &Path) -> Result<FileSurvey, IoError> {
         Reading::Table { record, .. } => of_table(with_time(record(&mut bytes, &file)?, None)?),
         Reading::Arrays(read) => of_arrays(&read(bytes, &file)?),
     };
-    let is_time = |column: &&Read| TIMES.contains(&column.name.as_str()) && column.rows > 1;
+    let is_time = |column: &&RawColumn| TIMES.contains(&column.name.as_str()) && column.rows > 1;
     let samplings = columns
         .iter()
         .filter(is_time)
         .filter_map(|time| sampling(time, &columns))
         .collect();
     let quality_issues = quality_issues(&columns);
-    let survey = |column: Read| ColumnSurvey {
+    let survey = |column: RawColumn| ColumnSurvey {
         values: column.values.as_deref().and_then(values),
         path: column.path,
         unit: column.unit,
@@ -80,7 +80,7 @@ pub fn survey(path: &Path) -> Result<FileSurvey, IoError> {
     })
 }
 
-fn signal(column: &Read) -> Signal<'_> {
+fn signal(column: &RawColumn) -> Signal<'_> {
     Signal {
         name: &column.path,
         values: column.values.as_deref().unwrap_or_default(),
@@ -88,7 +88,7 @@ fn signal(column: &Read) -> Signal<'_> {
 }
 
 /// What is wrong with the columns that stand beside each other, by structure and length.
-fn quality_issues(columns: &[Read]) -> Vec<QualityIssue> {
+fn quality_issues(columns: &[RawColumn]) -> Vec<QualityIssue> {
     let mut seen: Vec<(&str, usize)> = Vec::new();
     let mut found = Vec::new();
     for column in columns.iter().filter(|column| column.rows > 1) {
@@ -101,9 +101,9 @@ fn quality_issues(columns: &[Read]) -> Vec<QualityIssue> {
         let time = TIMES
             .iter()
             .find_map(|name| beside().find(|c| c.name == *name && c.values.is_some()));
-        let is_time = |c: &Read| time.is_some_and(|time| time.path == c.path);
+        let is_time = |c: &RawColumn| time.is_some_and(|time| time.path == c.path);
         let numbers = || beside().filter(|c| c.values.is_some() && !is_time(c));
-        let is_clock = |c: &&Read| names_a_clock(&c.name) || TIMES.contains(&c.name.as_str());
+        let is_clock = |c: &&RawColumn| names_a_clock(&c.name) || TIMES.contains(&c.name.as_str());
         found.extend(issues_of(&Signals {
             columns: numbers().filter(|c| !is_clock(c)).map(signal).collect(),
             time: time.map(signal),

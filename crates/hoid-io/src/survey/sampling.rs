@@ -1,6 +1,6 @@
 //! The sampling of columns that belong together, as it is found.
 
-use super::read::Read;
+use super::read::RawColumn;
 use crate::data_quality::Grid;
 
 /// The sampling of columns that belong together.
@@ -29,7 +29,7 @@ pub struct SamplingSurvey {
 }
 
 /// The sampling by a time; none where it holds fewer than two finite values.
-pub(super) fn sampling(time: &Read, columns: &[Read]) -> Option<SamplingSurvey> {
+pub(super) fn sampling(time: &RawColumn, columns: &[RawColumn]) -> Option<SamplingSurvey> {
     let t: Vec<f64> = time
         .values
         .as_ref()?
@@ -82,7 +82,7 @@ mod tests {
 
     #[test]
     fn time_and_its_faults() {
-        let read = |name: &str, values: Vec<f64>| Read {
+        let read = |name: &str, values: Vec<f64>| RawColumn {
             path: name.into(),
             parent: String::new(),
             name: name.into(),

@@ -43,13 +43,13 @@ const STAMPS: [&str; 5] = ["timestamp", "stamp", "datetime", "date time", "date"
 
 /// What a name says about a column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Meaning {
+enum ColumnRole {
     Time(Option<Unit>),
     Stamp,
     Other,
 }
 
-fn meaning(name: &str) -> Meaning {
+fn column_role(name: &str) -> ColumnRole {
     let name = name.trim().trim_start_matches(['%', '#']).to_lowercase();
     let words: Vec<&str> = name
         .split([' ', '_', '-', '.', ',', '/', '(', ')', '[', ']'])
@@ -59,18 +59,18 @@ fn meaning(name: &str) -> Meaning {
     let unit = unit.filter(|unit| !matches!(unit, Unit::Iso | Unit::SecondsAndNanoseconds));
     let base = words[..words.len() - usize::from(unit.is_some())].join(" ");
     if WORDS.contains(&base.as_str()) {
-        return Meaning::Time(unit);
+        return ColumnRole::Time(unit);
     }
     match (words.last(), unit) {
-        _ if STAMPS.contains(&base.as_str()) && unit.is_some() => Meaning::Time(unit),
-        (Some(last), None) if STAMPS.contains(last) || STAMPS.contains(&base.as_str()) => Meaning::Stamp,
-        _ => Meaning::Other,
+        _ if STAMPS.contains(&base.as_str()) && unit.is_some() => ColumnRole::Time(unit),
+        (Some(last), None) if STAMPS.contains(last) || STAMPS.contains(&base.as_str()) => ColumnRole::Stamp,
+        _ => ColumnRole::Other,
     }
 }
 
 /// Whether the values of a column may become the time.
 pub(crate) fn is_time(name: &str) -> bool {
-    meaning(name) != Meaning::Other
+    column_role(name) != ColumnRole::Other
 }
 
 /// The table with a column t in s, where it has one column that is a time or was named as such.
@@ -137,15 +137,15 @@ fn found(table: &Table<'_>) -> Option<(usize, Option<Unit>)> {
     let columns = &table.columns;
     let is_constant = |column: &Column| column.values.iter().all(|value| *value == column.values[0]);
     let of = |meant: &dyn Fn(&Column) -> bool| only((0..columns.len()).filter(|at| meant(&columns[*at])));
-    let unit = |at: usize| match meaning(&columns[at].name) {
-        Meaning::Time(unit) => unit,
-        Meaning::Stamp | Meaning::Other => None,
+    let unit = |at: usize| match column_role(&columns[at].name) {
+        ColumnRole::Time(unit) => unit,
+        ColumnRole::Stamp | ColumnRole::Other => None,
     };
-    let by_name = || of(&|column| matches!(meaning(&column.name), Meaning::Time(_)) && column.texts.is_empty());
+    let by_name = || of(&|column| matches!(column_role(&column.name), ColumnRole::Time(_)) && column.texts.is_empty());
     let by_type = || of(&|column| column.moments && !is_constant(column));
     let by_stamp = || {
         of(&|column| {
-            meaning(&column.name) == Meaning::Stamp
+            column_role(&column.name) == ColumnRole::Stamp
                 && column.values.iter().all(|value| *value >= STAMP || value.is_nan())
         })
     };
@@ -316,7 +316,7 @@ mod tests {
 
     #[test]
     fn names_of_times_and_their_units() {
-        use Meaning::{Other, Stamp, Time};
+        use ColumnRole::{Other, Stamp, Time};
         let power = |power| Time(Some(Unit::Power(power)));
         for (name, meant) in [
             ("t", Time(None)),
@@ -341,7 +341,7 @@ mod tests {
             ("s", Other),
             ("", Other),
         ] {
-            assert_eq!(meaning(name), meant, "{name}");
+            assert_eq!(column_role(name), meant, "{name}");
         }
     }
 

@@ -10,7 +10,7 @@ use crate::{
     live::{LiveRun, Samples, start},
     record::record,
     reports,
-    session::{Batch, Begun, How, Logged, RunLog, Session},
+    session::{Batch, How, Logged, RunLog, RunStart, Session},
     task::{TICKS_PER_SAMPLE, Task},
     utc,
     verify::Measures,
@@ -90,7 +90,7 @@ impl Shared {
         let plan = &session.facts.plan[planned];
         let condition = session.facts.config.condition[plan.condition].clone();
         let stem = session.stem(&condition.name, number);
-        let begun = Begun {
+        let begun = RunStart {
             hoid: env!("CARGO_PKG_VERSION").to_owned(),
             number,
             planned,

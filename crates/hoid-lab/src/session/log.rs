@@ -18,7 +18,7 @@ use std::{
 
 use serde::Deserialize;
 
-use super::{begun::APPENDED, folder::Stem};
+use super::{folder::Stem, run_start::APPENDED};
 use crate::LabError;
 
 /// Longest time until the disk has what was appended.

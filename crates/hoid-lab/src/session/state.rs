@@ -10,9 +10,9 @@ use std::{
 use serde::{Deserialize, Serialize};
 
 use super::{
-    begun::{APPENDED, Begun, Ended, How},
     folder::{Stem, check_subject, session_folder},
     log::{RunLog, whole_lines},
+    run_start::{APPENDED, Ended, How, RunStart},
 };
 use crate::{
     LabError,
@@ -162,7 +162,7 @@ impl Session {
             if session.done.iter().any(|done| done.number == number) {
                 continue;
             }
-            if Begun::read(&stem).is_err() {
+            if RunStart::read(&stem).is_err() {
                 session.lost(number, &stem)?;
             } else if Ended::read(&stem).is_ok_and(|ended| ended.is_some()) {
                 session.note(&stem, &check(&stem)?)?;
@@ -253,7 +253,7 @@ impl Session {
 
     /// Appends a run that has ended to `runs.csv`.
     fn note(&mut self, stem: &Stem, checked: &Checked) -> Result<(), LabError> {
-        let begun = Begun::read(stem)?;
+        let begun = RunStart::read(stem)?;
         let done = Done {
             number: begun.number,
             planned: begun.planned,

@@ -233,9 +233,9 @@ impl Hostile {
         let Some((options, _)) = self.trackers.get(which) else {
             if let Some(warm_up) = WarmUp::restored(sample_time, &numbers) {
                 let mut live = Live::Collecting(warm_up);
-                let usual = TrackOptions::usual(Method::adaptive(), 29);
+                let default = TrackOptions::default_for(Method::adaptive(), 29);
                 for k in from..from + SAMPLES {
-                    live.update(sample(k), &|_| Ok((usual.clone(), None)));
+                    live.update(sample(k), &|_| Ok((default.clone(), None)));
                 }
                 live.saved();
             }
@@ -268,7 +268,7 @@ fn saved(record: &Record) -> (Vec<(TrackOptions, Vec<f64>)>, Vec<f64>) {
             .with(&[("track_delay", "0.2..0.35")])
             .unwrap(),
         of(hoid_survey::multiple_model()),
-        TrackOptions::usual(Method::adaptive(), 29)
+        TrackOptions::default_for(Method::adaptive(), 29)
             .with(&[("replay", "5")])
             .unwrap(),
         of(hoid_survey::ekf()),
@@ -289,10 +289,10 @@ fn saved(record: &Record) -> (Vec<(TrackOptions, Vec<f64>)>, Vec<f64>) {
         let numbers = tracker.saved();
         (options, numbers)
     };
-    let usual = of(hoid_survey::physical());
-    let mut live = Live::new(&usual, 2000, record.sample_time()).unwrap();
+    let default = of(hoid_survey::physical());
+    let mut live = Live::new(&default, 2000, record.sample_time()).unwrap();
     for k in 0..100 {
-        live.update(sample(k), &|_| Ok((usual.clone(), None)));
+        live.update(sample(k), &|_| Ok((default.clone(), None)));
     }
     (all.into_iter().map(run).collect(), live.saved().1)
 }

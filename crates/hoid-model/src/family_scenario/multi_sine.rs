@@ -106,11 +106,17 @@ mod tests {
 
     #[test]
     fn senseless_ones_are_refused() {
-        let usual = MultiSine::default();
+        let default = MultiSine::default();
         for bad in [
-            MultiSine { period_s: 0.0, ..usual },
-            MultiSine { rms: f64::NAN, ..usual },
-            MultiSine { largest: 1, ..usual },
+            MultiSine {
+                period_s: 0.0,
+                ..default
+            },
+            MultiSine {
+                rms: f64::NAN,
+                ..default
+            },
+            MultiSine { largest: 1, ..default },
         ] {
             assert!(bad.excitation().is_err(), "{bad:?}");
         }

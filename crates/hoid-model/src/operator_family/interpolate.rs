@@ -21,9 +21,9 @@
 
 use super::{
     dual::Dual,
-    hold::HeldFamily,
     matrices::{SIZE, Vector, characteristic, companion, exponential, product, times},
     operator::FamilyOperator,
+    zoh::HeldFamily,
 };
 use crate::{ModelError, SampleTime, delayed_operator::whole_samples};
 

@@ -25,13 +25,13 @@ mod dual;
 mod examples;
 mod fitted;
 mod form;
-mod hold;
 mod interpolate;
 mod matrices;
 mod operator;
+mod zoh;
 
 pub use dual::PARTIALS;
 pub use fitted::FittedOperator;
 pub use form::{Coordinate, Form};
-pub use hold::HeldFamily;
 pub use operator::{FamilyOperator, FamilyResponse, NamedParameter, PARAMETERS};
+pub use zoh::HeldFamily;

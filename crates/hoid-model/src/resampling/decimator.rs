@@ -102,7 +102,7 @@ impl<const C: usize> Decimator<C> {
     }
 
     /// How many samples the last one given lies behind the last one taken.
-    pub fn behind(&self) -> u64 {
+    pub fn lag_samples(&self) -> u64 {
         let at = self.given.saturating_sub(1) * self.done.factor as u64;
         self.came.saturating_sub(1).saturating_sub(at)
     }

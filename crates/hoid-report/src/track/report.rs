@@ -12,9 +12,9 @@ use super::{
     tables,
 };
 use crate::{
-    ReportError, answer, facts,
+    ReportError, facts,
     figures::{self, TraceGrid},
-    page, tables as of_fits,
+    fit_summary, page, tables as of_fits,
 };
 
 /// Most traces of a page: more curves over each other cannot be told apart.
@@ -83,7 +83,7 @@ impl TrackReport<'_> {
             |id: &str, title: &str, grid: &TraceGrid| Value::from_safe_string(figures::trace_panels(id, title, grid));
         let values = context! {
             title => self.title.clone(),
-            answer => self.verdict.as_ref().map(|v| context! { verdict => answer::verdict(v) }),
+            answer => self.verdict.as_ref().map(|v| context! { verdict => fit_summary::verdict(v) }),
             settings => page::facts(&self.settings),
             notes => self.notes.clone(),
             names => self.traces.iter().map(|t| t.name.clone()).collect::<Vec<_>>(),
@@ -172,7 +172,7 @@ impl TrackReport<'_> {
             changes => tables::changes(trace),
             begins => Some(trace.section.trace.options())
                 .filter(|options| options.method.starts_itself())
-                .map(hoid_track::TrackOptions::start_in_words),
+                .map(hoid_track::TrackOptions::start_as_text),
             batch => tables::batch(trace, self.record),
         }
     }

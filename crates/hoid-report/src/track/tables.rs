@@ -42,8 +42,8 @@ pub fn methods(traces: &[Evaluated<'_>], record: &Record) -> Vec<Value> {
         };
         context! {
             name => t.section.name.clone(), method => options.method.name(), model, average,
-            forgetting => options.memory_in_words(record.sample_time()),
-            start => options.start_in_words(),
+            forgetting => options.memory_as_text(record.sample_time()),
+            start => options.start_as_text(),
             moves_from => format!("{} s", plain(trace.updated_from_s().max(record.time_s(0)))),
         }
     };

@@ -71,7 +71,7 @@ pub(super) struct OperatorState {
 
 /// What the operator says of a sample before its error is known.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Answer {
+pub(super) struct OperatorOutput {
     /// The response without the error of the sample, before the delay of whole samples.
     past: f64,
     /// The same behind the delay: what u has of it.
@@ -145,7 +145,7 @@ impl HeldLoop {
 
     /// What the operator says of the sample that is next.
     #[inline]
-    pub fn answer(&self, state: &OperatorState) -> Answer {
+    pub fn answer(&self, state: &OperatorState) -> OperatorOutput {
         let [e1, e2] = state.errors;
         let past = self.operator.output(&state.state) + self.taps[1] * e1 + self.taps[2] * e2;
         let (known, tap) = if self.delay == 0 {
@@ -154,12 +154,12 @@ impl HeldLoop {
             let mask = state.ring.len() - 1;
             (state.ring[state.k.wrapping_sub(self.delay) & mask], 0.0)
         };
-        Answer { past, known, tap }
+        OperatorOutput { past, known, tap }
     }
 
     /// Takes the error of the sample that was answered: the operator is one sample on.
     #[inline]
-    pub fn respond(&self, state: &mut OperatorState, answer: Answer, e: f64) {
+    pub fn respond(&self, state: &mut OperatorState, answer: OperatorOutput, e: f64) {
         let mask = state.ring.len() - 1;
         state.ring[state.k & mask] = answer.past + self.taps[0] * e;
         state.k += 1;
@@ -173,7 +173,7 @@ impl HeldLoop {
     #[inline]
     pub fn step(&self, state: &mut LoopState, inputs: Inputs) -> Outputs {
         let answer = self.answer(&state.operator);
-        let Answer { known, tap, .. } = answer;
+        let OperatorOutput { known, tap, .. } = answer;
         let direct = self.element_direct();
         let of_state = self.element_output * self.element.output(&state.element);
         let rest = inputs.target - of_state - direct * (known + inputs.remnant + inputs.disturbance);

@@ -121,7 +121,7 @@ impl Person {
             let Some(taken) = loop_of(population, plant, form, &draw[1..])? else {
                 continue;
             };
-            let Taken {
+            let AcceptedLoop {
                 state,
                 crossover_rad_s,
                 phase_margin_deg,
@@ -233,14 +233,14 @@ impl Person {
 }
 
 /// A loop that a population takes.
-struct Taken {
+struct AcceptedLoop {
     state: FamilyState,
     crossover_rad_s: f64,
     phase_margin_deg: f64,
 }
 
 /// The loop of one draw with its crossover and margin, where the population takes it.
-fn loop_of(population: &Population, plant: Plant, form: Form, draw: &[f64]) -> Result<Option<Taken>, SimError> {
+fn loop_of(population: &Population, plant: Plant, form: Form, draw: &[f64]) -> Result<Option<AcceptedLoop>, SimError> {
     let kinds = form.coordinates(true);
     let value = |kind: &Coordinate| match kind {
         Coordinate::Gain => 1.0,
@@ -284,7 +284,7 @@ fn loop_of(population: &Population, plant: Plant, form: Form, draw: &[f64]) -> R
         return Ok(None);
     };
     let taken = population.phase_margin_deg.contains(phase_margin_deg);
-    Ok(taken.then_some(Taken {
+    Ok(taken.then_some(AcceptedLoop {
         state,
         crossover_rad_s,
         phase_margin_deg,

@@ -211,7 +211,7 @@ impl<'a> RunAnalysis<'a> {
             ..Tracking::of(TrackRequest::of(method.clone()))
         };
         if !method.starts_itself() {
-            let structure = method.usual_structure();
+            let structure = method.default_structure();
             match from_cell.orders(structure) {
                 Ok(orders) => {
                     let has = |name: &str| name == "nk" || structure.polynomials().contains(&name[1..]);

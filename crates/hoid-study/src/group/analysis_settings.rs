@@ -119,7 +119,7 @@ impl AnalysisSettings {
         let (fitted, recursions) = (self.polynomials()?, self.recursions()?);
         let started = |structure: Structure| {
             let mut from_fits = recursions.iter().filter(|method| !method.starts_itself());
-            from_fits.any(|method| method.usual_structure() == structure)
+            from_fits.any(|method| method.default_structure() == structure)
         };
         let needed = |structure: &Structure| fitted.contains(structure) || started(*structure);
         Ok(POLYNOMIALS.into_iter().filter(needed).collect())

@@ -25,7 +25,7 @@ pub(super) enum Pairing {
 }
 
 /// The record in a file, and what was done to it; the condition may have a preparation of its own.
-fn read_file(manifest: &Manifest, condition: &str, path: &Path, pairing: Pairing) -> Result<Looked, String> {
+fn read_file(manifest: &Manifest, condition: &str, path: &Path, pairing: Pairing) -> Result<CheckedRecord, String> {
     let reading = &manifest.read;
     let text = |error: hoid_io::IoError| error.to_string();
     let options = ReadOptions {
@@ -71,11 +71,15 @@ fn read_file(manifest: &Manifest, condition: &str, path: &Path, pairing: Pairing
         recorded.record.clone(),
         recorded.account.clone(),
     );
-    let mended = as_recorded
+    let repaired = as_recorded
         .repaired(reading.faults.handling(), Of::Person)
         .map_err(|error| error.to_string())?;
-    let faults = mended.accounts.into_iter().flat_map(|account| account.faults).collect();
-    let longest = mended.records.into_iter().max_by_key(Record::len);
+    let faults = repaired
+        .accounts
+        .into_iter()
+        .flat_map(|account| account.faults)
+        .collect();
+    let longest = repaired.records.into_iter().max_by_key(Record::len);
     let mut read = ReadRecord {
         record: longest.unwrap_or_else(|| read.record.clone()),
         ..read
@@ -87,7 +91,7 @@ fn read_file(manifest: &Manifest, condition: &str, path: &Path, pairing: Pairing
         .map_err(|error| error.to_string())?;
     read.record = record;
     read.steps.extend(done.map(Step::from));
-    Ok(Looked {
+    Ok(CheckedRecord {
         factor: done.map_or(1, |done| done.factor),
         read,
         faults,
@@ -96,7 +100,7 @@ fn read_file(manifest: &Manifest, condition: &str, path: &Path, pairing: Pairing
 }
 
 /// What was read, without its faults, and which there were.
-pub(super) struct Looked {
+pub(super) struct CheckedRecord {
     read: ReadRecord,
     faults: Vec<Fault>,
     /// By how much its rate was lowered behind what counts samples as they were recorded.
@@ -145,7 +149,7 @@ pub(super) fn schemas() -> [(&'static str, TableSchema); 2] {
 }
 
 /// A file by its name in the manifest, and what was read of it.
-pub(super) type ReadFile<'a> = (&'a Path, Result<Looked, String>);
+pub(super) type ReadFile<'a> = (&'a Path, Result<CheckedRecord, String>);
 
 /// The file of a run, and the one that is joined behind it.
 pub(super) fn read_files<'a>(
@@ -200,7 +204,7 @@ pub(super) fn read_run(manifest: &Manifest, base: &Path, entry: &RunEntry, pairi
 pub(super) fn run_of(files: Vec<ReadFile<'_>>) -> Result<Run, String> {
     let mut run: Option<Run> = None;
     for (_, read) in files {
-        let Looked {
+        let CheckedRecord {
             read, factor, recorded, ..
         } = read?;
         let record = read.record;
@@ -234,7 +238,7 @@ pub(super) fn account(entry: &RunEntry, files: &[ReadFile<'_>]) -> [(&'static st
     let [(steps_name, steps), (trouble_name, trouble)] = schemas();
     let (mut steps, mut trouble) = (Rows::new(&steps), Rows::new(&trouble));
     for (file, read) in files {
-        let Ok(Looked { read, faults, .. }) = read else {
+        let Ok(CheckedRecord { read, faults, .. }) = read else {
             continue;
         };
         for fault in faults {

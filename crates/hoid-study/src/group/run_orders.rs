@@ -107,10 +107,10 @@ pub(super) fn chosen(estimates: &OutputTable, structure: Structure) -> Result<Or
         let row = (0..values.len()).filter(own).find(|i| !reason[*i].is_empty());
         return Err(row.map_or_else(|| "no delay was chosen".to_owned(), |i| reason[i].clone()));
     };
-    let usual = structure.operator_orders(nk);
+    let default = structure.operator_orders(nk);
     Ok(Orders {
-        nd: value("nd").unwrap_or(usual.nd),
-        ..usual
+        nd: value("nd").unwrap_or(default.nd),
+        ..default
     })
 }
 

@@ -358,8 +358,8 @@ fn single(table: &Spanned<DeTable<'_>>, text: &str, whole: &[&str]) -> Result<Va
 
 fn cell(variant: &Variant, index: u64, replications: u64) -> Result<Cell, PlanProblem> {
     let own: OwnKeys = variant.read()?;
-    let usual = own.condition.clone().unwrap_or_else(|| "scenario".to_owned());
-    let name = own.name.unwrap_or_else(|| usual.clone());
+    let default = own.condition.clone().unwrap_or_else(|| "scenario".to_owned());
+    let name = own.name.unwrap_or_else(|| default.clone());
     let scenario: Scenario =
         hoid_io::parse_scenario(&variant.text, "", &name).map_err(|error| of_scenario(error, variant))?;
     let resolved = scenario.resolve().map_err(|error| of_model(&error, variant))?;

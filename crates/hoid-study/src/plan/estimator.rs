@@ -14,7 +14,7 @@
 
 use std::collections::BTreeMap;
 
-use hoid_analysis::Asked;
+use hoid_analysis::ResolvedRequest;
 use hoid_ident::{Estimator, GreyBox, IdentError};
 use hoid_model::{Detrend, Orders, SampleTime, Structure, scenario::ResolvedScenario};
 use hoid_track::{Method, StartAt, TrackOptions};
@@ -65,14 +65,14 @@ pub enum Task {
     /// The operator's parameters are fitted.
     GreyBox(Box<GreyBox>),
     /// What is done as `hoid identify` does it, verdict included.
-    Analysis(Box<Asked>),
+    Analysis(Box<ResolvedRequest>),
     /// The operator is tracked.
     Track(Box<TrackOptions>),
 }
 
 impl Task {
     /// What is done as `hoid identify` does it; none of the others.
-    pub(crate) fn analysis(&self) -> Option<&Asked> {
+    pub(crate) fn analysis(&self) -> Option<&ResolvedRequest> {
         match self {
             Self::Analysis(asked) => Some(asked),
             _ => None,
@@ -94,7 +94,7 @@ impl EstimatorCell {
             name => Some(hoid_survey::method(name).map_err(|_| at("method", unknown_method(name)))?),
         };
         let structure = match &table.structure {
-            None => method.as_ref().map_or(Structure::BoxJenkins, Method::usual_structure),
+            None => method.as_ref().map_or(Structure::BoxJenkins, Method::default_structure),
             Some(name) => name
                 .parse::<Structure>()
                 .map_err(|error| at("structure", format!("is wrong: {error}")))?,
@@ -201,24 +201,24 @@ impl EstimatorCell {
         // The delay in whole samples, but for the rounding of the quotient: what is left over is
         // for b0 and those after it.
         let delay = (scenario.scenario().initial.operator.tau_e_s / ts + 1e-9).floor() as usize;
-        let of = |order: Option<Order>, usual: usize, simulated: usize| match order {
-            None | Some(Order::Range(_)) => usual,
+        let of = |order: Option<Order>, default: usize, simulated: usize| match order {
+            None | Some(Order::Range(_)) => default,
             Some(Order::Number(n)) => n,
             Some(Order::Scenario(OfScenario::True)) => simulated,
             Some(Order::Scenario(OfScenario::Ramp)) => simulated.saturating_sub(1),
         };
-        let usual = structure.operator_orders(if structure.has_input() { delay + 1 } else { 0 });
+        let default = structure.operator_orders(if structure.has_input() { delay + 1 } else { 0 });
         let nd = match &self.task {
             Task::GreyBox(_) => scenario.scenario().remnant.order,
-            _ => usual.nd,
+            _ => default.nd,
         };
         Orders {
-            na: table.na.unwrap_or(usual.na),
-            nb: table.nb.unwrap_or(usual.nb),
-            nc: of(table.nc, usual.nc, 0),
+            na: table.na.unwrap_or(default.na),
+            nb: table.nb.unwrap_or(default.nb),
+            nc: of(table.nc, default.nc, 0),
             nd: of(table.nd, nd, scenario.scenario().remnant.order),
-            nf: table.nf.unwrap_or(usual.nf),
-            nk: of(table.nk, usual.nk, delay + 1),
+            nf: table.nf.unwrap_or(default.nf),
+            nk: of(table.nk, default.nk, delay + 1),
         }
     }
 
@@ -264,7 +264,7 @@ impl EstimatorCell {
         task
     }
 
-    fn with_orders(&self, asked: &Asked, scenario: &ResolvedScenario) -> Result<Asked, IdentError> {
+    fn with_orders(&self, asked: &ResolvedRequest, scenario: &ResolvedScenario) -> Result<ResolvedRequest, IdentError> {
         let noise = self.orders.of_noise(scenario.scenario().remnant.order);
         analysis::with_orders(asked.clone(), &noise, &self.orders(scenario))
     }

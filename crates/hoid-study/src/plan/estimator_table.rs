@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use hoid_analysis::{AnalysisError, Asked, registry::estimator_setting};
+use hoid_analysis::{AnalysisError, ResolvedRequest, registry::estimator_setting};
 use hoid_ident::{
     Estimator, GreyBox, IdentError, InitialState, NamedOrders, SearchOptions,
     settings::{Kind, MethodSpec, Setting},
@@ -192,7 +192,7 @@ impl EstimatorTable {
     pub(super) fn check_placement(
         &self,
         method: Option<&Method>,
-        asked: Option<&Asked>,
+        asked: Option<&ResolvedRequest>,
         at: &impl Fn(&str, String) -> PlanProblem,
     ) -> Result<(), PlanProblem> {
         let (fits, grey_box) = (self.method == FIT, self.method == GREY_BOX);
@@ -271,26 +271,26 @@ impl EstimatorTable {
     }
 
     fn search(&self) -> SearchOptions {
-        let usual = SearchOptions::default();
+        let default = SearchOptions::default();
         SearchOptions {
-            max_iterations: self.max_iterations.unwrap_or(usual.max_iterations),
-            ..usual
+            max_iterations: self.max_iterations.unwrap_or(default.max_iterations),
+            ..default
         }
     }
 
     pub(super) fn fit(&self, structure: Structure) -> Estimator {
-        let usual = Estimator::new(structure, Orders::default());
+        let default = Estimator::new(structure, Orders::default());
         Estimator {
             initial_state: self.initial_state,
             search: self.search(),
-            starts: self.starts.unwrap_or(usual.starts),
-            ..usual
+            starts: self.starts.unwrap_or(default.starts),
+            ..default
         }
     }
 
     pub(super) fn grey_box(&self, at: &impl Fn(&str, String) -> PlanProblem) -> Result<GreyBox, PlanProblem> {
-        let usual = GreyBox::new(1..=1);
-        let range = self.delay_s.unwrap_or(usual.delay_range_s);
+        let default = GreyBox::new(1..=1);
+        let range = self.delay_s.unwrap_or(default.delay_range_s);
         if !(range.0 > 0.0 && range.0 < range.1 && range.1.is_finite()) {
             return Err(at(
                 "delay_s",
@@ -299,16 +299,19 @@ impl EstimatorTable {
         }
         Ok(GreyBox {
             delay_range_s: range,
-            initial_state: self.initial_state.unwrap_or(usual.initial_state),
+            initial_state: self.initial_state.unwrap_or(default.initial_state),
             search: self.search(),
-            starts: self.starts.unwrap_or(usual.starts),
-            ..usual
+            starts: self.starts.unwrap_or(default.starts),
+            ..default
         })
     }
 
     /// What is run as `hoid identify` runs it, with the options of the table but its orders; `None` for another
     /// method.
-    pub(super) fn asked(&self, at: &impl Fn(&str, String) -> PlanProblem) -> Result<Option<Asked>, PlanProblem> {
+    pub(super) fn asked(
+        &self,
+        at: &impl Fn(&str, String) -> PlanProblem,
+    ) -> Result<Option<ResolvedRequest>, PlanProblem> {
         let changes = self.change == Some(Change::Sigmoid);
         let Some(mut asked) = analysis::of_method(&self.method, changes) else {
             return Ok(None);
@@ -427,7 +430,7 @@ pub(super) fn plan_key(setting: &Setting) -> String {
 
 /// A value of a plan in the form of the command line.
 fn text_of(value: &toml::Value, kind: Kind) -> Result<String, String> {
-    let wrong = || format!("is {value}, expected {}", in_words(kind));
+    let wrong = || format!("is {value}, expected {}", as_text(kind));
     Ok(match (value, kind) {
         (toml::Value::String(text), Kind::Prior) if hoid_io::is_fit_file(text) => {
             let reason = "is a file, and a plan holds all that it needs; name the parameters, as \"omega_nm=9:0.2\"";
@@ -455,12 +458,12 @@ fn text_of(value: &toml::Value, kind: Kind) -> Result<String, String> {
     })
 }
 
-fn in_words(kind: Kind) -> &'static str {
+fn as_text(kind: Kind) -> &'static str {
     match kind {
         Kind::Flag => "true or false",
         Kind::Count => "a whole number",
         Kind::Number => "a number",
-        Kind::NumberOrUsual(_) => "a number, or true",
+        Kind::NumberOrDefault(_) => "a number, or true",
         Kind::Counts => "a whole number, or two",
         Kind::NumberOrSpan => "a number, or two",
         Kind::Delay => "a whole number of samples, or a text such as \"0.28s\"",

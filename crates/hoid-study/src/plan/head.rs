@@ -22,7 +22,7 @@ pub(crate) struct Head {
     pub replications: u64,
     /// Replications that are run and stored together, which a stopped study loses at most. Default
     /// 50.
-    #[serde(default = "usual_block")]
+    #[serde(default = "default_block")]
     pub block: u64,
     /// What is kept.
     #[serde(default)]
@@ -59,6 +59,6 @@ fn one() -> u64 {
     1
 }
 
-fn usual_block() -> u64 {
+fn default_block() -> u64 {
     50
 }

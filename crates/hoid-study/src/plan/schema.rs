@@ -80,7 +80,7 @@ fn of_kind(kind: Kind) -> Value {
         Kind::Flag => json!({ "type": "boolean" }),
         Kind::Count => json!({ "type": "integer", "minimum": 0 }),
         Kind::Number => json!({ "type": "number" }),
-        Kind::NumberOrUsual(_) => json!({ "type": ["number", "boolean"] }),
+        Kind::NumberOrDefault(_) => json!({ "type": ["number", "boolean"] }),
         Kind::Counts | Kind::Delay => json!({ "type": ["integer", "string"] }),
         Kind::NumberOrSpan => json!({ "type": ["number", "array"], "items": { "type": "number" } }),
         Kind::Memory => json!({ "type": ["number", "string"] }),

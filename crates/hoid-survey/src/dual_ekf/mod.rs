@@ -93,11 +93,11 @@ impl RecursiveMethod for DualEkfOptions {
     }
 
     /// It follows from a random walk of the parameters.
-    fn usual_memory(&self, _parameter: &str) -> Memory {
+    fn default_memory(&self, _parameter: &str) -> Memory {
         Memory::Infinite
     }
 
-    fn usual_nd(&self) -> Option<usize> {
+    fn default_nd(&self) -> Option<usize> {
         Some(1)
     }
 
@@ -130,7 +130,7 @@ impl RecursiveMethod for DualEkfOptions {
         true
     }
 
-    fn memory_in_words(&self) -> Option<String> {
+    fn memory_as_text(&self) -> Option<String> {
         Some("by a random walk of the parameters".to_owned())
     }
 
@@ -363,7 +363,7 @@ mod tests {
     fn options(own: DualEkfOptions, span_s: (f64, f64), nk: usize) -> TrackOptions {
         TrackOptions {
             start: StartAt::Span(Some(span_s)),
-            ..TrackOptions::usual(Method::from(own), nk)
+            ..TrackOptions::default_for(Method::from(own), nk)
         }
     }
 

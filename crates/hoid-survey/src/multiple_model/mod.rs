@@ -44,7 +44,7 @@ const WITH_DELAYS: usize = 48;
 /// Standard deviations beyond which an innovation moves the estimate no further.
 const LIMIT: f64 = 3.5;
 /// Order of the noise model when none is named: the odds need innovations that are white.
-const USUAL_ND: usize = 6;
+const DEFAULT_ND: usize = 6;
 
 settings! {
     /// Options of the bank of hypotheses.
@@ -79,12 +79,12 @@ impl RecursiveMethod for MultipleModelOptions {
         }
     }
 
-    fn usual_nd(&self) -> Option<usize> {
-        Some(USUAL_ND)
+    fn default_nd(&self) -> Option<usize> {
+        Some(DEFAULT_ND)
     }
 
     /// It follows from a model of the change.
-    fn usual_memory(&self, _parameter: &str) -> Memory {
+    fn default_memory(&self, _parameter: &str) -> Memory {
         Memory::Infinite
     }
 
@@ -130,7 +130,7 @@ impl RecursiveMethod for MultipleModelOptions {
         true
     }
 
-    fn memory_in_words(&self) -> Option<String> {
+    fn memory_as_text(&self) -> Option<String> {
         Some(format!(
             "since the last change, by a bank of hypotheses; a change is declared at log odds of {}",
             self.alarm

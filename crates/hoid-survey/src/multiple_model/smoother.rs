@@ -90,7 +90,7 @@ pub(crate) struct Joined {
 }
 
 /// Output and signals behind the whitening filter; `None` where they are not known.
-type Seen = Option<(f64, Signals)>;
+type WhitenedSample = Option<(f64, Signals)>;
 
 /// The two-sided estimates of the rows of a causal run.
 ///
@@ -134,12 +134,12 @@ fn two_sided(
 ) -> Result<Vec<Joined>, IdentError> {
     let sample_time = record.sample_time();
     let spacing = (SPACING_S / sample_time.s()).round().max(1.0);
-    let usual = change_prior(alarm, setup, sample_time)?;
+    let default = change_prior(alarm, setup, sample_time)?;
     let supposed = ChangePrior {
         birth_interval: spacing as u32,
-        hazard: usual.hazard.min(0.5 / spacing),
+        hazard: default.hazard.min(0.5 / spacing),
         neuromuscular_every: 0,
-        ..usual
+        ..default
     };
     let first = first_hypothesis(from, KNOWN_LITTLE, sample_time)?;
     let bank = |first: Hypothesis| -> Result<Box<Bank<HYPOTHESES>>, IdentError> {
@@ -172,7 +172,7 @@ fn two_sided(
 }
 
 /// Output and signals of every sample behind D, for filters about a point that began at rest.
-fn whitened(record: &Record, nk: usize, largest: f64, d: &[f64], about: [f64; 2]) -> Vec<Seen> {
+fn whitened(record: &Record, nk: usize, largest: f64, d: &[f64], about: [f64; 2]) -> Vec<WhitenedSample> {
     let (e, u) = (record.input(), record.output());
     let sound = |v: f64| v.abs() <= largest;
     let mut response = Response::new(about, record.sample_time().s());
@@ -217,16 +217,16 @@ fn sides(bank: &Bank<HYPOTHESES>) -> Vec<Side> {
 
 /// The product of two mixtures.
 fn join(before: &[Side], after: &[Side]) -> Joined {
-    let mut pairs: Vec<(f64, Pair)> = Vec::with_capacity(before.len() + after.len());
+    let mut pairs: Vec<(f64, ForwardBackward)> = Vec::with_capacity(before.len() + after.len());
     let (mut most, least) = (f64::NEG_INFINITY, LEAST.ln());
     for f in before {
         for b in after {
             // Not a number where nothing is bounded: such a pair is tried.
             let highest = f.log_weight + b.log_weight - f.size.max(b.size);
-            if highest < most + least || highest - Pair::half_square(f, b) < most + least {
+            if highest < most + least || highest - ForwardBackward::half_square(f, b) < most + least {
                 continue;
             }
-            if let Some((log, pair)) = Pair::of(f, b) {
+            if let Some((log, pair)) = ForwardBackward::of(f, b) {
                 most = most.max(log);
                 pairs.push((log, pair));
             }
@@ -278,14 +278,14 @@ fn alone(f: &Side) -> Joined {
 }
 
 /// A past and a future, with `L L' = S` and `z = L^-1 (m_b - m_f)`.
-struct Pair<'a> {
+struct ForwardBackward<'a> {
     f: &'a Side,
     b: &'a Side,
     root: [[f64; OPERATOR]; OPERATOR],
     z: [f64; OPERATOR],
 }
 
-impl<'a> Pair<'a> {
+impl<'a> ForwardBackward<'a> {
     /// What the difference takes from the logarithm of the weight, at least: `z'z` is no less than
     /// the square of one difference over its variance. As S is larger than either covariance,
     /// neither of these bounds is crossed but for rounding.

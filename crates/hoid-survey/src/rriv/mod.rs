@@ -44,7 +44,7 @@ use hoid_model::Orders;
 
 use hoid_track::{
     Sample,
-    building::{Past, Recursion, StepOutcome, bounded, weighted},
+    building::{History, Recursion, StepOutcome, bounded, weighted},
 };
 
 use filters::{Filtered, Parts, Simulated, fill_f};
@@ -99,7 +99,7 @@ pub(crate) struct RefinedRecursion {
     instrument: Option<(Following, Simulated, f64)>,
     output: Filtered,
     /// xi.
-    rest: Past,
+    rest: History,
     shortened: usize,
     work: Work,
 }
@@ -182,7 +182,7 @@ impl RefinedRecursion {
             measured: Simulated::new(&orders),
             instrument: external.then(|| (Following::new(), Simulated::new(&orders), 0.0)),
             output: Filtered::new(&orders),
-            rest: Past::new(orders.nd),
+            rest: History::new(orders.nd),
             shortened: 0,
             work: Work {
                 phi: zeros.clone(),

@@ -33,7 +33,7 @@ impl RecursiveMethod for RrivOptions {
         }
     }
 
-    fn usual_memory(&self, parameter: &str) -> Memory {
+    fn default_memory(&self, parameter: &str) -> Memory {
         short_for_b(parameter)
     }
 

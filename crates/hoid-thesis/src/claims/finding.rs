@@ -64,7 +64,7 @@ impl Claim {
             failed: count(CellOutcome::Fails),
             of: parts.iter().map(|part| part.tests.len()).sum(),
             measured: parts.iter().flat_map(measured).collect(),
-            text: in_words(&verdict, &parts),
+            text: as_text(&verdict, &parts),
             verdict,
             parts,
         }
@@ -93,7 +93,7 @@ fn measured(part: &Part) -> Vec<Measured> {
     std::iter::once(over_cells).chain(shown).collect()
 }
 
-fn in_words(verdict: &Verdict, parts: &[Part]) -> String {
+fn as_text(verdict: &Verdict, parts: &[Part]) -> String {
     let of_part = |part: &Part| {
         let (above, below) = part.beyond();
         let open = part.count(CellOutcome::Undecided);

@@ -61,7 +61,7 @@ pub fn survey(plan: &SurveyPlan, each: &(dyn Fn(&str) + Sync)) -> Result<Vec<Met
             each(&format!("cell {}, run {replication}", cell.index));
             Ok::<_, ThesisError>(found)
         };
-        let runs: Vec<Vec<Found>> = (0..cell.replications)
+        let runs: Vec<Vec<MethodResult>> = (0..cell.replications)
             .into_par_iter()
             .map(one)
             .collect::<Result<_, _>>()?;
@@ -81,14 +81,14 @@ pub fn survey(plan: &SurveyPlan, each: &(dyn Fn(&str) + Sync)) -> Result<Vec<Met
 }
 
 /// What one method found in one run.
-struct Found {
+struct MethodResult {
     name: String,
     told: &'static str,
     errors: Result<Errors, String>,
     seconds: f64,
 }
 
-fn methods_of(plan: &SurveyPlan, cell: &Cell, record: &Record, validation: &Record) -> Vec<Found> {
+fn methods_of(plan: &SurveyPlan, cell: &Cell, record: &Record, validation: &Record) -> Vec<MethodResult> {
     let scenario = cell.resolved.scenario();
     let lines: Vec<f64> = scenario.forcing.sinusoids().iter().map(|s| s.omega_rad_s).collect();
     let omega = &lines[LINES.start.min(lines.len())..LINES.end.min(lines.len())];
@@ -108,7 +108,7 @@ fn methods_of(plan: &SurveyPlan, cell: &Cell, record: &Record, validation: &Reco
         let followed = follow();
         let seconds = begin.elapsed().as_secs_f64();
         let errors = followed.and_then(|found| errors(record, &at, omega, &found));
-        Found {
+        MethodResult {
             name: name.to_owned(),
             told,
             errors: errors.map_err(|error| error.to_string()),

@@ -22,7 +22,7 @@ pub enum GuardKind {
     /// A model that foretells u worse than the past of u does.
     Misfit,
     /// An estimate that foretells u worse than the start fit does.
-    Astray,
+    Diverged,
 }
 
 hoid_model::named_choice!(GuardKind, "kind of fault", 9, {
@@ -34,7 +34,7 @@ hoid_model::named_choice!(GuardKind, "kind of fault", 9, {
     Idle => "idle",
     Swapped => "exchanged",
     Misfit => "misfit",
-    Astray => "astray",
+    Diverged => "astray",
 });
 
 /// What was done.

@@ -85,7 +85,7 @@ impl Guard {
             return false;
         };
         held >= self.shortest_pulse
-            && size <= PULSE * self.profile.usual().magnitude[1]
+            && size <= PULSE * self.profile.typical().magnitude[1]
             && (x - last).abs() <= largest_move
             && (x - last).abs() <= 0.5 * size
     }

@@ -22,7 +22,7 @@ impl Guard {
             channel,
             first: self.samples.saturating_sub(samples),
             size,
-            bad_block: !matches!(kind, GuardKind::Missing | GuardKind::Level | GuardKind::Astray),
+            bad_block: !matches!(kind, GuardKind::Missing | GuardKind::Level | GuardKind::Diverged),
             good: 0,
             doubtful: 0,
         };

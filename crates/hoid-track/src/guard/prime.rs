@@ -76,13 +76,13 @@ impl Guard {
             })
             .collect();
         let over = |of: &dyn Fn(&Block) -> f64| middle(blocks.iter().map(of).collect());
-        let usual = Block {
+        let typical = Block {
             differences: std::array::from_fn(|c| std::array::from_fn(|j| over(&|b| b.differences[c][j]))),
             magnitude: std::array::from_fn(|c| over(&|b| b.magnitude[c])),
             mean: centre,
             ..Block::default()
         };
-        self.profile = Profile::of(&usual);
+        self.profile = Profile::of(&typical);
         for (c, channel) in self.channels.iter_mut().enumerate() {
             channel.set_tails(outer[c], inner[c]);
         }

@@ -1,7 +1,7 @@
 //! The recursion in the basis that people share ([`hoid_core::adaptive`]) behind the face of a
 //! recursion: what is usual of people, in seconds.
 //!
-//! It needs no start fit: it begins with what is usual of people ([`hoid_core::adaptive::usual`]). The delay begins at
+//! It needs no start fit: it begins with what is usual of people ([`hoid_core::adaptive::default`]). The delay begins at
 //! that of nk, .2 s where nothing is said, and at half a sample more, for an error that is held.
 //!
 //! **What is known of the person** before the first sample is `prior`: what is usual, next to nothing,
@@ -13,13 +13,12 @@
 
 mod starting_point;
 
-use starting_point::{StartingPoint, initial_estimate};
 use hoid_core::{
     adaptive::{
-        AdaptiveFilter, GAINS, DYNAMICS, LARGEST_ORDER, LINEAR, PARAMETERS,
+        AdaptiveFilter, DYNAMICS, GAINS, LARGEST_ORDER, LINEAR, PARAMETERS,
         basis::Basis,
-        memory_needed, through,
         defaults::{self, DefaultOperator},
+        memory_needed, through,
     },
     state::{State, visit_all},
 };
@@ -28,6 +27,7 @@ use hoid_model::{
     SampleTime, Structure,
     uncertainty::{Estimate, OperatorEstimate},
 };
+use starting_point::{StartingPoint, initial_estimate};
 
 use crate::{
     change::Change,
@@ -38,7 +38,7 @@ use crate::{
     recursion::{Recursion, Sample, StepOutcome},
     reported::Reported,
     response::Response,
-    setup::{Setup, StartAt, USUAL_DELAY_S},
+    setup::{DEFAULT_DELAY_S, Setup, StartAt},
     start::StartState,
 };
 
@@ -81,12 +81,12 @@ impl RecursiveMethod for AdaptiveOptions {
         Some("population")
     }
 
-    fn usual_nd(&self) -> Option<usize> {
+    fn default_nd(&self) -> Option<usize> {
         Some(defaults::ORDER)
     }
 
     /// It follows from the weights of the drifts.
-    fn usual_memory(&self, _parameter: &str) -> Memory {
+    fn default_memory(&self, _parameter: &str) -> Memory {
         Memory::Infinite
     }
 
@@ -134,7 +134,7 @@ impl RecursiveMethod for AdaptiveOptions {
         true
     }
 
-    fn memory_in_words(&self) -> Option<String> {
+    fn memory_as_text(&self) -> Option<String> {
         Some(format!(
             "since the last change where nothing changes; a change is declared so that {} false alarm{} an hour may be expected",
             self.false_alarms,
@@ -188,7 +188,7 @@ impl AdaptiveRecursion {
         let ts = sample_time.s();
         let nk = setup.orders.nk;
         // A delay that is not the default one has been given.
-        let is_given = nk != sample_time.nk(USUAL_DELAY_S);
+        let is_given = nk != sample_time.nk(DEFAULT_DELAY_S);
         let beginning = StartingPoint::of(&options.prior, (nk as f64 - 0.5) * ts, is_given, sample_time)?;
         let point = beginning.point;
         let basis = Basis::new(point, ts).ok_or_else(|| unusable(&format!("a delay of {} s", point.tau)))?;

@@ -20,7 +20,7 @@ use crate::{
 
 pub use adaptive::AdaptiveOptions;
 pub use rls::RlsOptions;
-pub use rpem::{RpemOptions, USUAL_LIMIT, short_for_b};
+pub use rpem::{DEFAULT_LIMIT, RpemOptions, short_for_b};
 
 /// A recursive method with its options; what it says of itself is that of [`RecursiveMethod`].
 #[derive(Debug)]
@@ -134,9 +134,9 @@ impl Method {
 
     /// The operator's orders with the noise model that the method takes when none is named: that of the
     /// structure, or of the order that the method names.
-    pub fn usual_orders(&self, nk: usize) -> Orders {
-        let orders = self.usual_structure().operator_orders(nk);
-        match self.usual_nd() {
+    pub fn default_orders(&self, nk: usize) -> Orders {
+        let orders = self.default_structure().operator_orders(nk);
+        match self.default_nd() {
             Some(nd) => Orders { nd, ..orders },
             None => orders,
         }
@@ -144,7 +144,7 @@ impl Method {
 
     /// The structure that the method takes when none is named: Box-Jenkins, or the first that it
     /// serves.
-    pub fn usual_structure(&self) -> Structure {
+    pub fn default_structure(&self) -> Structure {
         let served = self.about().structures;
         match served.first() {
             Some(first) if !served.contains(&Structure::BoxJenkins) => *first,

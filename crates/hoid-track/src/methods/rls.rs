@@ -47,7 +47,7 @@ impl RecursiveMethod for RlsOptions {
     }
 
     /// The text's 256 samples at 100 Hz.
-    fn usual_memory(&self, _parameter: &str) -> Memory {
+    fn default_memory(&self, _parameter: &str) -> Memory {
         Memory::Seconds(2.56)
     }
 

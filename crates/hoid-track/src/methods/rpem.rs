@@ -37,7 +37,7 @@ settings! {
 }
 
 /// What an innovation may move an estimate at most, in standard deviations.
-pub const USUAL_LIMIT: f64 = 5.0;
+pub const DEFAULT_LIMIT: f64 = 5.0;
 
 impl RecursiveMethod for RpemOptions {
     fn about(&self) -> About {
@@ -58,7 +58,7 @@ impl RecursiveMethod for RpemOptions {
         }
     }
 
-    fn usual_memory(&self, parameter: &str) -> Memory {
+    fn default_memory(&self, parameter: &str) -> Memory {
         short_for_b(parameter)
     }
 
@@ -103,7 +103,7 @@ impl RecursiveMethod for RpemOptions {
     }
 
     fn limit(&self) -> f64 {
-        self.gain.limit_or(USUAL_LIMIT)
+        self.gain.limit_or(DEFAULT_LIMIT)
     }
 
     fn track_delay_s(&self) -> Option<(f64, f64)> {

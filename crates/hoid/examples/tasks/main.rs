@@ -245,7 +245,7 @@ pub fn rpem(e: &[f64], u: &[f64], history: &mut Vec<[f64; 5]>) -> [f64; 5] {
 
 /// The same start and memory through `track`.
 pub fn traced(method: Method) -> TrackOptions {
-    let structure = method.usual_structure();
+    let structure = method.default_structure();
     let start = StartAt::Theta(match method == Method::rls() {
         true => vec![0.0; 4],
         false => RPEM_START.to_vec(),

@@ -6,7 +6,7 @@ mod pooled;
 
 use std::path::{Path, PathBuf};
 
-use hoid::analysis::Known;
+use hoid::analysis::LookOptions;
 use hoid::model::{SampleTime, VerdictLevel};
 use hoid::report::{group_figures, write_group_pages};
 use hoid::sim::people::{Population, Range};
@@ -20,7 +20,7 @@ use hoid::study::{
 
 use form::Finished;
 
-use super::{figure, paper_table, places, study::with_progress};
+use super::{figure, output_paths, paper_table, study::with_progress};
 use crate::{
     args::{GroupArgs, GroupCommand, GroupInitArgs, GroupRunArgs, SimulateGroupArgs},
     error::CliError,
@@ -111,7 +111,7 @@ fn write_manifest(args: &GroupInitArgs) -> Result<(), CliError> {
         )));
     }
     let (mut manifest, others) = Manifest::of_directory(&args.directory, &pattern)?;
-    let known = Known {
+    let known = LookOptions {
         offset_samples: args.offset,
         ..args.look.known()
     };
@@ -166,10 +166,10 @@ fn analyse(path: &Path, out: &Path, args: &GroupRunArgs) -> Result<(), CliError>
     }
     if let Some(figure) = &args.picture.figure {
         figure::check(figure)?;
-        places::check(&[&path], &[Some(figure)], &[])?;
+        output_paths::check(&[&path], &[Some(figure)], &[])?;
     }
     paper_table::check(&args.show)?;
-    places::check(&[&path], &[args.show.table.as_deref()], &[])?;
+    output_paths::check(&[&path], &[args.show.table.as_deref()], &[])?;
     let manifest = Manifest::read(&path)?;
     // What goes on writes no manifest.
     if !args.resume {

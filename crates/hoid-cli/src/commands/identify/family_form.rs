@@ -15,7 +15,7 @@ const STRAIGHT_ERRORS: f64 = 2.0;
 const LEAST_HALF_S: f64 = 0.007;
 
 /// Everything that was found.
-pub struct Found<'a> {
+pub struct FamilyReport<'a> {
     pub identified: &'a Identified,
     pub fit: &'a FamilyFit,
     pub files: &'a [String],
@@ -27,7 +27,7 @@ pub struct Found<'a> {
     pub settings: &'a [Setting],
 }
 
-impl Found<'_> {
+impl FamilyReport<'_> {
     /// The answer, and with `verbose` what is behind it.
     pub fn page(&self, verbose: bool) -> Result<String, CliError> {
         let mut page = self.answer(verbose)?;

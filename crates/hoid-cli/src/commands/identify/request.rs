@@ -1,6 +1,6 @@
 //! From the options of `hoid identify` to what is asked of the library.
 
-use hoid::analysis::{Asked, Request};
+use hoid::analysis::{Request, ResolvedRequest};
 
 use crate::{args::IdentifyArgs, error::CliError, output};
 
@@ -8,7 +8,7 @@ use crate::{args::IdentifyArgs, error::CliError, output};
 ///
 /// # Errors
 /// [`CliError::Usage`].
-pub fn asked(args: &IdentifyArgs) -> Result<Asked, CliError> {
+pub fn asked(args: &IdentifyArgs) -> Result<ResolvedRequest, CliError> {
     let request = Request {
         structure: args.structure.clone(),
         method: Some(args.method.clone()),
@@ -20,7 +20,7 @@ pub fn asked(args: &IdentifyArgs) -> Result<Asked, CliError> {
         faults: args.faults.faults,
         rate: args.read.prepare.rate.decimate,
     };
-    let (asked, notes) = request.asked().map_err(CliError::of_options)?;
+    let (asked, notes) = request.resolve().map_err(CliError::of_options)?;
     for note in notes {
         output::notice("", format!("note: {note}"));
     }
@@ -31,8 +31,8 @@ pub fn asked(args: &IdentifyArgs) -> Result<Asked, CliError> {
 }
 
 /// The first option of reading and writing that has no meaning for what is asked, and what it belongs to.
-fn misplaced(args: &IdentifyArgs, asked: &Asked) -> Option<(&'static str, &'static str)> {
-    let changing = matches!(asked, Asked::Change(_));
+fn misplaced(args: &IdentifyArgs, asked: &ResolvedRequest) -> Option<(&'static str, &'static str)> {
+    let changing = matches!(asked, ResolvedRequest::Change(_));
     let steady = "a model that does not change";
     let all = [
         (

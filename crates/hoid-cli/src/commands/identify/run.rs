@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use hoid::analysis::{
-    Asked, Excitation, Identified, PolynomialFit, Recordings,
+    Excitation, Identified, PolynomialFit, Recordings, ResolvedRequest,
     json::{BatchAnswer, PolynomialAnswer},
 };
 use hoid::ident::{
@@ -12,13 +12,13 @@ use hoid::ident::{
     validation::{nrmse_fit, vaf},
 };
 use hoid::model::{GainUnit, Record};
-use hoid::report::{Answer, ModelSection, Report, known_operator, model_figure, model_picture, write_report};
+use hoid::report::{FitSummary, ModelSection, Report, known_operator, model_figure, model_picture, write_report};
 use serde_json::Value;
 
 use super::{family, request, sigmoid};
 use crate::{
     args::IdentifyArgs,
-    commands::{figure, paper_table, places, reading},
+    commands::{figure, output_paths, paper_table, reading},
     error::CliError,
     family_operator, json, output, text,
 };
@@ -38,9 +38,9 @@ pub fn run(args: &IdentifyArgs) -> Result<(), CliError> {
     let other = args.validate.as_deref();
     let other = other.map(|path| reading.file(path, reading::told)).transpose()?;
     match asked {
-        Asked::Operator(identification) => family::run(args, &identification, read, other),
-        Asked::Change(identification) => sigmoid::run(args, &identification, read),
-        Asked::Remnant(identification) => {
+        ResolvedRequest::Operator(identification) => family::run(args, &identification, read, other),
+        ResolvedRequest::Change(identification) => sigmoid::run(args, &identification, read),
+        ResolvedRequest::Remnant(identification) => {
             let found = output::watched("fitting", || identification.run(read))?;
             show(
                 args,
@@ -50,7 +50,7 @@ pub fn run(args: &IdentifyArgs) -> Result<(), CliError> {
                 other,
             )
         }
-        Asked::Polynomials(identification) => {
+        ResolvedRequest::Polynomials(identification) => {
             let found = output::watched("fitting", || identification.run(read))?;
             let PolynomialFit { fit, choice } = &found.fit;
             show(args, &found, fit, (choice.as_ref(), None), other)
@@ -95,7 +95,7 @@ fn show<F: BatchAnswer>(
                 truth: known_operator(records),
                 margins: answer.margins,
             }],
-            answer: Some(Answer {
+            answer: Some(FitSummary {
                 verdict: verdict.clone(),
                 sentence: sentence(&answer),
                 parameters: Vec::new(),
@@ -127,7 +127,7 @@ fn check_places(args: &IdentifyArgs) -> Result<(), CliError> {
     let mut inputs: Vec<&Path> = args.records.iter().map(PathBuf::as_path).collect();
     inputs.extend(args.validate.as_deref());
     inputs.extend(args.options.text("prior").map(Path::new));
-    places::check(
+    output_paths::check(
         &inputs,
         &[
             args.picture.figure.as_deref(),

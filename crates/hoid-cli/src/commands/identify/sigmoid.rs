@@ -29,7 +29,7 @@ pub fn run(
         .iter()
         .map(test)
         .collect::<Result<Vec<Option<LjungBox>>, CliError>>()?;
-    let found = Found {
+    let found = SigmoidReport {
         fit,
         verdict,
         files: &data.names,
@@ -84,7 +84,7 @@ fn before_and_after(fit: &SigmoidFit) -> String {
 }
 
 /// Everything that was found.
-struct Found<'a> {
+struct SigmoidReport<'a> {
     fit: &'a SigmoidFit,
     verdict: &'a Verdict,
     files: &'a [String],
@@ -95,7 +95,7 @@ struct Found<'a> {
     settings: &'a [Setting],
 }
 
-impl Found<'_> {
+impl SigmoidReport<'_> {
     /// The answer, and with `verbose` what is behind it.
     fn page(&self, verbose: bool) -> String {
         let Self {

@@ -25,7 +25,7 @@
 use hoid::model::{SampleTime, VerdictLevel, uncertainty::Estimate};
 use hoid::track::{Change, Live};
 
-use super::lines::Read;
+use super::lines::StreamSample;
 
 const MAGIC: &[u8; 4] = b"hoid";
 /// Bytes of a sample and of an estimate.
@@ -87,12 +87,12 @@ impl SampleDatagram {
     }
 
     /// As a line would be read: a value with a fault is NaN.
-    pub fn read(&self, sample_time: SampleTime, largest: f64) -> Read {
+    pub fn read(&self, sample_time: SampleTime, largest: f64) -> StreamSample {
         let sound = |v: f64| v.abs() <= largest;
         let told = |name: &str, v: f64| (!sound(v)).then(|| format!("{name} is {v}"));
         let faults: Vec<String> = [told("e", self.e), told("u", self.u)].into_iter().flatten().collect();
         let value = |v: f64| if sound(v) { v } else { f64::NAN };
-        Read {
+        StreamSample {
             t: Some(if self.t.is_finite() {
                 self.t
             } else {

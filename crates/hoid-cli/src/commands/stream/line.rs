@@ -121,7 +121,7 @@ impl From<&Estimate> for Number {
 }
 
 /// Where the recursion stands after a line of the input.
-pub struct Standing<'a> {
+pub struct StreamStatus<'a> {
     /// Time of the last sample, s.
     pub t: Option<f64>,
     pub live: &'a Live,
@@ -141,7 +141,7 @@ pub struct Standing<'a> {
     pub finding: Option<&'a Finding>,
 }
 
-impl Standing<'_> {
+impl StreamStatus<'_> {
     /// Writes the line into a buffer, its end included.
     ///
     /// # Errors

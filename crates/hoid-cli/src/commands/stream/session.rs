@@ -10,13 +10,13 @@ use hoid::track::{Change, Live, LiveOutcome, Sample, TrackFault, TrackOptions, T
 use super::{
     clock::{Arrival, Clock, LONGEST_GAP_S},
     datagram::{Datagram, EstimateDatagram},
-    line::{Counts, Standing},
-    lines::{Columns, Meaning, Read, is_object},
+    line::{Counts, StreamStatus},
+    lines::{Columns, ParsedLine, StreamSample, is_object},
 };
 use crate::{args::StreamArgs, commands::reading, error::CliError, output, recursion, text};
 
 /// Length of the warm-up when none is typed, s.
-const USUAL_WARM_UP_S: f64 = 20.0;
+const DEFAULT_WARM_UP_S: f64 = 20.0;
 /// Faults that are kept for the next line.
 const FAULTS_TOLD: usize = 4;
 
@@ -61,7 +61,7 @@ impl Session {
         sample_time: SampleTime,
         decimator: Option<Decimator<3>>,
     ) -> Result<Self, CliError> {
-        let length_s = args.warm_up.unwrap_or(USUAL_WARM_UP_S);
+        let length_s = args.warm_up.unwrap_or(DEFAULT_WARM_UP_S);
         let tracked = decimator.as_ref().map_or(sample_time, Decimator::sample_time);
         let samples = (length_s / tracked.s()).round();
         if !(1.0..=1e7).contains(&samples) {
@@ -123,24 +123,24 @@ impl Session {
 
     /// Takes a line; true when the output has a line for it.
     pub fn take(&mut self, text: Result<String, String>) -> Result<bool, CliError> {
-        let meaning = match text {
+        let line = match text {
             Ok(text) => self.columns.read(&text)?,
-            Err(reason) => Meaning::Unreadable(reason),
+            Err(reason) => ParsedLine::Unreadable(reason),
         };
-        Ok(self.meant(meaning))
+        Ok(self.handle(line))
     }
 
     /// Takes what a line means; true when the output has a line for it.
-    fn meant(&mut self, meaning: Meaning) -> bool {
+    fn handle(&mut self, line: ParsedLine) -> bool {
         self.forget_innovation();
-        match meaning {
-            Meaning::Nothing => return false,
-            Meaning::Sample(read) => self.timed(read),
+        match line {
+            ParsedLine::Nothing => return false,
+            ParsedLine::Sample(read) => self.timed(read),
             // By its time the next line will tell whether a sample is missing.
-            Meaning::Unreadable(reason) if self.columns.have_time() || !self.columns.are_known() => {
+            ParsedLine::Unreadable(reason) if self.columns.have_time() || !self.columns.are_known() => {
                 self.dropped(format!("{reason}: dropped"));
             }
-            Meaning::Unreadable(reason) => {
+            ParsedLine::Unreadable(reason) => {
                 self.fault(reason);
                 self.sample(f64::NAN, f64::NAN, None);
             }
@@ -176,10 +176,10 @@ impl Session {
                 };
                 for line in lines {
                     match self.columns.read(line) {
-                        Ok(Meaning::Unreadable(reason)) => self.dropped(format!("{reason}: dropped")),
+                        Ok(ParsedLine::Unreadable(reason)) => self.dropped(format!("{reason}: dropped")),
                         Err(error) => self.dropped(format!("{error}: dropped")),
-                        Ok(meaning) => {
-                            if self.meant(meaning) {
+                        Ok(line) => {
+                            if self.handle(line) {
                                 answer(self, None)?;
                             }
                         }
@@ -201,7 +201,7 @@ impl Session {
     }
 
     /// Takes a sample at its place in time.
-    fn timed(&mut self, read: Read) {
+    fn timed(&mut self, read: StreamSample) {
         if let Some(t) = read.t {
             self.has_time = true;
             match self.clock.take(t) {
@@ -276,7 +276,7 @@ impl Session {
             };
             let reference = Some(f_t).filter(|f| f.is_finite());
             (sample, tracked) = (Sample { e, u, reference }, decimator.sample_time());
-            behind_s = decimator.behind() as f64 * self.sample_time.s();
+            behind_s = decimator.lag_samples() as f64 * self.sample_time.s();
             self.innovation = None;
         }
         // The time that the recursion has come to.
@@ -320,7 +320,7 @@ impl Session {
     /// Writes the line of the output into a buffer.
     pub fn write(&mut self, buffer: &mut Vec<u8>) -> Result<(), CliError> {
         let fault = (!self.faults.is_empty()).then(|| self.faults.drain(..).collect::<Vec<_>>().join("; "));
-        let standing = Standing {
+        let standing = StreamStatus {
             t: self.t,
             live: &self.live,
             names: &self.names,

@@ -174,7 +174,9 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         }
         let (p, at) = (self.prior.person, candidate.basis().point());
         let mean = [p.omega - at.omega, p.zeta - at.zeta, p.tau - at.tau];
-        candidate.mixture.replace_prior(trusted(at), variances(&self.prior), mean);
+        candidate
+            .mixture
+            .replace_prior(trusted(at), variances(&self.prior), mean);
     }
 }
 

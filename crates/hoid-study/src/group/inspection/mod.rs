@@ -12,7 +12,7 @@ mod first_fit;
 
 use std::path::Path;
 
-use hoid_analysis::{Known, Look, Seen};
+use hoid_analysis::{Look, LookOptions, RecordSummary};
 
 pub use evidence::Evidence;
 
@@ -24,7 +24,7 @@ use crate::StudyError;
 /// # Errors
 /// [`StudyError::Io`] where the first file cannot be read at all; what cannot be found is said in
 /// the evidence.
-pub fn inspect(manifest: &mut Manifest, directory: &Path, known: &Known) -> Result<Vec<Evidence>, StudyError> {
+pub fn inspect(manifest: &mut Manifest, directory: &Path, known: &LookOptions) -> Result<Vec<Evidence>, StudyError> {
     let mut evidence = Vec::new();
     let first = Look::at(&directory.join(&manifest.runs[0].file), known)?;
     let shown = manifest.runs[0].file.display().to_string();
@@ -52,7 +52,7 @@ pub fn inspect(manifest: &mut Manifest, directory: &Path, known: &Known) -> Resu
     evidence.push(Evidence::new("[read]", "input", input.why));
     evidence.push(Evidence::new("[read]", "output", output.why));
     // All files are read by the columns of the first.
-    let of_all = Known {
+    let of_all = LookOptions {
         input: Some(input.column.clone()),
         output: Some(output.column.clone()),
         ..known.clone()
@@ -126,10 +126,10 @@ pub fn inspect(manifest: &mut Manifest, directory: &Path, known: &Known) -> Resu
 
 /// What the first run of a condition says of it.
 fn look_at(
-    seen: &Seen,
+    seen: &RecordSummary,
     condition: &str,
     table: &str,
-    known: &Known,
+    known: &LookOptions,
     evidence: &mut Vec<Evidence>,
     spans: &mut Vec<(f64, f64)>,
 ) -> ConditionSettings {

@@ -29,7 +29,7 @@ fn a_product_is_that_of_the_information_form() {
         side([1.0, 2.0, 3.0, 4.0], 0.5, 0.4),
         side([1.5, 1.0, 3.5, 4.2], 2.0, 0.6),
     );
-    let (_, pair) = Pair::of(&f, &b).unwrap();
+    let (_, pair) = ForwardBackward::of(&f, &b).unwrap();
     let joined = pair.product();
     let square = |m: &[[f64; OPERATOR]; OPERATOR]| nalgebra::Matrix4::from_fn(|i, j| m[i][j]);
     let inverse = |s: &Side| square(&s.covariance).try_inverse().unwrap();
@@ -68,8 +68,8 @@ fn options() -> TrackOptions {
         start: StartAt::Span(Some((0.0, 30.72))),
         ..TrackOptions::new(
             multiple_model().with("smooth", "true").unwrap(),
-            multiple_model().usual_structure(),
-            multiple_model().usual_orders(29),
+            multiple_model().default_structure(),
+            multiple_model().default_orders(29),
         )
     }
 }

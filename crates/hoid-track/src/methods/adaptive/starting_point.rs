@@ -14,11 +14,11 @@
 //! the variance of eps are `r_k = sum_j g_j g_{j+k}`.
 
 use hoid_core::adaptive::{
-    GAINS, DYNAMICS, LARGEST_ORDER, LINEAR, STATES,
+    DYNAMICS, GAINS, LARGEST_ORDER, LINEAR, STATES,
     basis::{Basis, Point, REFERENCE},
+    defaults::{DefaultOperator, GIVEN_DELAY_S, LAG_S},
     initial_estimate::InitialEstimate,
     noise::Lags,
-    defaults::{GIVEN_DELAY_S, LAG_S, DefaultOperator},
 };
 use hoid_ident::IdentError;
 use hoid_model::{Complex64, FittedOperator, SampleTime, operator_family::Coordinate, uncertainty::variance_along};
@@ -115,7 +115,11 @@ fn no_place(fit: &FittedOperator, why: &str) -> IdentError {
 ///
 /// # Errors
 /// [`IdentError::BadStart`] for a form that is not near to any gains.
-pub(super) fn initial_estimate(fit: &FittedOperator, basis: &Basis, sample_time: SampleTime) -> Result<InitialEstimate, IdentError> {
+pub(super) fn initial_estimate(
+    fit: &FittedOperator,
+    basis: &Basis,
+    sample_time: SampleTime,
+) -> Result<InitialEstimate, IdentError> {
     let nearest = Nearest::new(fit, basis, sample_time);
     let (value, misfit) = nearest.gains(|k| nearest.responses[k].value);
     if misfit > MISFIT {
@@ -308,7 +312,7 @@ fn solved(a: [[f64; GAINS]; GAINS], b: [f64; GAINS]) -> [f64; GAINS] {
 #[cfg(test)]
 mod tests {
     #![allow(clippy::unwrap_used)]
-    use hoid_core::adaptive::usual;
+    use hoid_core::adaptive::defaults;
     use hoid_model::{FamilyOperator, Form, uncertainty::variance_along};
 
     use super::*;
@@ -332,7 +336,7 @@ mod tests {
     }
 
     fn tracker(fit: FittedOperator) -> Result<Tracker, IdentError> {
-        let mut options = TrackOptions::usual(Method::adaptive(), 21);
+        let mut options = TrackOptions::default_for(Method::adaptive(), 21);
         options.method.start_from(fit).unwrap();
         Tracker::new(&options, None, SampleTime::HUNDREDTH)
     }

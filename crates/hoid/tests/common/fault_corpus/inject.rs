@@ -3,7 +3,7 @@
 use hoid::prelude::RunSeed;
 
 use super::{
-    kinds::{Fault, On, Place, WHOLE, What},
+    kinds::{Fault, FaultPosition, On, WHOLE, What},
     table::{Table, spread},
 };
 
@@ -39,10 +39,10 @@ pub fn inject(fault: &Fault, clean: &Table, second: &Table, seed: u64, case: u64
     let sign = |i: u64| if draw(i) < 0.5 { -1.0 } else { 1.0 };
     let near = |share: f64| ((share + 0.02 * (draw(0) - 0.5)) * n as f64) as usize;
     let at = match fault.place {
-        Place::Start => near(0.06),
-        Place::Middle => near(0.5),
-        Place::End => near(0.9),
-        Place::Whole => 0,
+        FaultPosition::Start => near(0.06),
+        FaultPosition::Middle => near(0.5),
+        FaultPosition::End => near(0.9),
+        FaultPosition::Whole => 0,
     };
     let samples = |seconds: f64| ((seconds / clean.h).round() as usize).max(1);
     let until = |length: usize| at.saturating_add(length).min(n);
@@ -92,9 +92,9 @@ pub fn inject(fault: &Fault, clean: &Table, second: &Table, seed: u64, case: u64
         What::Idle | What::IdleNoisy => {
             // Before the run, inside it, behind it.
             let at = match fault.place {
-                Place::Start => 0,
-                Place::End => n,
-                Place::Middle | Place::Whole => at,
+                FaultPosition::Start => 0,
+                FaultPosition::End => n,
+                FaultPosition::Middle | FaultPosition::Whole => at,
             };
             let small = if fault.kind.what == What::Idle { 0.0 } else { 1e-3 };
             let length = samples(size);

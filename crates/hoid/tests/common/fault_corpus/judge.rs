@@ -27,7 +27,7 @@ const OF_FAULTS: [&str; 4] = ["faults", "held-back", "hostile-span", "restarted"
 
 /// What is known of a case.
 #[derive(Debug, Clone)]
-pub struct Known {
+pub struct CaseTruth {
     pub truth: Truth,
     /// The truth behind the fault, where that is another person.
     pub then: Option<Truth>,
@@ -40,7 +40,7 @@ pub struct Known {
 
 /// The judgement of one result.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Judged {
+pub struct CaseOutcome {
     /// The parameter that is off most, and by how many standard errors.
     pub worst: Option<(String, f64)>,
     pub wrong: bool,
@@ -59,7 +59,7 @@ pub struct Judged {
     pub lasting: Option<f64>,
 }
 
-impl Judged {
+impl CaseOutcome {
     /// A record that the program refuses.
     pub fn refused() -> Self {
         Self {
@@ -90,10 +90,10 @@ pub struct Row {
 }
 
 /// Judges a fit by what the program printed.
-pub fn of_fit(json: &Value, known: &Known) -> Judged {
+pub fn of_fit(json: &Value, known: &CaseTruth) -> CaseOutcome {
     let claims = claims_of(json, known);
     let worst = worst_of(&claims, &known.truth);
-    Judged {
+    CaseOutcome {
         wrong: worst.as_ref().is_some_and(|(_, z)| *z > WRONG),
         worst,
         ..reported(json, known)
@@ -101,7 +101,7 @@ pub fn of_fit(json: &Value, known: &Known) -> Judged {
 }
 
 /// Judges a trace.
-pub fn of_trace(json: &Value, rows: &[Row], known: &Known) -> Judged {
+pub fn of_trace(json: &Value, rows: &[Row], known: &CaseTruth) -> CaseOutcome {
     let truth_at = |t: f64| match (&known.then, known.span_s) {
         (Some(then), Some((from, _))) if t >= from => then,
         _ => &known.truth,
@@ -130,7 +130,7 @@ pub fn of_trace(json: &Value, rows: &[Row], known: &Known) -> Judged {
             None => 0.0,
         })
     });
-    Judged {
+    CaseOutcome {
         wrong: worst.as_ref().is_some_and(|(_, z)| *z > WRONG),
         worst,
         recovery_s,
@@ -140,7 +140,7 @@ pub fn of_trace(json: &Value, rows: &[Row], known: &Known) -> Judged {
 }
 
 /// Verdict and reported faults of any result.
-fn reported(json: &Value, known: &Known) -> Judged {
+fn reported(json: &Value, known: &CaseTruth) -> CaseOutcome {
     let verdict = &json["verdict"];
     let findings = verdict["findings"].as_array().map_or(&[][..], Vec::as_slice);
     let graver = findings.iter().filter(|f| f["severity"] != "note");
@@ -157,17 +157,17 @@ fn reported(json: &Value, known: &Known) -> Judged {
         let ends = fault["to"].as_f64().unwrap_or(f64::INFINITY);
         begins <= to + NEAR_S && ends >= from - NEAR_S
     };
-    Judged {
+    CaseOutcome {
         level: verdict["level"].as_str().unwrap_or("none").to_owned(),
         of_faults: kinds.iter().any(|kind| OF_FAULTS.contains(&kind.as_str())),
         kinds,
         told: faults.len(),
         placed: faults.iter().filter(of_file).any(meets),
-        ..Judged::default()
+        ..CaseOutcome::default()
     }
 }
 
-fn claims_of(json: &Value, known: &Known) -> Vec<Claim> {
+fn claims_of(json: &Value, known: &CaseTruth) -> Vec<Claim> {
     let named = |name: &str| {
         let listed = json["parameters"]
             .as_array()

@@ -80,7 +80,7 @@ pub struct Kind {
 
 /// Where in the record.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Place {
+pub enum FaultPosition {
     /// At 6 % of its length.
     Start,
     /// At a half.
@@ -96,15 +96,15 @@ pub enum Place {
 pub struct Fault {
     pub kind: Kind,
     pub size: f64,
-    pub place: Place,
+    pub place: FaultPosition,
 }
 
 const CHANNELS: &[On] = &[On::E, On::U, On::Both];
 const EACH: &[On] = &[On::E, On::U];
 const TOGETHER: &[On] = &[On::Both];
 const ONE: &[On] = &[On::U];
-const PLACES: &[Place] = &[Place::Start, Place::Middle, Place::End];
-const ALL: &[Place] = &[Place::Whole];
+const PLACES: &[FaultPosition] = &[FaultPosition::Start, FaultPosition::Middle, FaultPosition::End];
+const ALL: &[FaultPosition] = &[FaultPosition::Whole];
 /// The whole record.
 pub const WHOLE: f64 = f64::INFINITY;
 
@@ -115,7 +115,7 @@ type Line = (
     &'static str,
     &'static [On],
     &'static [f64],
-    &'static [Place],
+    &'static [FaultPosition],
 );
 
 const LINES: [Line; 23] = [
@@ -158,7 +158,7 @@ const LINES: [Line; 23] = [
         "times",
         TOGETHER,
         &[10.0, 1e6],
-        &[Place::Start, Place::Middle],
+        &[FaultPosition::Start, FaultPosition::Middle],
     ),
     (What::Milliseconds, "t in ms", "", TOGETHER, &[1000.0], ALL),
     (What::Swapped, "swapped", "s", TOGETHER, &[10.0, 30.0, WHOLE], PLACES),
@@ -196,7 +196,7 @@ impl Fault {
     pub const NONE: Self = Self {
         kind: Kind::NOTHING,
         size: 0.0,
-        place: Place::Whole,
+        place: FaultPosition::Whole,
     };
 
     /// Size with its unit: `30 sigma`.

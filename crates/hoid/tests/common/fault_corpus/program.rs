@@ -12,7 +12,7 @@ use serde_json::Value;
 use super::{
     bases::{Base, Who, base},
     inject::inject,
-    judge::{self, Judged, Known, Row},
+    judge::{self, CaseOutcome, CaseTruth, Row},
     kinds::{Fault, What},
 };
 
@@ -83,7 +83,7 @@ pub struct Outcome {
     pub label: String,
     pub way: Way,
     pub seconds: f64,
-    pub judged: Judged,
+    pub judged: CaseOutcome,
     /// What the program said when it gave no result.
     pub refusal: Option<String>,
 }
@@ -109,7 +109,7 @@ pub fn outcomes(
         let found = run(program, *way, &base, &files, &known, &folder)?;
         let (judged, refusal) = match found {
             Ok(judged) => (judged, None),
-            Err(said) => (Judged::refused(), Some(said)),
+            Err(said) => (CaseOutcome::refused(), Some(said)),
         };
         Ok(Outcome {
             case,
@@ -129,7 +129,7 @@ pub fn outcomes(
 }
 
 /// The files of a case, the one with the fault last, and what is known of it.
-fn write(base: &Base, fault: &Fault, folder: &Path, seed: u64, case: u64) -> Result<(Vec<PathBuf>, Known), String> {
+fn write(base: &Base, fault: &Fault, folder: &Path, seed: u64, case: u64) -> Result<(Vec<PathBuf>, CaseTruth), String> {
     let injected = inject(fault, &base.runs[base.faulty()], &base.second, seed, case);
     let mut files = Vec::new();
     for (i, run) in base.runs.iter().enumerate() {
@@ -141,7 +141,7 @@ fn write(base: &Base, fault: &Fault, folder: &Path, seed: u64, case: u64) -> Res
     for (file, text) in &files {
         fs::write(file, text).map_err(|e| format!("{}: {e}", file.display()))?;
     }
-    let known = Known {
+    let known = CaseTruth {
         truth: base.truth.clone(),
         then: (fault.kind.what == What::SecondOperator).then(|| base.second_truth.clone()),
         span_s: (fault.kind.what != What::Nothing).then_some((injected.from_s, injected.to_s)),
@@ -157,9 +157,9 @@ fn run(
     way: Way,
     base: &Base,
     files: &[PathBuf],
-    known: &Known,
+    known: &CaseTruth,
     folder: &Path,
-) -> Result<Result<Judged, String>, String> {
+) -> Result<Result<CaseOutcome, String>, String> {
     let trace = folder.join(format!("trace-{}.csv", way.name()));
     let mut command = Command::new(program);
     command.env("RAYON_NUM_THREADS", "1");

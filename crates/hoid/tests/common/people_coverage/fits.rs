@@ -66,7 +66,7 @@ impl Quantity {
 
 /// What a fit found.
 #[derive(Debug, Clone)]
-pub struct Found {
+pub struct FitOutcome {
     pub form: Form,
     pub level: VerdictLevel,
     /// Kinds of the findings.
@@ -86,7 +86,7 @@ pub struct Outcome {
     pub variant: Variant,
     pub true_form: Form,
     pub seconds: f64,
-    pub found: Result<Found, String>,
+    pub found: Result<FitOutcome, String>,
 }
 
 /// The fits of one person.
@@ -118,7 +118,7 @@ pub fn outcomes(seed: u64, number: u64, variants: &[Variant]) -> Result<Vec<Outc
     Ok(variants.iter().map(of).collect())
 }
 
-fn found(fit: &FamilyFit, person: &Person, cell: Cell) -> Found {
+fn found(fit: &FamilyFit, person: &Person, cell: Cell) -> FitOutcome {
     let truth = &person.state.operator;
     let of = fit.operator(0);
     let named = truth.named();
@@ -172,7 +172,7 @@ fn found(fit: &FamilyFit, person: &Person, cell: Cell) -> Found {
             own.phase_margin_interval,
         );
     }
-    Found {
+    FitOutcome {
         form: fit.form,
         level: fit.verdict.level,
         kinds: fit.verdict.findings().iter().map(|f| f.kind.to_string()).collect(),
