@@ -1,7 +1,7 @@
 """Runs the steps of the hosted workflows on this machine, as far as they go without accounts.
 
     python3 -m pip install pyyaml
-    python3 .github/dry-run.py release            # or test, pages, advisories; with names of jobs behind it: these alone
+    python3 .github/dry-run.py release            # or test, pages, advisories; with names of jobs after it: these alone
     python3 .github/dry-run.py --dev release      # without optimisation: a fraction of the time
     python3 .github/dry-run.py --list
 

@@ -23,7 +23,7 @@ from pathlib import Path
 LICENCES = ("LICENSE-MIT", "LICENSE-APACHE")
 #: The crate of the program.
 PROGRAM = "hoid-cli"
-#: What a user does first. Its output must begin with the verdict.
+#: What a user does first. Its output must start with the verdict.
 TRIAL = "import pyhoid; print(pyhoid.identify(pyhoid.simulate('C1', seed=1)))"
 
 

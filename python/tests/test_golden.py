@@ -152,7 +152,7 @@ def plain(value: Any) -> Any:
     return repr(value)
 
 
-#: What is kept of a result, beside its type.
+#: What is kept of a result, next to its type.
 KEPT = (
     "structure",
     "form",

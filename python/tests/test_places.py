@@ -31,7 +31,7 @@ def traces(tools: Tools, run: Run) -> dict[tuple[str, ...], dict[str, list[float
 
 
 def parameter(place: Place) -> Any:
-    """A place as a test of its name; with its streams not beside those of ``test_lsl.py``."""
+    """A place as a test of its name; with its streams not next to those of ``test_lsl.py``."""
     group = [pytest.mark.xdist_group("lsl")] if "LabStreamingLayer" in place.name else []
     return pytest.param(place, id=place.name, marks=group)
 

@@ -99,7 +99,7 @@ def test_a_trace_of_a_person(c4: pyhoid.Record, tmp_path: Path) -> None:
     labels = [ax.get_ylabel() for ax in axes]
     assert len(axes) == len(trace.response_names) == 4
     assert "at 2.5 rad/s (dB)" in labels[0] and "rad/s" in labels[2] and "deg" in labels[3]
-    # A line for each change that was declared, beside those of the trace.
+    # A line for each change that was declared, next to those of the trace.
     assert len(trace.changes) >= 1 and all(
         len(ax.lines) == 1 + len(trace.changes) for ax in axes
     )

@@ -1,4 +1,4 @@
-//! A chore that runs beside another.
+//! A chore that runs next to another.
 
 use std::{
     env,
@@ -9,8 +9,8 @@ use std::{
 
 use crate::process::target_directory;
 
-/// A chore of this program in a process of its own. What it says is kept until it is waited for, so that it does not
-/// stand between the lines of another.
+/// A chore of this program in a process of its own. What it says is kept until it is waited for, so that it does not be
+/// between the lines of another.
 pub struct Background {
     name: &'static str,
     child: Child,
@@ -46,7 +46,7 @@ impl Background {
     }
 }
 
-/// Nothing goes on behind a chore that has failed.
+/// Nothing goes on after a chore that has failed.
 impl Drop for Background {
     fn drop(&mut self) {
         let _ = self.child.kill();

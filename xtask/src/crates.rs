@@ -26,7 +26,7 @@ const ALLOWED: [&str; 11] = [
     "Zlib",
 ];
 
-/// Crates that are not wanted, by name or by the beginning of a name that ends with `*`, and why.
+/// Crates that are not wanted, by name or by the start of a name that ends with `*`, and why.
 const BANNED: [(&str, &str); 16] = [
     (
         "*-sys",
@@ -115,10 +115,7 @@ pub fn check() -> Result<(), String> {
         );
         return Ok(());
     }
-    Err(format!(
-        "{}\n(the rules stand in xtask/src/crates.rs)",
-        wrong.join("\n")
-    ))
+    Err(format!("{}\n(the rules are in xtask/src/crates.rs)", wrong.join("\n")))
 }
 
 /// A crate that is not of the workspace.
@@ -163,7 +160,9 @@ fn licence_of(package: &Package) -> Option<String> {
             "{name} {version} is under {licence}, expected {}: take another crate",
             ALLOWED.join(", ")
         )),
-        None => Some(format!("{name} {version}: {licence:?} is no expression of licences")),
+        None => Some(format!(
+            "{name} {version}: {licence:?} is not an expression of licences"
+        )),
     }
 }
 

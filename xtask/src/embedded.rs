@@ -1,5 +1,5 @@
-//! The kernel on bare processors: built for Cortex-M4F and RISC-V, run under QEMU, and its digits beside those of
-//! the host and of `hoid track`.
+//! The kernel on bare processors: built for Cortex-M4F and RISC-V, run under QEMU, and its digits next to those of the
+//! host and of `hoid track`.
 //!
 //! What is not installed is said and left out, with what installs it.
 
@@ -116,7 +116,7 @@ fn shorten(file: &Path) -> Result<(), String> {
     fs::write(file, kept).map_err(said)
 }
 
-/// The named columns of a table whose comments begin with `#`.
+/// The named columns of a table whose comments start with `#`.
 fn columns(table: &str, names: &[&str]) -> Result<Vec<Vec<String>>, String> {
     let mut lines = table.lines().filter(|line| !line.starts_with('#'));
     let header: Vec<&str> = lines.next().unwrap_or_default().split(',').collect();

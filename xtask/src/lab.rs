@@ -1,5 +1,5 @@
-//! The page of `hoid lab`: that the built file is what its sources build, the page in a browser, the page that needs
-//! no program behind it, and the studies that need a browser: a long session (`hour.mjs`), operators in real time
+//! The page of `hoid lab`: that the built file is what its sources build, the page in a browser, the page that needs no
+//! program after it, and the studies that need a browser: a long session (`hour.mjs`), operators in real time
 //! (`real.mjs`).
 //!
 //! All need npm, what looks at a page a browser; what is not there is said and left out.
@@ -32,7 +32,7 @@ pub fn lab() -> Result<(), String> {
     in_browser("dev", "hour.mjs", &["1".to_owned()])
 }
 
-/// The page that needs no program behind it: one file, with an experiment and the tracker in it.
+/// The page that needs no program after it: one file, with an experiment and the tracker in it.
 pub fn alone(arguments: &[String]) -> Result<(), String> {
     let (mut config, mut out) = (None, None);
     let mut rest = arguments.iter();

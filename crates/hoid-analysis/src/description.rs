@@ -1,4 +1,4 @@
-//! The describing function of recordings, beside a fit: at the lines of the excitation, over whole periods.
+//! The describing function of recordings, next to a fit: at the lines of the excitation, over whole periods.
 
 use hoid_ident::{
     IdentError,
@@ -17,7 +17,7 @@ use crate::{
 /// Which channel holds the recorded disturbance or target.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub enum Excitation {
-    /// The first of the usual names whose power stands in lines.
+    /// The first of the usual names whose power is in lines.
     #[default]
     Found,
     /// None: no fit at lines.
@@ -82,7 +82,7 @@ impl Recordings {
         let again = repaired_alike(again.records, handling)?;
         let late = again.first().map_or(Ok(0.0), |r| late_samples(r, &offsets))?;
         let ts_s = again.first().map_or(1.0, |r| r.sample_time().s());
-        // At the rate of what is fitted beside it.
+        // At the rate of what is fitted next to it.
         let used_s = self.records.first().map_or(ts_s, |r| r.sample_time().s());
         let factor = (used_s / ts_s).round().max(1.0) as usize;
         let unmoved = again
@@ -93,8 +93,8 @@ impl Recordings {
     }
 }
 
-/// What a fit beside the lines is told of them: what was looked for by name is missed, what was looked for by
-/// itself is not.
+/// What a fit next to the lines is told of them: what was looked for by name is missed, what was looked for by itself
+/// is not.
 pub(crate) fn of_lines(
     described: &Result<Option<Description>, AnalysisError>,
     excitation: &Excitation,

@@ -39,9 +39,9 @@ pub enum AnalysisError {
         /// What was found, what was expected, what to do.
         reason: String,
     },
-    /// A text that is no result.
+    /// A text that is not a result.
     #[error(
-        "this is no result of a fit: {found}; expected what to_json of this version wrote, or identify --json printed"
+        "this is not a result of a fit: {found}; expected what to_json of this version wrote, or identify --json printed"
     )]
     NotAResult {
         /// What was found.

@@ -17,7 +17,7 @@ pub struct FoundFault {
     /// Time of its first sample, s; none where there is no time.
     #[serde(rename = "from")]
     pub from_s: Option<f64>,
-    /// Time of the sample behind its last, s.
+    /// Time of the sample after its last, s.
     #[serde(rename = "to")]
     pub to_s: Option<f64>,
     /// How many samples.

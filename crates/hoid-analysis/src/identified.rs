@@ -27,7 +27,7 @@ pub struct Identified<F = FamilyFit> {
     /// The recordings as they were fitted, without their means where these were taken out, and what was done
     /// to them.
     pub data: Recordings,
-    /// The describing function that stands beside the fit.
+    /// The describing function that is next to the fit.
     pub described: Option<Description>,
     /// The settings that were used.
     pub settings: Vec<Setting>,

@@ -33,7 +33,7 @@ pub(crate) fn levels_into(
 pub(crate) struct Level {
     /// The records with it, where it was taken out.
     as_read: Option<Vec<Record>>,
-    /// What was found of it beside the means.
+    /// What was found of it next to the means.
     beside_means: Vec<f64>,
 }
 
@@ -60,7 +60,7 @@ impl Level {
         if self.is_kept() { Detrend::None } else { Detrend::Mean }
     }
 
-    /// Takes out what a fit with the level as an unknown has found of it beside the means.
+    /// Takes out what a fit with the level as an unknown has found of it next to the means.
     pub(crate) fn refined(
         &mut self,
         data: &mut Recordings,

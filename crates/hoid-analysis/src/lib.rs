@@ -1,9 +1,9 @@
 //! From recordings to a result and what it is worth, once for all who ask.
 //!
-//! An estimator takes each sample at its word, and its error bars are those of its model. What a result
-//! is worth follows from more: what was wrong with the recording and what was done about it, what a second
-//! fit without suspicious samples says, whether anybody could have held the loop. These rules stand here
-//! and nowhere else; command line, groups and Python parse options and show results.
+//! An estimator takes each sample at its word, and its error bars are those of its model. What a result is worth
+//! follows from more: what was wrong with the recording and what was done about it, what a second fit without
+//! suspicious samples says, whether anybody could have held the loop. These rules are here and nowhere else; command
+//! line, groups and Python parse options and show results.
 //!
 //! ```text
 //! files -- Reading --> Recordings -- Identification { options }.run --> Identified { fit, verdict, data, settings }
@@ -14,7 +14,7 @@
 //! | a file is looked at, before anything is chosen | `look` |
 //! | files are read (before it) | `files`, `reading`; kept with what was done to them in `recordings` |
 //! | runs that are given twice are refused | `copies` |
-//! | faults are looked for and mended, channels are judged | `repair`, `quality` |
+//! | faults are looked for and repaired, channels are judged | `repair`, `quality` |
 //! | a high rate is lowered | `rate` |
 //! | the describing function, where the excitation is recorded | `description`, `offset` |
 //! | the fit, a second opinion, the loop, the settings of the estimator | `estimators`: a file each |
@@ -24,7 +24,7 @@
 //! | a recursion over a recording, from it to the verdict | `tracking` |
 //! | the level of u, the settings that all share | `level`, `settings` |
 //!
-//! Options come as fields, or by their names from texts: `options`. What there is stands in [`registry`].
+//! Options come as fields, or by their names from texts: `options`. What there is is in [`registry`].
 //!
 //! ```
 //! use hoid_analysis::{Identification, Recordings};

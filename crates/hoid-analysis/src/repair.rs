@@ -1,4 +1,4 @@
-//! Faults of recordings, looked for and mended before anything else is done with them.
+//! Faults of recordings, looked for and repaired before anything else is done with them.
 
 use hoid_ident::faults::{SLOWEST_S, repair};
 use hoid_model::{FaultHandling, Finding, ModelError, Record};
@@ -14,8 +14,8 @@ use crate::{
 const MOST_LEVELS: usize = 16;
 
 impl Recordings {
-    /// The recordings without their faults; one that is cut gives several. What was found and what it says
-    /// of any result stands in the account of the first of them.
+    /// The recordings without their faults; one that is cut gives several. What was found and what it says of any
+    /// result is in the account of the first of them.
     ///
     /// # Errors
     /// [`AnalysisError::SameSamples`] for runs that are given twice.
@@ -29,7 +29,7 @@ impl Recordings {
         for (((name, record), account), origin) in one.zip(self.origins) {
             let steps = of == Of::System && steps_from_level_to_level(&record);
             let handling = match handling {
-                // A system that settles behind a step is no fault of its sensor: told, and nothing is cut.
+                // A system that settles after a step is not a fault of its sensor: told, and nothing is cut.
                 FaultHandling::Bridge | FaultHandling::Cut if steps => FaultHandling::Report,
                 as_asked => as_asked,
             };
@@ -77,7 +77,7 @@ pub(crate) fn steps_from_level_to_level(record: &Record) -> bool {
     levels.len() > 1
 }
 
-/// The same records read another way, mended alike.
+/// The same records read another way, repaired alike.
 pub(crate) fn repaired_alike(records: Vec<Record>, handling: FaultHandling) -> Result<Vec<Record>, ModelError> {
     let mut all = Vec::with_capacity(records.len());
     for record in records {

@@ -111,7 +111,7 @@ impl ResolvedRequest {
     /// Sets an option by its name; false where it is none of its own.
     ///
     /// # Errors
-    /// [`AnalysisError`] for a text that is no value of it.
+    /// [`AnalysisError`] for a text that is not a value of it.
     pub fn set(&mut self, name: &str, text: &str) -> Result<bool, AnalysisError> {
         each!(self, how => how.set(name, text))
     }

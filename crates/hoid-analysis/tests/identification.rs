@@ -1,4 +1,5 @@
-//! From recordings to a verdict: each rule with a recording that trips it, beside one that does not.
+//! From recordings to a verdict: each rule with a recording that trips it, next to one that does
+//! not.
 #![allow(clippy::unwrap_used)]
 
 use std::{collections::BTreeMap, fs, path::Path};
@@ -85,7 +86,7 @@ fn a_stick_at_its_end_is_told_of_files_and_of_records_alike() {
     assert_eq!(words(&of_records), words(&of_files));
     let first = &words(&of_files)[0];
     assert!(
-        first.starts_with("run 1: u stands at an end of its range in 28 % of the rows"),
+        first.starts_with("run 1: u is at an end of its range in 28 % of the rows"),
         "{first}"
     );
 }
@@ -294,7 +295,7 @@ fn every_estimator_hears_of_the_recordings() {
             .run(Recordings::of_records([record.clone()]))
             .unwrap();
         let first = found.verdict.reasons().next().unwrap_or_default().to_owned();
-        assert!(first.contains("stands at an end of its range"), "{first}");
+        assert!(first.contains("is at an end of its range"), "{first}");
     }
     let record = clipped(1);
     let polynomials = Polynomials {

@@ -1,4 +1,4 @@
-//! How long `hoid stream` takes to answer a sample, and what happens when readers stop, either side begins again,
+//! How long `hoid stream` takes to answer a sample, and what happens when readers stop, either side starts again,
 //! clocks jump and datagrams are hostile. The numbers of the page "In your simulator".
 //!
 //! `cargo xtask slow latency [--seconds N] [--seed N] [--program FILE] [--python FILE]`: each way and rate for 600 s, unless
@@ -110,7 +110,7 @@ fn profile() -> PathBuf {
     path.ancestors().nth(2).unwrap().to_owned()
 }
 
-/// The program that is built beside this example.
+/// The program that is built next to this example.
 fn beside_this() -> PathBuf {
     profile().join(format!("hoid{}", std::env::consts::EXE_SUFFIX))
 }

@@ -74,7 +74,7 @@ pub fn width() -> Option<usize> {
 }
 
 /// A page with the lines of its sentences wrapped; tables have the width that they were made with.
-/// What continues a point of a list stands below its words.
+/// What continues a point of a list is below its words.
 fn wrapped(page: &str, width: usize) -> String {
     let mut text = String::with_capacity(page.len() + page.len() / 16);
     for line in page.split_inclusive('\n') {
@@ -107,7 +107,7 @@ fn wrapped(page: &str, width: usize) -> String {
 /// What is said after the answer: words, and what they are said of.
 static NOTICES: Mutex<Vec<(String, Vec<String>)>> = Mutex::new(Vec::new());
 
-/// What stands before a remark that speaks of trouble.
+/// What is before a remark that speaks of trouble.
 const WARNING: &str = "warning: ";
 
 /// Keeps a warning, as [`notice`].
@@ -169,8 +169,8 @@ pub fn message(text: &str) {
     let _ = writeln!(io::stderr().lock(), "{text}");
 }
 
-/// A progress bar on standard error with rate and time left; invisible where standard error is no
-/// terminal.
+/// A progress bar on standard error with rate and time left; invisible where standard error is not
+/// a terminal.
 pub fn progress(total: usize, what: &str) -> ProgressBar {
     let bar = ProgressBar::new(total as u64);
     // Should the template be wrong, the plain bar does as well.
@@ -183,7 +183,7 @@ pub fn progress(total: usize, what: &str) -> ProgressBar {
 }
 
 /// Does work that may last, with the time since its start on standard error, and a bar with the
-/// time left as soon as it says how far it is; nothing where standard error is no terminal.
+/// time left as soon as it says how far it is; nothing where standard error is not a terminal.
 pub fn watched<T>(what: &'static str, work: impl FnOnce() -> T) -> T {
     let bar = ProgressBar::new_spinner().with_message(what);
     if let Ok(style) = ProgressStyle::with_template("{spinner} {msg}, {elapsed}") {

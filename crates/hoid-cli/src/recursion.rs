@@ -92,7 +92,7 @@ pub fn method_of(name: &str) -> Result<Method, CliError> {
 /// The method with the options that were typed.
 ///
 /// # Errors
-/// [`CliError::Usage`] for an option of another method, or a text that is no value of it.
+/// [`CliError::Usage`] for an option of another method, or a text that is not a value of it.
 fn method(args: &RecursionArgs) -> Result<Method, CliError> {
     let usage = |name: &str, text: &str| CliError::Usage(format!("--{} {text}", flag(name)));
     let mut method = method_of(&args.method)?;

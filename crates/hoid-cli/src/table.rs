@@ -125,7 +125,7 @@ impl Rows {
         (0..self.header.len()).map(of).collect()
     }
 
-    /// Each row as its first cell with the others below, each behind its heading.
+    /// Each row as its first cell with the others below, each after its heading.
     fn as_lists(&self) -> String {
         let name = self.header.iter().map(|name| name.chars().count()).max().unwrap_or(0);
         let mut lines = Vec::new();

@@ -36,7 +36,7 @@ pub fn verdict(verdict: &Verdict) -> String {
     format!("{verdict}\n\n")
 }
 
-/// What is behind the page.
+/// What is after the page.
 pub const MORE: &str = "More with -v: what else was tried, tests, every setting; --report DIR writes a page.\n";
 
 /// The same where only settings are.
@@ -97,7 +97,7 @@ pub fn records(files: &[String], records: &[Record], accounts: &[Account], verbo
 pub fn levels(files: &[String], accounts: &[Account]) -> String {
     let line = |(file, account): (&String, &Account)| {
         let level = account.level.as_ref()?;
-        Some(format!("{file}: level of u beside its response to e: {level}\n"))
+        Some(format!("{file}: level of u next to its response to e: {level}\n"))
     };
     files.iter().zip(accounts).filter_map(line).collect()
 }
@@ -138,7 +138,7 @@ pub fn remnant_orders(grey_box: &GreyBoxFit) -> String {
     format!("{rows}\n\n")
 }
 
-/// The operators of the records behind the first, where a grey box has parameters for each.
+/// The operators of the records after the first, where a grey box has parameters for each.
 pub fn other_records(grey_box: &GreyBoxFit, files: &[String], gain: &GainUnit) -> String {
     let differs = |k: &usize| grey_box.operator_parameters(*k) != grey_box.operator_parameters(0);
     let mut text = String::new();
@@ -339,8 +339,9 @@ pub fn crossings(all: &Crossings) -> String {
     line
 }
 
-/// What there is to say of the loop of an estimate beside its lowest crossover: the others, the smallest phase margin,
-/// the gain margin, and that it is not stable. Nothing is said of one that crosses once and is stable, unless it is asked for.
+/// What there is to say of the loop of an estimate next to its lowest crossover: the others, the smallest phase margin,
+/// the gain margin, and that it is not stable. Nothing is said of one that crosses once and is stable, unless it is
+/// asked for.
 pub fn loop_shape(shape: &LoopShape, always: bool) -> String {
     if !always && shape.crossovers.len() < 2 && shape.is_stable() != Some(false) {
         return String::new();

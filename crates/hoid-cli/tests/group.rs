@@ -210,7 +210,7 @@ fn init_looks_at_the_files_and_says_what_it_saw() {
     assert_eq!(condition["controlled_element"].as_str(), Some("1/s"));
     assert_eq!(condition["offset_samples"].as_float(), Some(0.0));
     assert_eq!(manifest["read"]["input"].as_str(), Some("e"));
-    // Each stands below its evidence.
+    // Each is below its evidence.
     for (evidence, line) in [
         ("# the tracking error, by its name", "input = "),
         ("# d has", "excitation = "),

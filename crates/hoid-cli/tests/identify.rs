@@ -66,7 +66,7 @@ fn identify_prints_the_json_of_the_contract() {
     assert_eq!(found["candidates"], serde_json::json!([]));
 }
 
-/// The bytes with which a file begins say what it is, and it has the width that was asked for.
+/// The bytes with which a file starts say what it is, and it has the width that was asked for.
 #[test]
 #[cfg(feature = "pdf-png")]
 fn a_figure_is_a_page_or_a_picture_as_its_name_says() {
@@ -83,7 +83,7 @@ fn a_figure_is_a_page_or_a_picture_as_its_name_says() {
     assert!(pdf.starts_with(b"%PDF-") && text.contains("/MediaBox [0 0 240.9") && text.contains("/Font"));
     let png = draw("bode.png");
     assert!(png.starts_with(b"\x89PNG\r\n\x1a\n"));
-    // At 300 dots an inch; the width stands in the first chunk.
+    // At 300 dots an inch; the width is in the first chunk.
     let width = u32::from_be_bytes(png[16..20].try_into().unwrap());
     assert!(width.abs_diff(1004) <= 4, "{width}");
 }
@@ -260,7 +260,7 @@ fn a_change_is_found_and_its_gains_are_written() {
     assert!((midpoint["value"].as_f64().unwrap() - 40.96).abs() < 3.0, "{midpoint}");
     let trace = fs::read_to_string(d.join("trace.csv")).unwrap();
     assert!(trace.contains("t,K_e,K_e_se,T_L,T_L_se,K_e_dot,K_e_dot_se"));
-    // 8192 rows behind two comments and the header.
+    // 8192 rows after two comments and the header.
     assert_eq!(trace.lines().count(), 8195);
 }
 

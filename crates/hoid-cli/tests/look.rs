@@ -10,7 +10,7 @@ use tempfile::TempDir;
 
 use common::{bad, good, hoid, json, wave, write};
 
-/// A person on an integrator, recorded as time, r, y and u: two periods of 20 s, begun 3 s before the first and
+/// A person on an integrator, recorded as time, r, y and u: two periods of 20 s, started 3 s before the first and
 /// stopped 1 s after the last.
 fn recorded() -> TempDir {
     let directory = TempDir::new().unwrap();
@@ -27,7 +27,7 @@ fn recorded() -> TempDir {
     for k in 0..2640_usize {
         // Columns t, e, u, d, y, of which the last rows come first again.
         let row = &rows[(k + 2400 - 180) % 2400];
-        // No target before the first period and behind the last.
+        // No target before the first period and after the last.
         let (r, e) = (if !(180..2580).contains(&k) { 0.0 } else { row[3] }, row[1]);
         csv.push_str(&format!("{},{r},{},{}\n", k as f64 / 60.0, r - e, row[2]));
     }

@@ -20,7 +20,7 @@ use common::{bad, good, hoid, json};
 fn simulate(at: &Path, person: &str, hz: f64, seed: u64) -> String {
     let file = format!("{person}-{hz}-{seed}.csv");
     let (ts, seed) = (format!("{:?}", 1.0 / hz), seed.to_string());
-    // Four periods, or three where these are no whole samples of four.
+    // Four periods, or three where these are not whole samples of four.
     let (measurement_s, run_in_s) = if ts == "0.003" { (60.0, 6.0) } else { (80.0, 8.0) };
     let toml = |form: &str, gains: &str, element: &str| {
         format!(
@@ -271,7 +271,7 @@ fn a_stream_at_1000_hz_is_the_track() {
         .lines()
         .map(|line| serde_json::from_str(line).unwrap())
         .collect();
-    // A line for each line, and nothing but samples behind the header.
+    // A line for each line, and nothing but samples after the header.
     assert_eq!(answers.len(), rows.len() - 1);
     let last = &answers[answers.len() - 1];
     let decimated = &last["decimated"];

@@ -197,12 +197,12 @@ fn trouble_is_shown_and_handled_only_as_asked() {
         "Trouble:",
         "7 rows are there twice, time included",
         "remedy: drop them with --drop-repeated",
-        "20 rows missing in 1 place, the first behind row",
+        "20 rows missing in 1 place, the first after row",
         "u stays at its largest value, 0.15",
     ] {
         assert!(text.contains(words), "{words}: {text}");
     }
-    // Nothing is mended unasked.
+    // Nothing is repaired unasked.
     let (code, message) = bad(at, &["identify", "run.csv"]);
     assert!(code == 1 && message.contains("expected increasing time"), "{message}");
     let (code, message) = bad(at, &["identify", "run.csv", "--drop-repeated"]);

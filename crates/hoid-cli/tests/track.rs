@@ -303,7 +303,7 @@ fn the_default_needs_nothing_and_tells_the_loop() {
     let found = json(d, &arguments);
     assert_eq!(found["method"], "adaptive");
     assert!(found["start"].is_null());
-    assert_eq!(setting(&found, "start"), "what is usual of people");
+    assert_eq!(setting(&found, "start"), "the defaults for people");
     assert_eq!(setting(&found, "response at"), "1, 2.5 rad/s");
     let trace = trace(d);
     // The first second gives the scale of the gains; then there are bands, which become narrower.

@@ -180,7 +180,7 @@ fn person() -> AdaptiveFilter<Vec<f64>> {
     AdaptiveFilter::new(default_operator.prior(ts), memory).unwrap()
 }
 
-/// Goes on with a person: from the beginning, where replays are short, or from where they are long.
+/// Goes on with a person: from the start, where replays are short, or from where they are long.
 fn follow(mut person: AdaptiveFilter<Vec<f64>>, data: &[(f64, f64)], history: &mut Vec<f64>) {
     history.clear();
     for &(x, u) in data {
@@ -228,7 +228,7 @@ fn bench(c: &mut Criterion) {
         b.iter(|| rls(any(16, 16, 0, 0), scalar(), data, &mut h32))
     });
     let mut innovations: Vec<f64> = Vec::with_capacity(SAMPLES);
-    group.bench_function("adaptive, from the beginning", |b| {
+    group.bench_function("adaptive, from the start", |b| {
         b.iter(|| follow(person(), data, &mut innovations))
     });
     let mut later = person();

@@ -1,6 +1,6 @@
 //! The gain of the prediction-error method: P with a rule of forgetting and a guard against windup.
 //!
-//! The equations stand in [`crate::adaptation`].
+//! The equations are in [`crate::adaptation`].
 //!
 //! **Windup.** Where nothing excites a direction, forgetting alone would let P grow without limit.
 //! In turn each parameter gets a pseudo-measurement of the value that it has: the estimate stays,
@@ -138,7 +138,7 @@ impl<const N: usize> Covariance<N> {
         self.factors.matrix()
     }
 
-    /// The step by every rule and at every time; [`Adaptation::update`] has the usual case beside
+    /// The step by every rule and at every time; [`Adaptation::update`] has the usual case next to
     /// it.
     #[inline(never)]
     fn update_by_rule(&mut self, psi: &[f64; N], eps: f64, variance: f64) -> ParameterStep<N> {

@@ -70,9 +70,9 @@ impl<T: State + ?Sized> State for &mut T {
     }
 }
 
-/// Makes a type a [`State`] of the fields that are named:
-/// `state!([const N: usize] Type<N> { field, field })`. With `, bounded` behind them the type has a method of that
-/// name, which brings places, lengths and counts back to where they may be: numbers may have been made by anyone.
+/// Makes a type a [`State`] of the fields that are named: `state!([const N: usize] Type<N> { field, field })`. With
+/// `, bounded` after them the type has a method of that name, which brings places, lengths and counts back to where
+/// they may be: numbers may have been made by anyone.
 #[macro_export]
 macro_rules! state {
     ([$($generics:tt)*] $type:ty { $($field:ident),+ $(,)? }) => {

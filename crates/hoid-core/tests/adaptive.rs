@@ -208,7 +208,7 @@ fn a_steep_remnant_is_no_harder_than_a_flat_one() {
 
 #[test]
 fn neuromuscular_system_and_delay_are_found() {
-    // So far from what is usual that the basis has to move.
+    // So far from the default that the basis has to move.
     let point = Point {
         tau: 0.22,
         omega: 13.0,
@@ -386,7 +386,7 @@ fn what_says_nothing_does_no_harm() {
         assert_eq!(silent.step(0.0, 0.0).innovation, 0.0);
     }
     assert!(!silent.has_started());
-    // No error ever, an output that moves: nothing to begin with.
+    // No error ever, an output that moves: nothing to start with.
     let mut stream = Stream(3);
     for _ in 0..500 {
         silent.step(0.0, stream.normal());
@@ -541,7 +541,7 @@ fn what_is_known_stands_at_the_beginning() {
         response(&basis(default_operator()), GAINS_OF_A_PERSON, 2.0),
     );
     assert!((value[0] - truth[0]).hypot(value[1] - truth[1]) < 1e-9);
-    // Beside one who begins with nothing, over ten seconds.
+    // Next to one who starts with nothing, over ten seconds.
     let (mut person, mut other) = (Person::new(3), filter(1e9));
     let mut errors = [0.0; 2];
     for k in 0..500 {

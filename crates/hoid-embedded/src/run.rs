@@ -18,7 +18,7 @@ pub const UNREADABLE: &str = "run.csv cannot be read";
 const HEADER: &str = "t,K_e,K_e_se,K_e_dot,K_e_dot_se,omega_nm,omega_nm_se,zeta_nm,zeta_nm_se,tau_e,tau_e_se";
 /// s.
 const SAMPLE_TIME_S: f64 = 0.01;
-/// nk of the textbook's operator, whose delay the filter begins with.
+/// nk of the textbook's operator, whose delay the filter starts with.
 const NK: f64 = 29.0;
 /// Samples from one line of output to the next.
 const EVERY: u32 = 100;

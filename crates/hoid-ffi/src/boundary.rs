@@ -73,7 +73,7 @@ pub(crate) unsafe fn bytes<'a>(pointer: *const u8, length: usize, what: &str) ->
 /// `pointer` is null or points to room for one value.
 pub(crate) unsafe fn put<T>(pointer: *mut T, value: T, what: &str) -> Result<(), Failure> {
     check(pointer, what)?;
-    // SAFETY: not null, aligned; that there is room is the contract. What stood there needs no drop.
+    // SAFETY: not null, aligned; that there is room is the contract. What was there needs no drop.
     unsafe { pointer.write(value) };
     Ok(())
 }

@@ -51,7 +51,7 @@ pub unsafe extern "C" fn hoid_tracker_new(
     })
 }
 
-/// Makes a tracker that begins with an earlier fit of the person: the text that hoid identify --json
+/// Makes a tracker that starts with an earlier fit of the person: the text that hoid identify --json
 /// prints. Sample time in s and options as in hoid_tracker_new.
 ///
 /// # Safety

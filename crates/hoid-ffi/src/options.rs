@@ -27,7 +27,7 @@ const LONGEST_WARM_UP: f64 = 1e7;
 /// What was asked for, as it is saved.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct TrackerRequest {
-    /// Name of the method; none for the usual one.
+    /// Name of the method; none for the default one.
     pub method: Option<String>,
     pub sample_time_s: f64,
     /// Options in JSON.
@@ -145,7 +145,7 @@ fn object(text: &str) -> Result<Map<String, Value>, Failure> {
     let text = if text.trim().is_empty() { "{}" } else { text };
     serde_json::from_str(text).map_err(|error| {
         Failure::option(format!(
-            "the options are no object in JSON ({error}); write them as {{\"nk\": 29, \"memory\": \"4s\"}}"
+            "the options are not an object in JSON ({error}); write them as {{\"nk\": 29, \"memory\": \"4s\"}}"
         ))
     })
 }

@@ -1,4 +1,4 @@
-//! A description in JSON and bytes behind it, of which damage shows.
+//! A description in JSON and bytes after it, of which damage shows.
 //!
 //! | bytes | |
 //! |---|---|

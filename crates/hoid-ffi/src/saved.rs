@@ -37,7 +37,7 @@ impl Session {
         let wrong = |text: &str| Failure::new(HOID_BAD_STATE, format!("{text}; save the tracker again"));
         let damaged = || wrong("the bytes were changed or cut since they were saved");
         let (description, numbers) = opened(MAGIC, bytes).map_err(|closed| match closed {
-            Closed::Other => wrong("the bytes are no tracker that this version of hoid has saved"),
+            Closed::Other => wrong("the bytes are not a tracker that this version of hoid has saved"),
             Closed::Damaged => damaged(),
         })?;
         let numbers = as_numbers(numbers).ok_or_else(damaged)?;
@@ -104,7 +104,7 @@ mod tests {
     fn a_saved_tracker_goes_on_with_the_same_digits() {
         let samples = samples();
         let [taken, all] = TAKEN;
-        // The second is an earlier name, as it stands in what was saved under it.
+        // The second is an earlier name, as it is in what was saved under it.
         let of_bank = [("adaptive", None), ("population", None)];
         let at_work = [("rpem", Some(AT_ONCE))];
         let warm = [

@@ -1,4 +1,4 @@
-//! Statuses, and the text behind the last one.
+//! Statuses, and the text after the last one.
 //!
 //! The text belongs to the thread: two threads with a tracker each do not mix theirs up.
 
@@ -106,7 +106,7 @@ fn remember(text: &str) {
     let _ = LAST.try_with(|last| *last.borrow_mut() = text);
 }
 
-/// The text behind the last status of this thread that was not HOID_OK, empty before the first. It
+/// The text after the last status of this thread that was not HOID_OK, empty before the first. It
 /// stays until the next one.
 #[unsafe(no_mangle)]
 pub extern "C" fn hoid_last_error() -> *const c_char {

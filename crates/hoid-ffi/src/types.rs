@@ -108,7 +108,7 @@ pub struct HoidCounts {
     pub skipped: u64,
     /// Samples that the guard held back.
     pub held: u64,
-    /// How often the guard began the estimate again.
+    /// How often the guard started the estimate again.
     pub restarts: u64,
     /// Steps that stability or a bound made shorter.
     pub steps_shortened: u64,

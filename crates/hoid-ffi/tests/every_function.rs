@@ -150,7 +150,7 @@ fn a_tracker_by_every_function_of_the_header() {
     }
 }
 
-/// The text behind a status is that of its thread, and two threads have a tracker each.
+/// The text after a status is that of its thread, and two threads have a tracker each.
 #[test]
 fn threads_with_a_tracker_each() {
     let tracked = |names: &'static str| {
@@ -273,7 +273,7 @@ macro_rules! life_of_a_unit {
         let mut counts = [-1; 2];
         assert_eq!(counted!($get_count, references, 2, counts.as_mut_ptr()), 0);
         assert_eq!(counts, [SAMPLES as c_int, 0]);
-        // An output is not set, nothing is read by a list that is null, no elements are no list.
+        // An output is not set, nothing is read by a list that is null, no elements are not a list.
         assert_eq!(counted!($set_count, references, 2, counts.as_ptr()), 3);
         assert_eq!(counted!($get_count, references, 2, ptr::null_mut()), 3);
         assert_eq!(counted!($get_count, references, 0, ptr::null_mut()), 0);
@@ -478,7 +478,7 @@ fn a_unit_by_every_function_of_fmi_3() {
     assert!(told.iter().all(|(status, text)| *status == 3 && !text.is_empty()) && told.len() > 4);
 }
 
-/// What the library hands out stands above, but for what answers with an error whatever it is given.
+/// What the library hands out is above, but for what answers with an error whatever it is given.
 #[test]
 #[cfg_attr(miri, ignore = "it reads sources, not memory of a caller")]
 fn no_function_is_left_out() {

@@ -290,7 +290,7 @@ proptest! {
         }
     }
 
-    /// Bytes of any kind are no tracker.
+    /// Bytes of any kind are not a tracker.
     #[test]
     fn any_bytes_are_refused(bytes in prop::collection::vec(any::<u8>(), 0..200), magic in any::<bool>()) {
         let bytes = if magic { [b"hoid\x01\0\0\0".as_slice(), &bytes].concat() } else { bytes };

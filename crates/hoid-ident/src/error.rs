@@ -114,7 +114,7 @@ pub enum IdentError {
         /// What is wrong with it, and the remedy.
         reason: String,
     },
-    /// A name that is no parameter of the model.
+    /// A name that is not a parameter of the model.
     #[error("the model has no parameter {name}; it has {available}")]
     UnknownParameter {
         /// The name.

@@ -1,6 +1,6 @@
 //! The estimator by the prediction error method: what is to be estimated, and how.
 //!
-//! The options, their check, and the calls that fit. The method itself stands in [`crate::pem`].
+//! The options, their check, and the calls that fit. The method itself is in [`crate::pem`].
 
 use std::collections::BTreeMap;
 
@@ -55,7 +55,7 @@ pub struct Estimator {
     pub loss: Loss,
     /// What the model is to be good at. Default: prediction.
     pub focus: Focus,
-    /// True where u of each record has a constant that is no response to e, an unknown as its initial states are
+    /// True where u of each record has a constant that is not a response to e, an unknown as its initial states are
     /// ([`crate::level`]); not with initial states of zero. Default false.
     pub level: bool,
     /// True when A must be stable too, so that the model from e to u is. C and F always are.
@@ -191,8 +191,9 @@ impl Estimator {
     /// Fits a model to each record alone.
     ///
     /// Box-Jenkins models of records of one length are searched side by side, in about half of the
-    /// time of one after the other. What a fit finds does not depend on what it is searched beside;
-    /// it differs from that of [`Estimator::fit`] by rounding, less than 1e-7 of a standard error.
+    /// time of one after the other. What a fit finds does not depend on what it is searched
+    /// alongside; it differs from that of [`Estimator::fit`] by rounding, less than 1e-7 of a
+    /// standard error.
     ///
     /// # Errors
     /// Those of [`Estimator::fit`], for each record by itself.

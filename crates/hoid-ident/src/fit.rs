@@ -33,7 +33,7 @@ pub struct Fit {
     pub(crate) output_variance: f64,
     /// True where the innovation variance is the square of a robust scale.
     pub(crate) robust: bool,
-    /// True where instruments stood in place of the regressors.
+    /// True where instruments was in place of the regressors.
     pub(crate) instrumented: bool,
     /// The physical parameters that theta was computed from, for a grey box.
     pub(crate) physical: Option<Box<Physical>>,

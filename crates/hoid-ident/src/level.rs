@@ -1,4 +1,4 @@
-//! The level of a record: the constant of u that is no response to e.
+//! The level of a record: the constant of u that is not a response to e.
 //!
 //! `u(t) = c + G e(t) + v(t)`: a stick that rests off its zero, an amplifier with an offset, an e with one.
 //! For given dynamics c is linear, and of long records least squares is that of the means,
@@ -7,7 +7,7 @@
 //!
 //! so that a fit to e and u without their means ([`hoid_model::Detrend::Mean`]) is the fit with c for each record (L.
 //! Ljung, *System Identification*, 1999, section 14.1), but for the ends of the record and what happens in them: over a
-//! step the mean of u is no level. There c is an unknown of the fit, as the initial states are
+//! step the mean of u is not a level. There c is an unknown of the fit, as the initial states are
 //! ([`crate::Estimator::level`]), and what is left of it in a record is
 //!
 //! `c = eps'z / z'z`, z the residuals of u = 1 at e = 0.
@@ -44,7 +44,7 @@ pub fn without_level(records: &[Record]) -> Vec<Record> {
 }
 
 impl Fit {
-    /// The constant of u that is no response to e, by least squares over the residuals; `None` where the model makes
+    /// The constant of u that is not a response to e, by least squares over the residuals; `None` where the model makes
     /// nothing of one, as with an integration.
     ///
     /// # Errors
@@ -134,7 +134,7 @@ mod tests {
 
     #[test]
     fn it_is_the_constant_of_the_regression() {
-        // Twin: ARX is linear, with a column of ones beside the regressors.
+        // Twin: ARX is linear, with a column of ones next to the regressors.
         let record = moved(&simulated(40), 0.0, 0.03);
         let fit = fitted(Structure::Arx, &record);
         let (e, u) = (record.input(), record.output());

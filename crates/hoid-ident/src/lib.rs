@@ -62,7 +62,7 @@
 //! | [`family`] | operators of recorded people: form, parameters, errors that hold, a verdict |
 //! | [`grey_box`] | the fit in physical parameters: operator with a real delay, remnant filter |
 //! | [`SigmoidChange`] | gains that follow a sigmoid, with the time and the rate of the change |
-//! | [`faults`] | faults of recorded data, found and mended before a fit |
+//! | [`faults`] | faults of recorded data, found and repaired before a fit |
 //! | [`frequency`] | describing function, coherence, remnant spectrum and margins by Fourier coefficients |
 //! | [`judgement`] | what speaks for and against a fit: [`Fit::verdict`] |
 //! | [`progress`] | how far a fit is, for whoever waits |
@@ -75,7 +75,7 @@
 //! | `optimize` | minimisation of a sum of squares, also along the border of stability |
 //! | `criterion` | the prediction-error criterion of the general model and its gradients; initial states |
 //! | `multistart` | searches from several starts |
-//! | `initial_guess` | where a search begins |
+//! | `initial_guess` | where a search starts |
 //! | `pem` | bounds, priors, robust loss, focus; fits of one record or of many side by side |
 //! | `searched_delay` | what the search of nk adds to the error bars |
 

@@ -36,7 +36,7 @@ pub struct OrderRanges {
 /// Orders by their names (na, nb, nc, nd, nf, nk), each with its range.
 pub type NamedOrders = BTreeMap<String, RangeInclusive<usize>>;
 
-/// Refuses what is no order, and orders that no model has.
+/// Refuses what is not an order, and orders that no model has.
 ///
 /// # Errors
 /// [`IdentError::BadOption`].
@@ -111,7 +111,7 @@ impl OrderRanges {
     /// With the orders that are named in the place of these.
     ///
     /// # Errors
-    /// [`IdentError::BadOption`] for a name that is no order.
+    /// [`IdentError::BadOption`] for a name that is not an order.
     pub fn with(mut self, named: &NamedOrders) -> Result<Self, IdentError> {
         for (name, range) in named {
             let place = match name.as_str() {

@@ -7,12 +7,11 @@
 //!
 //! `s = d theta/d tau = -G^-1 psi' d`
 //!
-//! and what `d` has beside psi tells the delay: `var tau = sigma^2/(d'd - d' psi G^-1 psi' d) + Ts^2/12`
-//! (the corner of the inverse of the information of theta and tau together: L. Ljung, *System
-//! Identification*, 1999, section 9.4; the second part is that nk is a whole number: W. F. Sheppard,
-//! *Proc. London Math. Soc.* 29 (1898) 353-380). It is no more than that of all delays that were
-//! searched being equally likely. The covariance of theta becomes `P + s s' var tau`, and what depends
-//! on theta by the gradient g and on the delay by h has the variance
+//! and what `d` has next to psi tells the delay: `var tau = sigma^2/(d'd - d' psi G^-1 psi' d) + Ts^2/12` (the corner
+//! of the inverse of the information of theta and tau together: L. Ljung, *System Identification*, 1999, section 9.4;
+//! the second part is that nk is a whole number: W. F. Sheppard, *Proc. London Math. Soc.* 29 (1898) 353-380). It is no
+//! more than that of all delays that were searched being equally likely. The covariance of theta becomes
+//! `P + s s' var tau`, and what depends on theta by the gradient g and on the delay by h has the variance
 //!
 //! `g' P g + (g' s + h)^2 var tau`.
 //!
@@ -93,8 +92,8 @@ impl Fit {
         finite.then_some(SearchedDelay { variance_s2, slope })
     }
 
-    /// Columns of psi in the record of a criterion, and d behind them: the residual's slope along the
-    /// delay, as if that were the last element of theta.
+    /// Columns of psi in the record of a criterion, and d after them: the residual's slope along the delay, as if that
+    /// were the last element of theta.
     pub(crate) fn jacobian_with_delay(&self, criterion: &Criterion<'_>, workspace: &mut Workspace) -> Vec<Vec<f64>> {
         let mut psi = criterion.jacobian(self.model.theta(), 0, workspace);
         let of_b = &psi[criterion.orders.na..];

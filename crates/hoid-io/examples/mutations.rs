@@ -3,10 +3,10 @@
 //!
 //! `cargo xtask slow mutations [--inputs N] [--first N] [--jobs N] [--seed N] [--memory MB] [--keep DIRECTORY]`.
 //!
-//! The cases are shared among processes, each with a limit of its address space (`ulimit -v`; where
-//! there is no such limit, nothing is said of memory). A case that ends its process, or keeps it for
-//! [`PATIENCE`], is told and the process goes on behind it. `--keep` writes the files of the cases
-//! that failed. It is built with overflow checks on, as the tests are.
+//! The cases are shared among processes, each with a limit of its address space (`ulimit -v`; where there is no such
+//! limit, nothing is said of memory). A case that ends its process, or keeps it for [`PATIENCE`], is told and the
+//! process goes on after it. `--keep` writes the files of the cases that failed. It is built with overflow checks on,
+//! as the tests are.
 #![allow(clippy::unwrap_used, clippy::print_stdout, clippy::print_stderr)]
 
 #[path = "../tests/common/mutations/mod.rs"]

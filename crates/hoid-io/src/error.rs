@@ -1,4 +1,4 @@
-//! Everything that can be wrong with a file, in the words of the person who has to mend it.
+//! Everything that can be wrong with a file, in the words of the person who has to repair it.
 
 use hoid_model::ModelError;
 use thiserror::Error;
@@ -55,9 +55,9 @@ pub enum IoError {
         /// What is wrong.
         reason: String,
     },
-    /// A file that is no shared library of a platform that units are made for.
+    /// A file that is not a shared library of a platform that units are made for.
     #[error(
-        "{file} is no shared library for Linux, Windows or macOS with 64 bits; give the one that `cargo xtask ffi` has built"
+        "{file} is not a shared library for Linux, Windows or macOS with 64 bits; give the one that `cargo xtask ffi` has built"
     )]
     NoLibrary {
         /// The file.
@@ -97,7 +97,7 @@ pub enum IoError {
         /// "; unpack it", empty where the format is unknown.
         remedy: String,
     },
-    /// Bytes that are no text.
+    /// Bytes that are not text.
     #[error("{file}, {place}: {found}, expected text in UTF-8; save the table as CSV in UTF-8")]
     NotText {
         /// The file.
@@ -133,7 +133,7 @@ pub enum IoError {
     },
     /// Cells between blanks.
     #[error(
-        "{file}: {found} numbers between blanks stand in a line, expected commas, semicolons or tabs between them; save the table so, with a header such as t,e,u"
+        "{file}: {found} numbers between blanks are in a line, expected commas, semicolons or tabs between them; save the table so, with a header such as t,e,u"
     )]
     Blanks {
         /// The file.
@@ -209,7 +209,7 @@ pub enum IoError {
         /// The names that exist.
         available: String,
     },
-    /// Text that is no choice of a column.
+    /// Text that is not a choice of a column.
     #[error("the column \"{found}\": {expected}")]
     Expression {
         /// The text as given.
@@ -331,7 +331,7 @@ pub enum IoError {
         /// The names that exist.
         available: String,
     },
-    /// Time that stands still or runs back.
+    /// Time that stays constant or runs back.
     #[error(
         "{file}, {place}: t = {found} s after {previous} s, expected increasing time; drop rows that were written twice with --drop-repeated, read trials whose time starts again with --trial t, write t with more decimals, or give --fs HZ to count samples instead"
     )]
@@ -356,7 +356,7 @@ pub enum IoError {
         place: String,
         /// Its time, s.
         after_s: f64,
-        /// The time of the row behind the gap, s.
+        /// The time of the row after the gap, s.
         next_s: f64,
         /// Samples missing in the first gap.
         missing: u64,
@@ -425,7 +425,7 @@ pub enum IoError {
         /// What was expected, or the remedy.
         expected: String,
     },
-    /// Text that is no scale.
+    /// Text that is not a scale.
     #[error("the scale \"{found}\": expected {expected}")]
     Scaling {
         /// The text, or the factor.
@@ -433,7 +433,7 @@ pub enum IoError {
         /// What a scale may be.
         expected: String,
     },
-    /// Text that is no offset.
+    /// Text that is not an offset.
     #[error("the offset \"{found}\": expected a number of samples (1, -0.5) or of seconds (0.0167s)")]
     Offset {
         /// The text.
@@ -511,14 +511,14 @@ pub enum IoError {
         /// The columns of the file.
         expected: String,
     },
-    /// Bytes that are no Parquet.
+    /// Bytes that are not a Parquet.
     #[error(
-        "{file} is no Parquet file: {found}, expected PAR1 at both ends; copy or write it again if it was cut short, or name it .csv if it is text"
+        "{file} is not a Parquet file: {found}, expected PAR1 at both ends; copy or write it again if it was cut short, or name it .csv if it is text"
     )]
     NotParquet {
         /// The file.
         file: String,
-        /// What stands there instead.
+        /// What is there instead.
         found: String,
     },
     /// Bytes of another format than the extension says.
@@ -530,9 +530,9 @@ pub enum IoError {
         file: String,
         /// The format of the extension.
         format: &'static str,
-        /// What stands there instead.
+        /// What is there instead.
         found: String,
-        /// What such a file begins with.
+        /// What such a file starts with.
         expected: &'static str,
     },
     /// Bytes that contradict the format of the file.

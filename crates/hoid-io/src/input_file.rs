@@ -1,5 +1,4 @@
-//! Files that are no recordings, read whole: texts, settings of a bounded length, bytes; and the names
-//! in a directory.
+//! Files that are not recordings, read whole: texts, settings of a bounded length, bytes; and the names in a directory.
 
 use std::fs;
 use std::io::{self, Read as _};

@@ -1,10 +1,9 @@
 //! The file formats of hoid: the only crate that knows them.
 //!
-//! Recordings come as CSV, Parquet, NPZ, MATLAB or XDF, with columns of any name, clocks that
-//! jitter and rows that are missing. Reading takes the columns that are asked for, finds the
-//! sampling, checks every value in use, and gives an evenly sampled [`Record`](hoid_model::Record)
-//! or an error that names the place in the file. Nothing is repaired unasked; what is wrong with
-//! the data is said beside the record.
+//! Recordings come as CSV, Parquet, NPZ, MATLAB or XDF, with columns of any name, clocks that jitter and rows that are
+//! missing. Reading takes the columns that are asked for, finds the sampling, checks every value in use, and gives an
+//! evenly sampled [`Record`](hoid_model::Record) or an error that names the place in the file. Nothing is repaired
+//! unasked; what is wrong with the data is said next to the record.
 //!
 //! ```
 //! use hoid_io::{ReadOptions, read_record};
@@ -36,7 +35,7 @@
 //! | [`fmu`] | functional mock-up units |
 //! | `results` | [`OutputTable`], [`write_table`], [`TableWriter`]: tables of results; [`read_fit`]: a fit that was printed |
 //! | `output` | [`write_atomically`], [`check_output`], [`DirectoryLock`]: what holds for all that is written |
-//! | `input_file` | [`read_text`], [`read_settings`]: files that are no recordings |
+//! | `input_file` | [`read_text`], [`read_settings`]: files that are not recordings |
 //! | `wording` | numbers and names in messages |
 //! | `error` | [`IoError`] |
 

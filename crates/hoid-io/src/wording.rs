@@ -68,7 +68,7 @@ pub(crate) fn did_you_mean(unknown: &[&str], names: &[&str]) -> String {
     let of = |asked: &&str| {
         let asked = asked.trim().to_lowercase();
         let score = |name: &str| (strsim::jaro(&asked, &name.trim().to_lowercase()), name.to_owned());
-        // A letter or two are within every longer name: what begins with them is meant.
+        // A letter or two are within every longer name: what starts with them is meant.
         let is_near = |name: &&&str| asked.chars().count() > 2 || name.trim().to_lowercase().starts_with(&asked);
         let known = names
             .iter()

@@ -100,7 +100,7 @@ fn small_files_do_not_unpack_without_a_bound() {
         ("many.csv", (header.join(",") + "\n").into_bytes(), "10001"),
     ] {
         let path = at(name);
-        assert!(bytes.len() < 2_000_000, "{name} is no bomb");
+        assert!(bytes.len() < 2_000_000, "{name} is not a bomb");
         fs::write(&path, bytes).unwrap();
         let surveyed = survey(&path).map(drop).unwrap_err().to_string();
         let read = read_table(&path).map(drop).unwrap_err().to_string();

@@ -281,8 +281,7 @@ fn other_columns_that_are_no_numbers_are_left_out_with_a_note() {
     assert!(read.notes[2].contains("column d is left out") && read.notes[2].contains("missing (empty)"));
 }
 
-/// Whatever stands in a file, the answer is a record of finite numbers or an error that names the
-/// file.
+/// Whatever is in a file, the answer is a record of finite numbers or an error that names the file.
 #[test]
 fn damaged_files_never_panic() {
     let desk = Desk::new();

@@ -142,7 +142,11 @@ fn a_given_frequency_wins_over_t() {
     assert_eq!(clock.record.time_s(1), 0.5);
     assert_eq!(clock.notes[0], "t is in s from its first moment");
     let none = desk.read("t,e,u\nx,1,0\n12:00:02,2,0\n", &with(2.0)).unwrap();
-    assert!(none.notes[0].contains("t is no number on line 2"), "{:?}", none.notes);
+    assert!(
+        none.notes[0].contains("t is not a number on line 2"),
+        "{:?}",
+        none.notes
+    );
     assert_eq!(desk.read("e,u\n1,2\n", &with(2.0)).unwrap().record.len(), 1);
     assert!(
         desk.error("e,u\n1,2\n", &defaults())
@@ -198,7 +202,7 @@ fn fill_bridges_and_says_so() {
     );
 }
 
-/// An outer join of two topics: each row lacks one of the two, and neither begins nor ends with both.
+/// An outer join of two topics: each row lacks one of the two, and neither starts nor ends with both.
 #[test]
 fn two_topics_in_one_table_are_read_where_both_have_values() {
     let desk = Desk::new();
@@ -298,7 +302,7 @@ fn resample_goes_over_gaps_and_jitter() {
     assert!((coarse.record.input()[1] - 2.5).abs() < 1e-14);
     let slow = desk.read(&text, &ask(RESAMPLE, Some(2.0))).unwrap();
     assert!(slow.notes[0].contains("no low-pass filter"), "{:?}", slow.notes);
-    // An even record is left alone, and one with a time that jumps away is no record.
+    // An even record is left alone, and one with a time that jumps away is not a record.
     let even = "t,e,u\n0.0,1,2\n0.1,2,3\n0.2,4,5\n";
     assert_eq!(
         desk.read(even, &ask(RESAMPLE, None)).unwrap(),

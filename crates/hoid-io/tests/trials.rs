@@ -93,7 +93,7 @@ fn one_record_of_several_trials_is_refused_by_name() {
         message.contains("holds 3 trials by trial: 0, 1, 2; read one of them with --trial trial=0"),
         "{message}"
     );
-    // A clock that is set back by a row is no trial.
+    // A clock that is set back by a row is not a trial.
     let set: String = (0..40)
         .map(|k| format!("{:.2},{k},{k}\n", 0.02 * f64::from(k - 2 * i32::from(k > 20))))
         .collect();

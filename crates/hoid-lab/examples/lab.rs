@@ -123,7 +123,7 @@ fn tracked(engine: &mut page::Engine, person: &Person, seed: u64, remnant: f64) 
             n
         })
         .collect();
-    // An event is taken by the tick behind it: one of the delay.
+    // An event is taken by the tick after it: one of the delay.
     let delay = (operator.tau_e_s() / TICK_S).round() as usize - 1;
     let answer = engine.ask(
         &json!({"phases": task.phases, "ticks": task.ticks, "map": MAP, "target": bytes(&task.target),

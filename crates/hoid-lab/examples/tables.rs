@@ -1,7 +1,7 @@
-//! `cargo xtask lab-page`: an experiment as the tables of its runs, in JSON, for the page that needs no program
-//! behind it. Usage: `tables [lab.toml]`.
+//! `cargo xtask lab-page`: an experiment as the tables of its runs, in JSON, for the page that needs no program after
+//! it. Usage: `tables [lab.toml]`.
 //!
-//! Runs stand in the order of the first person. Tables are doubles, little end first, in base 64.
+//! Runs are in the order of the first person. Tables are doubles, little end first, in base 64.
 #![allow(clippy::print_stdout)]
 
 use std::{env, error::Error, path::Path};

@@ -1,10 +1,10 @@
 //! What the loop of page and events adds to a delay.
 //!
-//! A simulated operator takes the place of the person: in the page, in real time, seeing what is
-//! drawn and answering by events of a pointer. Its gain, neuromuscular system and delay tau are known;
-//! what `hoid identify` finds on the run beyond tau is the latency of page, frames and events, as it
-//! stands in every delay that is identified on this machine. It holds neither the screen (from the
-//! buffer to the light) nor the device (from the hand to the event): these need a sensor.
+//! A simulated operator takes the place of the person: in the page, in real time, seeing what is drawn and answering by
+//! events of a pointer. Its gain, neuromuscular system and delay tau are known; what `hoid identify` finds on the run
+//! beyond tau is the latency of page, frames and events, as it is in every delay that is identified on this machine. It
+//! holds neither the screen (from the buffer to the light) nor the device (from the hand to the event): these need a
+//! sensor.
 
 use std::path::Path;
 

@@ -108,7 +108,7 @@ pub struct Condition {
     pub name: String,
     /// What the person reads before a run.
     pub text: String,
-    /// A condition C1 to C6, or a scenario file; it stands in place of the keys from
+    /// A condition C1 to C6, or a scenario file; it is in place of the keys from
     /// `controlled_element` to `disturbance`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub scenario: Option<String>,

@@ -1,4 +1,4 @@
-//! What stands beside the sessions of an experiment: what it is, who took part, and the manifest of
+//! What is next to the sessions of an experiment: what it is, who took part, and the manifest of
 //! `hoid group`.
 
 use std::{collections::BTreeMap, path::Path};
@@ -19,7 +19,7 @@ sub-P01/ses-01/             one session of one person, who has a made-up name
   lab.toml                  the experiment, its order, browser and screen
   lab.copy.toml             the same, for when lab.toml is damaged
   runs.csv                  each run that ended: verified, or unverified and why
-  ..._run.json              the task of a run and its settings, written before it began
+  ..._run.json              the task of a run and its settings, written before it started
   ..._forcing.parquet       target and disturbance at each tick of 1 ms
   ..._ticks.csv             u (hand) and e (error) at each tick
   ..._events.csv            input events: the tick that took them, their own time stamp, when the page

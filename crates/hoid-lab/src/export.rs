@@ -1,4 +1,4 @@
-//! A session as one archive, with what stands beside it in the experiment.
+//! A session as one archive, with what is next to it in the experiment.
 
 use std::{
     io::{Cursor, Write as _},

@@ -7,7 +7,7 @@
 //!
 //! | file | what it holds |
 //! |---|---|
-//! | `runs` | a run: sent, begun, taken batch by batch, ended |
+//! | `runs` | a run: sent, started, taken batch by batch, ended |
 //! | `told` | what the pages are told |
 
 mod runs;
@@ -87,7 +87,7 @@ struct Current {
     session: Option<Session>,
     /// The page that tracks.
     person: Option<u64>,
-    /// A run that was sent and has not begun.
+    /// A run that was sent and has not started.
     ready: Option<Ready>,
     run: Option<Running>,
     /// The run that ended last: its page may not have heard of it yet, and go on for a moment.

@@ -1,14 +1,14 @@
 //! The lag of the person while the run goes on.
 //!
-//! The tracker acts in a basis whose lag stays where it began: nothing of it says what T_I is. So the
-//! samples of the measurement since the last declared change are fitted as `hoid identify` does, each
-//! 10 s, on a thread of its own: all forms of the operator, the one that held-out data choose,
-//! and its T_I where the data determine it ([`hoid_analysis::identify`]). Of a form without a lag, or one
-//! whose interval reaches a pure integration, T_I is not determined, and no number is told.
+//! The tracker acts in a basis whose lag stays where it started: nothing of it says what T_I is. So the samples of the
+//! measurement since the last declared change are fitted as `hoid identify` does, each 10 s, on a thread of its own:
+//! all forms of the operator, the one that held-out data choose, and its T_I where the data determine it
+//! ([`hoid_analysis::identify`]). Of a form without a lag, or one whose interval reaches a pure integration, T_I is not
+//! determined, and no number is told.
 //!
-//! A form with a lag is chosen now and then for who has none, a short lag beside a longer lead: for 13 of
-//! 60 runs of C1 and 2 of 20 of C2, 30 and 80 s long, with T_I up to 6.3 standard errors from zero. A lag
-//! of 1 s that is there is 25 of them from zero and more. So a lag counts from ten on.
+//! A form with a lag is chosen now and then for who has none, a short lag next to a longer lead: for 13 of 60 runs of
+//! C1 and 2 of 20 of C2, 30 and 80 s long, with T_I up to 6.3 standard errors from zero. A lag of 1 s that is there is
+//! 25 of them from zero and more. So a lag counts from ten on.
 
 use std::{
     sync::mpsc::{Receiver, Sender, channel},
@@ -118,11 +118,11 @@ impl LagFits {
         (self.fitted, self.last) = (0, Lag::Waiting);
     }
 
-    /// The lag by the last fit that is done; begins the next one where it is due.
+    /// The lag by the last fit that is done; starts the next one where it is due.
     pub fn lag(&mut self) -> Lag {
         while let Ok((from_s, lag)) = self.found.try_recv() {
             self.busy = false;
-            // One that began before a change is of nobody.
+            // One that started before a change is of nobody.
             if from_s == self.from_s {
                 self.last = lag;
             }

@@ -1,8 +1,8 @@
 //! A tracking experiment in the browser, identified while it runs, that proves itself.
 //!
-//! The page computes the controlled element at 1 ms from tables that are made here, logs every input
-//! event, tick and frame, and sends them in batches. Here they are appended to the folder of the
-//! session, followed by the tracker, and behind the run recomputed to the last bit.
+//! The page computes the controlled element at 1 ms from tables that are made here, logs every input event, tick and
+//! frame, and sends them in batches. Here they are appended to the folder of the session, followed by the tracker, and
+//! after the run recomputed to the last bit.
 //!
 //! | module | what it holds |
 //! |---|---|
@@ -18,7 +18,7 @@
 //! | [`wire`] | what page and server say to each other |
 //! | [`lab`] | [`Lab`]: the experiment as its pages see it |
 //! | [`server`] | [`Server`]: HTTP and sockets on 127.0.0.1 |
-//! | `experiment`, `export`, `replay`, `reports` | what stands beside the sessions; archives; runs shown again; pages |
+//! | `experiment`, `export`, `replay`, `reports` | what is next to the sessions; archives; runs shown again; pages |
 //! | [`calibrate`] | what the loop of page and events adds to a delay |
 
 pub mod calibrate;

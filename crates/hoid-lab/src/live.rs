@@ -32,7 +32,7 @@ use crate::{
 
 /// Warm-up of methods that need one, s.
 const WARM_UP_S: f64 = 20.0;
-/// Delay that a method begins at, samples of 10 ms.
+/// Delay that a method starts at, samples of 10 ms.
 const DEFAULT_NK: usize = 21;
 /// Where the crossover is looked for, rad/s, and in how many steps of one factor.
 const CROSSOVERS: (f64, f64, usize) = (0.3, 15.0, 40);
@@ -103,7 +103,7 @@ impl LiveRun {
         })
     }
 
-    /// Takes samples, and says how it stands behind the last of them.
+    /// Takes samples, and says how it is after the last of them.
     pub fn take(&mut self, samples: &[Sample]) -> LiveLine {
         let mut changed_s = None;
         for sample in samples {

@@ -23,7 +23,7 @@ const GROUP: &str = "group";
 pub struct Pages(Vec<(String, String)>);
 
 impl Pages {
-    /// What they are, and where behind the address of the page.
+    /// What they are, and where after the address of the page.
     pub fn links(&self) -> Vec<(String, String)> {
         self.0.clone()
     }

@@ -3,7 +3,7 @@
 //! The controlled element is held exactly over a tick of 1 ms (zero-order hold,
 //! [`hoid_model::held_system`]). Where it changes, its matrices are those of the continuous model at
 //! the middle of each block of ten ticks. Target and disturbance are sampled at every tick; over the
-//! first seconds of the run-in they are faded in linearly, so that nobody begins with a jump.
+//! first seconds of the run-in they are faded in linearly, so that nobody starts with a jump.
 
 use std::{collections::BTreeMap, f64::consts::TAU};
 
@@ -148,7 +148,7 @@ fn drawn(excitation: &Excitation, turns: &mut impl Iterator<Item = f64>) -> Resu
     Ok(ForcingFunction::new(drawn.collect())?)
 }
 
-/// A controlled element over one tick; its leading gain stands where the realisation says.
+/// A controlled element over one tick; its leading gain is where the realisation says.
 fn held(num: &[f64], den: &[f64], realisation: Realisation, tick: SampleTime) -> Result<Plant, LabError> {
     let gain = num.first().copied().unwrap_or(0.0);
     let shape: Vec<f64> = num.iter().map(|c| if gain == 0.0 { *c } else { c / gain }).collect();

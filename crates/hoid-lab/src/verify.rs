@@ -12,7 +12,7 @@
 //! | `lab-tick` | e at a tick is not that of the plant, by a bit |
 //! | `lab-event` | an event was taken before its time stamp, or too late |
 //! | `lab-frame` | a frame was too late, or did not show the tick that it names |
-//! | `lab-changed` | a file was changed behind the end |
+//! | `lab-changed` | a file was changed after the end |
 //!
 //! u and e are compared bit for bit, but for the sign of zero, which text does not keep. e is
 //! recomputed from the u of the log, so that a false event and a false tick are told apart; the tables
@@ -168,7 +168,7 @@ fn task_of(begun: &RunStart, task: &Task) -> Option<Finding> {
 
 fn ticks_of(logged: &Logged) -> Option<Finding> {
     let wrong = logged.numbers.iter().enumerate().find(|(k, tick)| **tick != *k as f64);
-    wrong.map(|(k, tick)| Finding::doubt("lab-ticks", format!("tick {tick} stands in the place of tick {k}")))
+    wrong.map(|(k, tick)| Finding::doubt("lab-ticks", format!("tick {tick} is in the place of tick {k}")))
 }
 
 fn events_of(begun: &RunStart, logged: &Logged) -> Option<Finding> {
@@ -185,7 +185,7 @@ fn events_of(begun: &RunStart, logged: &Logged) -> Option<Finding> {
             )
         } else if late > begun.limits.input_ms {
             let limit = begun.limits.input_ms;
-            format!("was taken {late:.1} ms behind its time stamp, expected at most {limit} ms")
+            format!("was taken {late:.1} ms after its time stamp, expected at most {limit} ms")
         } else {
             last = event.tick;
             continue;
@@ -245,13 +245,13 @@ fn frames_of(begun: &RunStart, logged: &Logged) -> Option<Finding> {
         if !(0.0..=limit).contains(&interval) {
             return wrong(
                 k,
-                format!("came {interval:.1} ms behind the last one, expected 0 to {limit} ms"),
+                format!("came {interval:.1} ms after the last one, expected 0 to {limit} ms"),
             );
         }
         if !(0.0..=limit).contains(&age.abs()) {
             return wrong(
                 k,
-                format!("was drawn {age:.1} ms behind its own time, expected at most {limit} ms"),
+                format!("was drawn {age:.1} ms after its own time, expected at most {limit} ms"),
             );
         }
         last = frame.drawn_ms;
@@ -275,7 +275,7 @@ fn files_of(stem: &Stem, ended: &Ended) -> Result<Option<Finding>, LabError> {
         .collect();
     Ok((!changed.is_empty()).then(|| {
         let words = format!(
-            "the file of {} was changed behind the end of the run",
+            "the file of {} was changed after the end of the run",
             changed.join(" and that of ")
         );
         Finding::doubt("lab-changed", words)

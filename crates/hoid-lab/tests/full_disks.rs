@@ -223,7 +223,7 @@ fn a_run_that_meets_a_full_disk_is_ended_and_the_page_is_told() {
     // What the page has sent meanwhile is of no account, and the pages see that nothing goes on.
     person.track(1, 3000..3100).unwrap();
     assert_eq!(person.state()["running"], Value::Null);
-    // As long as it is full none begins.
+    // As long as it is full none starts.
     let said = person.next(2).unwrap_err();
     assert!(said.contains("No space left") && said.contains("make room"), "{said}");
     fs::remove_file(&ballast).unwrap();
@@ -231,10 +231,10 @@ fn a_run_that_meets_a_full_disk_is_ended_and_the_page_is_told() {
     let number = 1 + Stem::all(&folder).unwrap().last().unwrap().0;
     person.next(number).unwrap();
     person.track(number, 0..4000).unwrap();
-    // A run that cannot be closed is no verified one.
+    // A run that cannot be closed is not a verified one.
     fill(&ballast);
     let said = person.finish(number).unwrap_err();
-    assert!(said.contains("make room on the disk and begin it again"), "{said}");
+    assert!(said.contains("make room on the disk and start it again"), "{said}");
     assert_eq!(person.state()["next"], 0);
     fs::remove_file(&ballast).unwrap();
     person.next(number + 1).unwrap();

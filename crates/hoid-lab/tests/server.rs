@@ -172,7 +172,7 @@ impl Page {
         while self.hear("state")["phase"] != "runs" {}
     }
 
-    /// Begins the next run; its number.
+    /// Starts the next run; its number.
     fn begin(&mut self) -> u64 {
         self.say(&json!({"type": "next"}));
         let number = self.hear("run")["number"].as_u64().unwrap();
@@ -347,9 +347,10 @@ fn slow_strangers_do_not_shut_the_page_out() {
     assert_eq!(status(&reply), "200");
 }
 
-/// A thousand connections of strangers, each of which begins again as soon as it is closed: silence, half a head,
-/// heads without the token or without an end, sockets, bytes of any kind. The page is answered each time. (Within a second where the list of connections that
-/// the system holds does not overflow, which a test cannot demand of a busy machine.)
+/// A thousand connections of strangers, each of which starts again as soon as it is closed: silence, half a head, heads
+/// without the token or without an end, sockets, bytes of any kind. The page is answered each time. (Within a second
+/// where the list of connections that the system holds does not overflow, which a test cannot demand of a busy
+/// machine.)
 #[test]
 fn a_thousand_hostile_connections_do_not_shut_the_page_out() {
     let dir = tempfile::tempdir().unwrap();

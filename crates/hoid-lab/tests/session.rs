@@ -319,7 +319,7 @@ fn numbers_of_files_are_no_places() {
     fs::write(&ticks, format!("{text}{last}\n{last}\n")).unwrap();
     let checked = check(&stem).unwrap();
     assert!(
-        checked.reasons().contains("tick 3999 stands in the place of tick 4000"),
+        checked.reasons().contains("tick 3999 is in the place of tick 4000"),
         "{}",
         checked.reasons()
     );
@@ -358,7 +358,7 @@ fn reading_a_session_changes_no_file() {
     fs::write(&runs, &cut).unwrap();
     assert_eq!(Session::read(&session.folder).unwrap().done.len(), 1);
     assert_eq!(fs::read_to_string(&runs).unwrap(), cut);
-    // The next line stands behind the last whole one.
+    // The next line is after the last whole one.
     let mut session = Session::open(&session.folder).unwrap();
     let (stem, log) = run(&mut session, usize::MAX);
     drop(log);

@@ -1,10 +1,9 @@
 //! A fault of recorded data: what it is, where, how large, and what was done about it.
 //!
-//! A [`Fault`] is a place in one channel of a record (or in all of them) where the numbers cannot be
-//! what the channel did. How faults are found is told where that is done; here stands what is said of
-//! one, so that a file, a fit and a stream say it alike. [`fault_findings`] turns faults into what a
-//! [`Verdict`](crate::Verdict) is made of: a fault that was mended is worth a note, one that is still
-//! in the data a doubt.
+//! A [`Fault`] is a place in one channel of a record (or in all of them) where the numbers cannot be what the channel
+//! did. How faults are found is told where that is done; here stands what is said of one, so that a file, a fit and a
+//! stream say it alike. [`fault_findings`] turns faults into what a [`Verdict`](crate::Verdict) is made of: a fault
+//! that was repaired is worth a note, one that is still in the data a doubt.
 
 use std::fmt;
 
@@ -14,7 +13,7 @@ use crate::Finding;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
 #[non_exhaustive]
 pub enum FaultKind {
-    /// One or few samples that those before and behind them rule out.
+    /// One or few samples that those before and after them rule out.
     Spike,
     /// A constant that the channel jumps to and back from.
     Dropout,
@@ -77,7 +76,7 @@ pub enum FaultAction {
     Reported,
     /// Its samples were replaced by what those around them say; a wrap was unwrapped.
     Bridged,
-    /// The record ends before it and another begins behind it.
+    /// The record ends before it and another starts after it.
     Cut,
 }
 
@@ -96,7 +95,7 @@ pub struct Fault {
     pub channel: String,
     /// Time of its first sample, s.
     pub from_s: f64,
-    /// Time of the sample behind its last, s.
+    /// Time of the sample after its last, s.
     pub to_s: f64,
     /// How many samples.
     pub samples: usize,
@@ -184,11 +183,11 @@ fn short(value: f64, digits: usize) -> String {
 
 /// Faults of one kind that are told one by one; more are counted.
 const TOLD: usize = 3;
-/// Share of the samples that may be mended before the rest is doubted.
+/// Share of the samples that may be repaired before the rest is doubted.
 pub const MOST_MENDED: f64 = 0.2;
 
-/// What faults say of a result: a note where all of a kind were mended, a doubt where they were not,
-/// and a doubt where more than [`MOST_MENDED`] of the samples are gone.
+/// What faults say of a result: a note where all of a kind were repaired, a doubt where they were
+/// not, and a doubt where more than [`MOST_MENDED`] of the samples are gone.
 pub fn fault_findings(faults: &[Fault], samples: usize) -> Vec<Finding> {
     let mut all = Vec::new();
     for kind in FaultKind::ALL {
@@ -218,7 +217,7 @@ pub fn fault_findings(faults: &[Fault], samples: usize) -> Vec<Finding> {
         .filter(|fault| fault.action != FaultAction::Reported && fault.kind != FaultKind::Wrap)
         .map(|fault| fault.samples)
         .sum();
-    // What is idle is no part of the run.
+    // What is idle is not a part of the run.
     let idle: usize = (faults.iter())
         .filter(|fault| fault.action == FaultAction::Cut && fault.kind == FaultKind::Idle)
         .map(|fault| fault.samples)

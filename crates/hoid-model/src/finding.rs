@@ -46,7 +46,7 @@ pub struct Finding {
 }
 
 impl Finding {
-    /// A finding that the result stands in spite of.
+    /// A finding that the result is in spite of.
     pub fn note(kind: &'static str, message: impl Into<String>) -> Self {
         Self::new(kind, Severity::Note, message)
     }

@@ -21,8 +21,8 @@ impl GainUnit {
         Self(declared.map(|(e, u)| (e.to_owned(), u.to_owned())))
     }
 
-    /// Unit of a parameter, of its name and of the unit `own` that it has beside that of the gain
-    /// ("s" of K_e_dot, "1/s" of K/T_I, "deg/deg" or "" of K). What is no gain keeps its own.
+    /// Unit of a parameter, of its name and of the unit `own` that it has next to that of the gain
+    /// ("s" of K_e_dot, "1/s" of K/T_I, "deg/deg" or "" of K). What is not a gain keeps its own.
     ///
     /// ```
     /// # use hoid_model::{Channel, GainUnit, Record, SampleTime};

@@ -17,7 +17,7 @@ use num_complex::Complex64;
 
 use crate::{ModelError, SampleTime};
 
-/// A held system; its state is that of `1/den`, the numerator stands in the output.
+/// A held system; its state is that of `1/den`, the numerator is in the output.
 #[derive(Debug, Clone, PartialEq)]
 pub struct HeldSystem {
     order: usize,

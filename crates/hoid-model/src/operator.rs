@@ -3,7 +3,7 @@
 //! `H(s) = K_e (T_L s + 1) e^{-s tau_e} omega_nm^2 / (s^2 + 2 zeta_nm omega_nm s + omega_nm^2)`
 //! (eq. 2)
 //!
-//! Behind a zero-order hold this is exactly `(b0 + b1 q^-1) q^-nk / (1 + f1 q^-1 + f2 q^-2)` with
+//! After a zero-order hold this is exactly `(b0 + b1 q^-1) q^-nk / (1 + f1 q^-1 + f2 q^-2)` with
 //! `nk = tau_e/Ts + 1` (eq. 11), by the formulas of [`hoid_core::held_operator`].
 
 use hoid_core::held_operator::held_operator;
@@ -52,7 +52,7 @@ impl OperatorParameters {
     /// which is zero when it is not named.
     ///
     /// # Errors
-    /// [`ModelError::Operator`] for a name that is not there, is lacking, or stands beside one that
+    /// [`ModelError::Operator`] for a name that is not there, is lacking, or is next to one that
     /// says the same.
     pub fn of_names(pairs: &[(String, f64)]) -> Result<Self, ModelError> {
         const NAMES: [&str; 6] = ["K_e", "T_L", "K_e_dot", "omega_nm", "zeta_nm", "tau_e"];
@@ -114,7 +114,7 @@ impl OperatorParameters {
     ///
     /// # Errors
     /// [`ModelError::OutOfRange`] when omega_nm is not positive, a parameter is not finite, or the
-    /// delay is no whole number of samples.
+    /// delay is not a whole number of samples.
     pub fn discretise(&self, sample_time: SampleTime) -> Result<DiscreteOperator, ModelError> {
         let checks = [
             ("error gain K_e", self.k_e, true),

@@ -1,4 +1,4 @@
-//! The remnant gain K_n that gives a demanded noise level P_n (appendix A of the reference text).
+//! The remnant gain K_n that gives a demanded noise level P_n (appendix A of the thesis).
 //!
 //! With `S = 1/(1 + H_HO H_CE)`, unit white noise drawn once a sample (its power spreads evenly
 //! over 0 to pi/Ts), and

@@ -18,7 +18,7 @@
 //! replaces the matrix exponential and logarithm of the extended matrix (eq. B.7); it gives the
 //! same numbers. The inverse exists when no pole in z lies on the closed negative real axis (then
 //! the logarithm is the principal one). Source: N. J. Higham, *Functions of Matrices*, 2008,
-//! sections 2.4 and B.16 (divided differences); eq. B.3-B.10 of the reference text.
+//! sections 2.4 and B.16 (divided differences); eq. B.3-B.10 of the thesis.
 
 use hoid_core::divided_differences::DividedDifferences;
 
@@ -37,7 +37,7 @@ pub struct SecondOrder {
     pub a2: f64,
 }
 
-/// `(b0 + b1 q^-1) q^-1 / (1 + f1 q^-1 + f2 q^-2)`: a second-order system behind a zero-order hold.
+/// `(b0 + b1 q^-1) q^-1 / (1 + f1 q^-1 + f2 q^-2)`: a second-order system after a zero-order hold.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HeldSecondOrder {
     /// First coefficient of B.
@@ -147,7 +147,7 @@ impl HeldStates {
     }
 }
 
-/// Direct feedthrough beside the strictly proper part: `d + (b0 s + b1)/(s^2 + a1 s + a2)`,
+/// Direct feedthrough next to the strictly proper part: `d + (b0 s + b1)/(s^2 + a1 s + a2)`,
 /// numerator and denominator by descending powers.
 ///
 /// The held system has the numerator `d + (d f1 + b0_d) q^-1 + (d f2 + b1_d) q^-2`.

@@ -219,7 +219,7 @@ impl PyFit {
 
     /// A, B, C, D and F by ascending powers of q^-1.
     ///
-    /// A, C, D and F begin with 1, B with the zeros of its delay.
+    /// A, C, D and F start with 1, B with the zeros of its delay.
     #[getter]
     fn polynomials<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let model = self.fit.model();

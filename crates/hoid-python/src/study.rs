@@ -189,7 +189,7 @@ pub fn merge_shards(py: Python<'_>, shards: Vec<PathBuf>, directory: PathBuf, cs
 /// Index page, number of tables and figures, tally of the claims.
 type Reproduced = (PathBuf, usize, Option<[usize; 5]>);
 
-/// Makes the tables, figures and claims of the reference text; `None` after an interrupt.
+/// Makes the tables, figures and claims of the thesis; `None` after an interrupt.
 #[pyfunction]
 #[pyo3(signature = (directory, *, only, replications, jobs, progress))]
 pub fn reproduce(

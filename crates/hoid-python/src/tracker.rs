@@ -224,7 +224,7 @@ impl PyTracker {
         matches!(self.live, Live::Tracking(_))
     }
 
-    /// Why the last start fit failed, or why the warm-up began again.
+    /// Why the last start fit failed, or why the warm-up started again.
     #[getter]
     fn trouble(&self) -> Option<String> {
         match &self.live {
@@ -368,7 +368,7 @@ impl PyTracker {
         event.map(|fault| figures::track_fault(py, &fault)).transpose()
     }
 
-    /// True while the guard lets the estimate stand still.
+    /// True while the guard lets the estimate stay constant.
     #[getter]
     fn paused(&self) -> bool {
         matches!(&self.live, Live::Tracking(tracker) if tracker.is_paused())

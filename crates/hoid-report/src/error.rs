@@ -5,7 +5,7 @@ use hoid_study::StudyError;
 use thiserror::Error;
 
 /// Everything that stops a report. A model that does not convert or a record that cannot be
-/// validated is no error: the page shows the reason in its place.
+/// validated is not an error: the page shows the reason in its place.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum ReportError {

@@ -1,4 +1,4 @@
-//! What stands in the table of settings of every page.
+//! What is in the table of settings of every page.
 
 use hoid_analysis::{Account, Setting};
 use hoid_io::{QualityIssue, Step};

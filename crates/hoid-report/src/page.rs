@@ -23,7 +23,7 @@ pub(crate) fn render(name: &str, values: Value) -> Result<String, ReportError> {
     render_with(&[], name, values)
 }
 
-/// The page of a template, which may be one of `own`: name and text of templates beside those of
+/// The page of a template, which may be one of `own`: name and text of templates next to those of
 /// this crate, whose parts and style they can use.
 ///
 /// # Errors

@@ -65,7 +65,7 @@ fn page<'a>(models: Vec<ModelSection<'a>>) -> String {
     report.to_html().unwrap()
 }
 
-/// The text behind the first `<h2 id=...>` with this name, up to the next section.
+/// The text after the first `<h2 id=...>` with this name, up to the next section.
 fn section_of<'a>(html: &'a str, name: &str) -> &'a str {
     let start = html.find(&format!("\">{name}</h2>")).unwrap();
     let end = html[start..].find("</section>").unwrap();

@@ -253,7 +253,7 @@ fn short_records_and_averages_have_their_page() {
     // Shorter than 10 s: errors over the whole record.
     assert!(html.contains("with <i>t</i> &ge; 0 s"));
     assert!(html.contains("101 rows, behind by 0.5 s"));
-    assert!(html.contains("nothing at the end of [-3, -1] s: the trace begins later"));
+    assert!(html.contains("nothing at the end of [-3, -1] s: the trace starts later"));
     // One row alone.
     let one = track(&record, &options, 800).unwrap();
     assert_eq!(one.len(), 1);

@@ -59,7 +59,7 @@ pub enum SimError {
     /// An instruction set that this processor does not have.
     #[error("this processor does not have the instruction set that was asked for; use InstructionSet::Best")]
     NoSuchInstructionSet,
-    /// Noise that is no number.
+    /// Noise that is not a number.
     #[error("the noise at sample {index} is {value}, expected a finite number")]
     NoiseNotFinite {
         /// Index of the sample, from 0.

@@ -106,7 +106,7 @@ impl OperatorRun {
         true
     }
 
-    /// What stands in the ring for the sample that is next.
+    /// What is in the ring for the sample that is next.
     fn respond(&mut self) {
         let [of_output, of_rate] = self.matrices().operator_output;
         let last = self.memory.len() - 1;
@@ -118,7 +118,7 @@ impl OperatorRun {
         all[self.k.min(all.len() - 1)]
     }
 
-    /// The white noise of the sample that is next; behind the end of the scenario it goes on.
+    /// The white noise of the sample that is next; after the end of the scenario it goes on.
     fn white(&mut self) -> f64 {
         if self.k >= self.noise.len() {
             self.noise = self.run.white_noise(2 * self.k + 1);
@@ -174,7 +174,7 @@ mod tests {
         }
     }
 
-    /// An operator goes on in another, behind the end of its scenario too.
+    /// An operator goes on in another, after the end of its scenario too.
     #[test]
     fn a_saved_operator_goes_on_with_the_same_digits() {
         let mut scenario = Scenario::condition(Condition::C4);

@@ -258,7 +258,7 @@ fn coefficient(values: &[f64], omega_rad_s: f64, ts: f64) -> Complex64 {
 #[test]
 fn the_describing_function_is_the_operator_behind_a_hold() {
     let mut operators = vec![lead_lag(0.1437)];
-    // Without neuromuscular part e passes at once, behind the hold's half sample.
+    // Without neuromuscular part e passes at once, after the hold's half sample.
     operators.push(FamilyOperator::new(Form::LeadLag, false, &[2.0, 0.3, 0.2, 0.15]).unwrap());
     operators.push(FamilyOperator::new(Form::Gain, false, &[2.0, 0.15]).unwrap());
     operators.push(FamilyOperator::new(Form::Gain, false, &[2.0, 0.002]).unwrap());

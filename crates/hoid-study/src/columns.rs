@@ -52,7 +52,7 @@ impl Rows {
         }
     }
 
-    /// Begins a row: empty cells, zero counts.
+    /// Starts a row: empty cells, zero counts.
     pub fn begin(&mut self) {
         self.rows += 1;
         for column in &mut self.columns {

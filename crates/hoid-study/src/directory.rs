@@ -21,12 +21,12 @@ pub(crate) fn seal_path(directory: &Path, block: u64) -> PathBuf {
     directory.join("parts").join(format!("{block:06}-seal.json"))
 }
 
-/// Writes the plan beside the results.
+/// Writes the plan next to the results.
 pub(crate) fn write_plan(plan: &Plan, directory: &Path) -> Result<(), StudyError> {
     write_source(&directory.join(PLAN), plan.text())
 }
 
-/// Writes what the results are made of beside them, never over something else of the same name.
+/// Writes what the results are made of next to them, never over something else of the same name.
 pub(crate) fn write_source(path: &Path, text: &str) -> Result<(), StudyError> {
     if path.exists() {
         if hoid_io::read_bytes(path)? == text.as_bytes() {

@@ -43,7 +43,7 @@ pub enum StudyError {
         /// The directory.
         directory: String,
     },
-    /// A plan or manifest of the user in the place of the copy beside the results.
+    /// A plan or manifest of the user in the place of the copy next to the results.
     #[error("{file} is there already and would be replaced by what is run now; take another directory for the results")]
     SourceThere {
         /// The file.
@@ -77,7 +77,7 @@ pub enum StudyError {
         /// The directory.
         directory: String,
     },
-    /// A table that is not what the plan beside it says.
+    /// A table that is not what the plan next to it says.
     #[error("{file}: {reason}; expected the table that hoid wrote: run the study again")]
     Table {
         /// The file.

@@ -61,7 +61,7 @@ impl<'a> EstimateRows<'a> {
         }
     }
 
-    /// Begins a replication: its estimators are compared with each other.
+    /// Starts a replication: its estimators are compared with each other.
     pub fn begin_replication(&mut self) {
         self.vafs.clear();
     }
@@ -108,7 +108,7 @@ impl<'a> EstimateRows<'a> {
         rows.real("to_s", to);
     }
 
-    /// The estimate that was begun has failed.
+    /// The estimate that was started has failed.
     pub fn failed(&mut self, reason: &str) {
         self.fits.text("status", "failed");
         self.fits.text("reason", reason);
@@ -206,7 +206,7 @@ impl<'a> EstimateRows<'a> {
         if let Some(true_response) = &self.true_response {
             rows.real("response_error", true_response.error_percent(&of.polynomial_fit));
         }
-        // T_I of a pure integration is no number.
+        // T_I of a pure integration is not a number.
         for p in of.parameters.iter().filter(|p| p.value.is_finite()) {
             let estimate = Estimate {
                 value: p.value,

@@ -1,9 +1,9 @@
 //! Running a study: blocks over threads, parts on disk, resume.
 //!
-//! A block is written as one file a table when it is finished, traces first, beside its place and
-//! then renamed, and at last its seal (`seal`). A study that was killed therefore has whole blocks
-//! and nothing else, and goes on with the blocks that have no seal or do not agree with it. When all blocks are there, the parts are joined in
-//! the order of the plan; which thread or machine made a part does not show.
+//! A block is written as one file a table when it is finished, traces first, next to its place and then renamed, and at
+//! last its seal (`seal`). A study that was killed therefore has whole blocks and nothing else, and goes on with the
+//! blocks that have no seal or do not agree with it. When all blocks are there, the parts are joined in the order of
+//! the plan; which thread or machine made a part does not show.
 
 use std::{
     path::{Path, PathBuf},
@@ -107,7 +107,7 @@ pub fn run(
         let done = done.fetch_add(n, Ordering::Relaxed) + n;
         progress(Progress { done, total, known });
     };
-    // Once one block was stopped, the next do not begin with simulating their runs.
+    // Once one block was stopped, the next do not start with simulating their runs.
     let stopped = AtomicBool::new(false);
     let one = |block: &Block| -> Result<bool, StudyError> {
         if stopped.load(Ordering::Relaxed) {

@@ -1,4 +1,4 @@
-//! What stands beside the results: `study.json`.
+//! What is next to the results: `study.json`.
 //!
 //! It says which plan and which program made the parts of a directory, and which shard of the study
 //! they are. Two directories belong together when plan, replications, seed and version are the

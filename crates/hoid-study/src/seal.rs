@@ -58,7 +58,7 @@ pub(crate) fn write_block(
     })?)
 }
 
-/// What stands on disk of a block.
+/// What is on disk of a block.
 pub(crate) fn on_disk(directory: &Path, plan_sha256: &str, block: u64) -> OnDisk {
     let path = seal_path(directory, block);
     if !path.exists() {

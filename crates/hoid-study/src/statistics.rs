@@ -15,7 +15,7 @@ use hoid_numerics::statistics::{self, finite_sorted, mean};
 /// What a box plot and a table say of some values.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Statistics {
-    /// Values, those that are no numbers left out.
+    /// Values, those that are not numbers left out.
     pub count: usize,
     /// Values left out.
     pub missing: usize,
@@ -48,7 +48,7 @@ pub struct Statistics {
 }
 
 impl Statistics {
-    /// The statistics of some values; of none, all but the counts are no numbers.
+    /// The statistics of some values; of none, all but the counts are not numbers.
     pub fn of(values: &[f64]) -> Self {
         let sorted = finite_sorted(values.iter().copied());
         let (n, missing) = (sorted.len(), values.len() - sorted.len());
@@ -131,7 +131,7 @@ pub fn quantile(sorted: &[f64], p: f64) -> f64 {
     statistics::quantile(sorted, p).unwrap_or(f64::NAN)
 }
 
-/// Median of values; those that are no numbers are left out.
+/// Median of values; those that are not numbers are left out.
 pub fn median(values: &[f64]) -> f64 {
     statistics::quantile_of(values, 0.5).unwrap_or(f64::NAN)
 }

@@ -196,7 +196,7 @@ fn a_row_is_the_analysis_of_the_run() {
     assert!(one("bias_K_e2", "change", "change").abs() < 30.0);
 }
 
-/// The lead of a form with a lag is no estimate of the lead that was simulated.
+/// The lead of a form with a lag is not an estimate of the lead that was simulated.
 #[test]
 fn a_lead_of_another_form_has_no_bias() {
     let text = PLAN.replace("form = \"lead\"", "form = \"lead-lag\"");

@@ -86,7 +86,7 @@ condition = "fo"
 run = "1"
 "#;
 
-/// Values that stand where others belong.
+/// Values that are where others belong.
 const VALUES: [&str; 30] = [
     "",
     "0",

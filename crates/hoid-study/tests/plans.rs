@@ -101,7 +101,7 @@ fn bad_plans_name_line_and_remedy() {
             "orders.nk = 29",
             "orders.nk = 29\nspan_s = [50.0, 20.0]",
             14,
-            vec!["span_s", "beginning before its end"],
+            vec!["span_s", "start before its end"],
         ),
         (
             "orders.nk = 29",

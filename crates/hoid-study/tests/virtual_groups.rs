@@ -1,4 +1,4 @@
-//! Virtual experiments: groups of simulated people, with what is true beside them.
+//! Virtual experiments: groups of simulated people, with what is true next to them.
 #![allow(clippy::unwrap_used)]
 
 mod common;
@@ -182,7 +182,8 @@ fn grey_box_error_bars_hold_in_a_virtual_experiment() {
     assert!((bj - 29.0).abs() < 2.0 && arx > bj + 3.0, "ARX {arx}, BJ {bj}");
 }
 
-/// Virtual people: their files are those of recorded experiments, with all that is true beside them.
+/// Virtual people: their files are those of recorded experiments, with all that is true next to
+/// them.
 #[test]
 fn virtual_people_have_their_truth_beside_them() {
     let experiment = PeopleExperiment {

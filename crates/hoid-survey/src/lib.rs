@@ -1,4 +1,4 @@
-//! The recursive methods of the literature beside those of hoid: for comparison.
+//! The recursive methods of the literature next to those of hoid: for comparison.
 //!
 //! Each follows the source that its file names, and is a [`Method`](hoid_track::Method) as the default is: the tracker,
 //! the guard, saved states, traces and verdicts of [`hoid_track`] are those of all. This crate sees all

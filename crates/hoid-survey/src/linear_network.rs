@@ -1,6 +1,5 @@
-//! A network of a single linear layer that learns the equalization parameters, as section 2.4 of the
-//! reference text describes that of its reference [14]. The rule: B. Widrow and M. E. Hoff,
-//! *Adaptive switching circuits*, IRE WESCON 1960.
+//! A network of a single linear layer that learns the equalization parameters, as section 2.4 of the thesis describes
+//! that of its reference [14]. The rule: B. Widrow and M. E. Hoff, *Adaptive switching circuits*, IRE WESCON 1960.
 //!
 //! The inputs are the discretised pilot model with unit equalization: y_0 and y_1, the responses of
 //! the neuromuscular part to the delayed error and to its rate, each over its size s_i, the root mean
@@ -45,8 +44,8 @@ impl RecursiveMethod for LinearNetworkOptions {
     fn about(&self) -> About {
         About {
             name: NAME,
-            help: "single linear layer that learns K_e and K_e_dot behind a known neuromuscular part, for comparison",
-            source: "the reference text, section 2.4; Widrow and Hoff 1960",
+            help: "single linear layer that learns K_e and K_e_dot after a known neuromuscular part, for comparison",
+            source: "the thesis, section 2.4; Widrow and Hoff 1960",
             structures: &[Structure::BoxJenkins, Structure::General],
             defaults: &[],
         }

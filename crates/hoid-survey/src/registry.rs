@@ -79,8 +79,8 @@ fn plain(text: &str) -> String {
     text.trim().to_ascii_lowercase()
 }
 
-/// The method of a name, with its defaults. An earlier name stands in plans and in saved trackers, and is read
-/// as well; who can tell the user says it ([`renamed`]).
+/// The method of a name, with its defaults. An earlier name is in plans and in saved trackers, and is read as well; who
+/// can tell the user says it ([`renamed`]).
 ///
 /// # Errors
 /// [`IdentError::BadOption`] for a name that no method has.

@@ -55,7 +55,7 @@ impl RecursiveMethod for WindowOptions {
         About {
             name: "window",
             help: "a batch fit of the last seconds, again and again",
-            source: "the reference text, section VII",
+            source: "the thesis, section VII",
             structures: &Structure::ALL,
             defaults: &[],
         }

@@ -42,7 +42,7 @@ fn a_guard_that_never_acts_changes_no_digit() {
             let without = track(&record, &options(method(), "no"), 16).unwrap();
             assert!(with.is_guarded() && !without.is_guarded());
             assert_eq!(with.faults(), [], "{}", method());
-            // As bits: there is none before the estimate begins.
+            // As bits: there is none before the estimate starts.
             let bits = |numbers: &[f64]| numbers.iter().map(|x| x.to_bits()).collect::<Vec<u64>>();
             for row in 0..with.len() {
                 assert_eq!(with.theta(row), without.theta(row), "{}", method());
@@ -123,7 +123,7 @@ fn a_restored_guard_goes_on_with_the_same_digits() {
             assert_eq!(first.is_paused(), second.is_paused());
             for k in stop..6700 {
                 let (e, u) = hostile(&record, k);
-                // NaN is no innovation, so that outcomes can be compared.
+                // NaN is not an innovation, so that outcomes can be compared.
                 let of =
                     |tracker: &mut Tracker| -> (Outcome, Option<GuardEvent>) { (tracker.step(e, u), tracker.event()) };
                 assert_eq!(of(&mut first), of(&mut second), "{} at {k}", method());

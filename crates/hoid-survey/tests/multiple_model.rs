@@ -121,7 +121,7 @@ fn responses_times_gains_are_the_held_operator_and_their_derivatives_are_differe
 #[test]
 fn a_point_that_moves_takes_the_past_with_it() {
     // What the filters remember after a move differs in the second order from that of filters that
-    // always stood there.
+    // always was there.
     let error = |step: f64| {
         let mut noise = Noise(9);
         let (mut moved, mut there) = (

@@ -27,7 +27,7 @@ fn record(condition: Condition) -> Record {
 /// The answer to a step of e, and the second in which its end is found, s.
 const ANSWER_S: f64 = 4.0;
 
-/// What stands still.
+/// What stays constant.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Stand {
     /// e and u are zero.

@@ -122,7 +122,7 @@ fn the_response_of_physical_has_the_delay_of_its_row() {
     assert!((tau - 0.28).abs() > 0.02, "the delay has moved: {tau}");
 }
 
-/// Phase of the true operator of the last sample at 2.5 rad/s, behind its hold.
+/// Phase of the true operator of the last sample at 2.5 rad/s, after its hold.
 fn true_phase_deg(record: &Record) -> f64 {
     let of = |name: &str| record.channel(name).unwrap()[record.len() - 1];
     let (omega, square) = (2.5_f64, of("omega_nm").powi(2));

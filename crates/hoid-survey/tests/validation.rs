@@ -138,8 +138,8 @@ fn what_cannot_choose_is_refused_with_what_to_do() {
     assert!(says(&alone, &options(Method::rls())).contains("no input"));
 }
 
-/// With a power of zero nothing is changed, to the last bit; with the usual one P shrinks and the estimate
-/// of a person who changes is better in what the text names, the oscillations.
+/// With a power of zero nothing is changed, to the last bit; with the default one P shrinks and the estimate of a
+/// person who changes is better in what the text names, the oscillations.
 #[test]
 fn the_covariance_shrinks_where_less_is_explained() {
     let (mut default, mut updated, mut differs) = (0.0, 0.0, false);

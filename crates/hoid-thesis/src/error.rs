@@ -1,4 +1,4 @@
-//! Why the reference text could not be reproduced.
+//! Why the thesis could not be reproduced.
 
 use hoid_ident::IdentError;
 use hoid_io::IoError;
@@ -47,7 +47,7 @@ pub enum ThesisError {
     /// A model that has no meaning.
     #[error(transparent)]
     Model(#[from] ModelError),
-    /// A model that is no operator.
+    /// A model that is not an operator.
     #[error(transparent)]
     NotConvertible(#[from] NotConvertible),
     /// A scenario that cannot be simulated.

@@ -1,6 +1,6 @@
-//! The reference text, reproduced: its studies, tables, figures and claims (A. Ortiz Moya,
-//! *Time-Varying Human-Operator Identification with Box-Jenkins Models*, MSc thesis, Delft
-//! University of Technology, 2023).
+//! The thesis, reproduced: its studies, tables, figures and claims (A. Ortiz Moya, *Time-Varying
+//! Human-Operator Identification with Box-Jenkins Models*, MSc thesis, Delft University of
+//! Technology, 2023).
 //!
 //! The text compares ARX and Box-Jenkins models of the human operator, in batches and recursively,
 //! by simulation. [`reproduce`] runs its studies, draws its tables and figures, tests what it

@@ -2,7 +2,7 @@
 //!
 //! A parameter is determined where it stands more than two standard errors from zero and, where the
 //! method supposes something of it before the first sample, where the data have at least halved that
-//! variance: else what stands there is the supposition.
+//! variance: else what is there is the supposition.
 
 use hoid_model::uncertainty::OperatorEstimate;
 

@@ -40,12 +40,12 @@
 //! | `live` | [`Live`]: the warm-up of a stream, then its tracker |
 //! | `guard` | samples and spans that no tracking makes, kept from the recursion |
 //! | `stationary` | what a recursion without a guard does while nothing arrives |
-//! | `idle` | what was recorded before a run began |
+//! | `idle` | what was recorded before a run started |
 //! | `over_record`, `two_sided` | [`track()`]: a record; the two-sided estimate of a recorded run |
 //! | `trace`, `columns`, `summary`, `as_text` | [`Trace`]: the estimate at every sample, as columns and in words |
 //! | `judgement` | what a trace, and the estimate of a moment, is worth: [`Trace::verdict`] |
 //! | `determined` | which parameters the data determine |
-//! | `delay_bank` | a delay in whole samples, followed beside any recursion |
+//! | `delay_bank` | a delay in whole samples, followed next to any recursion |
 //! | `validation` | what a trace explains of another run; the covariance at the start that this chooses |
 //! | `change` | [`Change`]: when a person changed |
 //!
@@ -54,11 +54,10 @@
 //! estimate stays, so that no sample counts twice and the error bars hold. With the text's own
 //! start, `P_0 = 0.1 I` (eq. 38, 5.41, 5.55), the estimate moves from the first sample on.
 //!
-//! **Samples that are not as they should be** never reach the filters. A value is a fault when it
-//! is not a finite number or larger than [`TrackOptions::largest`]. An error e is then replaced by
-//! the last good one, an output u by the one-step prediction, and the estimate stays at that
-//! sample. Each is counted. Behind a guard (`guard`; by default for `adaptive`) so are
-//! outliers and spans that no tracking makes.
+//! **Samples that are not as they should be** never reach the filters. A value is a fault when it is not a finite
+//! number or larger than [`TrackOptions::largest`]. An error e is then replaced by the last good one, an output u by
+//! the one-step prediction, and the estimate stays at that sample. Each is counted. After a guard (`guard`; by default
+//! for `adaptive`) so are outliers and spans that no tracking makes.
 
 pub mod building;
 mod change;

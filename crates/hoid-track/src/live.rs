@@ -19,7 +19,7 @@ pub type Choose<'a> = &'a dyn Fn(&Record) -> Result<(TrackOptions, Option<Choice
 const QUARTER: usize = 4;
 /// Of a warm-up that goes on, so many times its length is kept.
 const KEPT: usize = 2;
-/// Longest run of faulty samples within a warm-up, s; after a longer one it begins anew.
+/// Longest run of faulty samples within a warm-up, s; after a longer one it starts anew.
 const LONGEST_FAULT_S: f64 = 1.0;
 
 /// Where the recursion is.
@@ -41,7 +41,7 @@ pub struct LiveOutcome {
 }
 
 impl Live {
-    /// A recursion that begins at once where its start is given, else with a warm-up of so many
+    /// A recursion that starts at once where its start is given, else with a warm-up of so many
     /// samples.
     ///
     /// # Errors
@@ -126,11 +126,11 @@ pub struct WarmUp {
     length: usize,
     sample_time: SampleTime,
     samples: VecDeque<Sample>,
-    /// Samples since the collection began.
+    /// Samples since the collection started.
     pub collected: usize,
     /// How many there are to be when the fit is tried.
     pub needed: usize,
-    /// Why the last start fit failed, or the collection began anew.
+    /// Why the last start fit failed, or the collection started anew.
     pub trouble: Option<String>,
     /// Faulty samples at the end.
     faulty: usize,
@@ -198,7 +198,7 @@ impl WarmUp {
         }
     }
 
-    /// Takes a sample. The collection begins with a sound one, and begins anew after a long fault.
+    /// Takes a sample. The collection starts with a sound one, and starts anew after a long fault.
     fn collect(&mut self, sample: Sample) {
         let sound = sample.e.is_finite() && sample.u.is_finite();
         self.faulty = if sound { 0 } else { self.faulty + 1 };
@@ -208,7 +208,7 @@ impl WarmUp {
         if self.faulty as f64 * self.sample_time.s() > LONGEST_FAULT_S {
             *self = Self::new(self.length, self.sample_time);
             self.trouble = Some(format!(
-                "more than {LONGEST_FAULT_S} s of faulty samples: the warm-up began anew"
+                "more than {LONGEST_FAULT_S} s of faulty samples: the warm-up started anew"
             ));
             return;
         }
@@ -219,7 +219,7 @@ impl WarmUp {
         self.collected += 1;
     }
 
-    /// Leaves out what came before the run began, and collects as much in its place; false where
+    /// Leaves out what came before the run started, and collects as much in its place; false where
     /// there is nothing of the kind.
     fn leave_out_idle(&mut self) -> bool {
         let Ok(record) = self.record() else { return false };

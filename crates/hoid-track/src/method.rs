@@ -41,7 +41,7 @@ pub struct About {
     pub defaults: &'static [(&'static str, &'static str)],
 }
 
-/// What a method can do behind a box: any that can be cloned and compared.
+/// What a method can do after a box: any that can be cloned and compared.
 pub trait Boxed: fmt::Debug + Send + Sync {
     /// A copy.
     fn boxed(&self) -> Box<dyn RecursiveMethod>;
@@ -114,7 +114,7 @@ pub trait RecursiveMethod: Settings + Boxed + 'static {
     }
 
     /// True for a method that has a model of how the person changes, and no memory: physical
-    /// parameters behind the noise model of a batch fit, which stays.
+    /// parameters after the noise model of a batch fit, which stays.
     fn is_model_of_change(&self) -> bool {
         false
     }
@@ -147,7 +147,7 @@ pub trait RecursiveMethod: Settings + Boxed + 'static {
         false
     }
 
-    /// What it remembers, in words, where that is no memory of parameters.
+    /// What it remembers, in words, where that is not a memory of parameters.
     fn memory_as_text(&self) -> Option<String> {
         None
     }
@@ -184,13 +184,13 @@ pub trait RecursiveMethod: Settings + Boxed + 'static {
         self.gain().and_then(|gain| gain.windup_guard)
     }
 
-    /// Whether a guard stands in front of it, or that was refused; none where nothing was said and its own default
-    /// is to have none.
+    /// Whether a guard is in front of it, or that was refused; none where nothing was said and its own default is to
+    /// have none.
     fn guard(&self) -> Option<GuardChoice> {
         None
     }
 
-    /// True where a guard stands in front of it.
+    /// True where a guard is in front of it.
     fn is_guarded(&self) -> bool {
         self.guard() == Some(GuardChoice::Yes)
     }
@@ -231,7 +231,7 @@ pub trait RecursiveMethod: Settings + Boxed + 'static {
         None
     }
 
-    /// Takes what is known of the person; false where that is no option.
+    /// Takes what is known of the person; false where that is not an option.
     fn set_person_prior(&mut self, _prior: PersonPrior) -> bool {
         false
     }

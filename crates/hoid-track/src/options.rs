@@ -25,7 +25,7 @@ pub struct TrackOptions {
     /// Where to start. Default: a batch fit of the first third.
     pub start: StartAt,
     /// Time from which the estimate moves, s; before that only the filters follow. Default: the end
-    /// of the start span when P is that of its fit, else the beginning of the record.
+    /// of the start span when P is that of its fit, else the start of the record.
     pub update_from_s: Option<f64>,
     /// Limits of the search of start fits and windows.
     pub search: SearchOptions,

@@ -46,9 +46,9 @@ impl PersonPrior {
     /// Where the estimate starts, in words.
     pub(crate) fn as_text(&self) -> String {
         match self {
-            Self::Population => "what is usual of people".to_owned(),
-            Self::Nothing => "next to nothing: what is usual of people, with wide errors".to_owned(),
-            Self::Named(prior) => format!("what is usual of people, with {prior}"),
+            Self::Population => "the defaults for people".to_owned(),
+            Self::Nothing => "next to nothing: the defaults for people, with wide errors".to_owned(),
+            Self::Named(prior) => format!("the defaults for people, with {prior}"),
             Self::Fit(fit) => format!(
                 "the fit in {} with its covariance, form {}",
                 fit.source,

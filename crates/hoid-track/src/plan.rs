@@ -146,7 +146,7 @@ fn default_ranges(method: &Method, ranges: &OrderRanges, sample_time: SampleTime
 /// named as f1 or b0.
 ///
 /// # Errors
-/// [`IdentError::BadOption`] for a name that is no order.
+/// [`IdentError::BadOption`] for a name that is not an order.
 pub fn ranges_of(
     method: &Method,
     structure: Structure,

@@ -12,7 +12,7 @@ use hoid_model::{
 
 use crate::start::StartState;
 
-/// Parameters of the operator behind a known delay: K_e, K_e_dot, omega_nm and zeta_nm.
+/// Parameters of the operator after a known delay: K_e, K_e_dot, omega_nm and zeta_nm.
 pub const OPERATOR: usize = 4;
 
 /// `[b0, b1, d.., f1, f2]` with the Jacobian of the operator's part, and the covariance of d, which

@@ -98,7 +98,7 @@ impl Response {
             sum([1.0, 0.0], &theta[..o.na]),
             sum([1.0, 0.0], &theta[first_f..first_f + o.nf]),
         );
-        // B has no constant of its own: b_0 stands at the delay.
+        // B has no constant of its own: b_0 is at the delay.
         let b = sum([0.0; 2], &theta[first_b..first_b + o.nb]);
         let (sin, cos) = (-omega_rad_s * sample_time.s() * (o.nk as f64 - 1.0)).sin_cos();
         over(times(b, [cos, sin]), times(a, f))

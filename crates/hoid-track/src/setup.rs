@@ -1,4 +1,4 @@
-//! What a recursion is built of, beside its start: structure, orders, and the options that all
+//! What a recursion is built of, next to its start: structure, orders, and the options that all
 //! methods read alike.
 
 use std::collections::BTreeMap;

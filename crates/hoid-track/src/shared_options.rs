@@ -13,7 +13,7 @@ use crate::{forgetting::ForgettingRule, memory::MemoryOptions};
 /// How far the variances of P may grow where nothing excites a parameter.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum WindupGuard {
-    /// As far as forgetting takes them: equations 5.26 and 31 of the reference text as they stand.
+    /// As far as forgetting takes them: equations 5.26 and 31 of the thesis as they stand.
     Off,
     /// To this multiple of what they are at the start.
     Bound(f64),
@@ -51,7 +51,7 @@ settings! {
     /// The gain of a recursion of the kernel.
     pub struct GainOptions {
         /// Covariance P at the start: X times the unit matrix, in units of the innovation variance
-        /// (the reference text: 0.1)
+        /// (the thesis: 0.1)
         #[setting(bounds(Bounds::PositiveFinite), default("that of the start fit; 1e6 where there is none"))]
         pub covariance: Option<f64> = None,
         /// Standard deviations beyond which an innovation moves the estimate no further
@@ -80,8 +80,8 @@ impl GainOptions {
     }
 
     /// The guard against windup in use; `None` where it follows from the start. It is off for the
-    /// recursion of the reference text: P at the start is given, P forgets exponentially, and no
-    /// innovation is too large.
+    /// recursion of the thesis: P at the start is given, P forgets exponentially, and no innovation
+    /// is too large.
     pub fn windup_guard(&self, limit: f64) -> Option<WindupGuard> {
         let of_the_text =
             self.covariance.is_some() && self.forgetting == ForgettingRule::Exponential && limit == f64::INFINITY;

@@ -3,7 +3,7 @@
 //! From a batch fit, P is its covariance over sigma^2, which is the inverse of the information
 //! matrix; in physical parameters `P_eta = T^{-1} P_theta T^{-T}` with the Jacobian T of
 //! theta(eta). A multiple of the unit matrix instead (the text's `0.1 I`) is the gain that the user
-//! wants; the error bars then still begin with the covariance of the fit.
+//! wants; the error bars then still start with the covariance of the fit.
 
 use std::collections::BTreeMap;
 
@@ -20,7 +20,7 @@ use crate::{
 /// Variance of P for a start from nothing, in units of the innovation variance.
 const UNKNOWN: f64 = 1e6;
 /// Operator of a start from nothing: K_e, K_e_dot (s), omega_nm (rad/s), zeta_nm, tau_e (s), those
-/// of the reference text's order.
+/// of the thesis's order.
 const TYPICAL_OPERATOR: [f64; 5] = [0.1, 0.05, 10.0, 0.4, 0.25];
 /// First noise pole of a start from nothing.
 const TYPICAL_NOISE_POLE: f64 = -0.8;
@@ -333,7 +333,7 @@ fn from_box_jenkins(setup: &Setup, record: &Record, known: Option<&Fit>) -> Resu
             if i < 4 {
                 (0..4).map(|j| (places[j], inverse[i][j])).collect()
             } else {
-                // c and d stand behind b.
+                // c and d are behind b.
                 vec![(2 + i - 4, 1.0)]
             }
         };

@@ -9,7 +9,7 @@ use hoid_model::{Channel, Orders, Record, Structure};
 /// D with its covariance.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct StartNoise {
-    /// Coefficients behind the 1.
+    /// Coefficients after the 1.
     pub d: Vec<f64>,
     /// Their covariance, by rows.
     pub covariance: Vec<f64>,

@@ -1,17 +1,16 @@
 //! What a recursion without a guard does while nothing arrives.
 //!
-//! Where e and u stand still the regressor is zero or constant, the innovations vanish, and their
-//! variance, a mean of `eps^2/(1 + h' Sigma h)` with an exponential memory ([`hoid_core::innovation_variance`]),
-//! is forgotten to zero: it falls as `lambda^t`, while the covariance over it grows by `1/lambda` a
-//! sample at most, in unexcited directions alone, and no further than its bound. The error bars, the
-//! root of their product, go to zero while nothing is learnt. Such samples say nothing of parameters
-//! or noise, for neither is excited (G. C. Goodwin and K. S. Sin, *Adaptive Filtering Prediction and
-//! Control*, 1984, section 3.4; K. J. Åström and B. Wittenmark, *Adaptive Control*, 2nd ed. 1995, section
-//! 11.5, conditional updating). So they go into the filters alone:
+//! Where e and u stay constant the regressor is zero or constant, the innovations vanish, and their variance, a mean of
+//! `eps^2/(1 + h' Sigma h)` with an exponential memory ([`hoid_core::innovation_variance`]), is forgotten to zero: it
+//! falls as `lambda^t`, while the covariance over it grows by `1/lambda` a sample at most, in unexcited directions
+//! alone, and no further than its bound. The error bars, the root of their product, go to zero while nothing is learnt.
+//! Such samples say nothing of parameters or noise, for neither is excited (G. C. Goodwin and K. S. Sin, *Adaptive
+//! Filtering Prediction and Control*, 1984, section 3.4; K. J. Åström and B. Wittenmark, *Adaptive Control*, 2nd ed.
+//! 1995, section 11.5, conditional updating). So they go into the filters alone:
 //!
-//! - A signal **stands** while it stays within [`SHARE`] of its usual size of the value at which the
-//!   stand began. The size is the geometric mean over blocks of a second of the largest distance from
-//!   the value at the beginning of the block; before ten blocks are known, a stand is of one value.
+//! - A signal **stands** while it stays within [`SHARE`] of its usual size of the value at which the stand started. The
+//!   size is the geometric mean over blocks of a second of the largest distance from the value at the start of the
+//!   block; before ten blocks are known, a stand is of one value.
 //! - **Nothing arrives** where e and u stand for [`BOTH_S`], or one of them for [`ONE_S`]: a channel that
 //!   is frozen, or a hand that rests while no answer can be told from none.
 //! - The recursion is then put back to the first sample of the stand, bit for bit (a jump to where it stands
@@ -19,8 +18,7 @@
 //!   covariance and innovation variance stay as they are there, however long it lasts.
 //! - It goes on once both signals move and the filters have settled ([`crate::guard`]).
 //!
-//! A recursion that never stands still has the same digits as without. Samples closer than
-//! 40 us are not watched.
+//! A recursion that never stays constant has the same digits as without. Samples closer than 40 us are not watched.
 
 use hoid_core::state::{State, visit_all};
 use hoid_model::SampleTime;
@@ -96,7 +94,7 @@ impl BufferedSample {
 /// How long a signal has stood, and how large it usually is.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Channel {
-    /// Value at which the stand began, samples behind it, and the last samples that are the same number.
+    /// Value at which the stand started, samples after it, and the last samples that are the same number.
     value: f64,
     stands: u64,
     same: u64,
@@ -106,7 +104,7 @@ struct Channel {
     steps: [f64; 2],
     jumped: [bool; 2],
     tolerance: f64,
-    /// Value at the beginning of the block, and the largest distance from it.
+    /// Value at the start of the block, and the largest distance from it.
     first: f64,
     largest: f64,
     /// Mean logarithm of these distances, and blocks in it.
@@ -328,7 +326,7 @@ impl StationaryWatch {
     ) -> Guarded {
         let last = self.ring.len() - 1;
         let begin = last.checked_sub(stood.saturating_sub(1) as usize);
-        // What stood before the ring began, and did not move the estimate there, is left as it is.
+        // What was before the ring started, and did not move the estimate there, is left as it is.
         if let Some(begin) = begin {
             let newer = usize::from(begin >= self.since);
             self.kept[newer].restore(recursion);
@@ -390,7 +388,7 @@ impl StationaryWatch {
         self.event
     }
 
-    /// True while the estimate stands still.
+    /// True while the estimate stays constant.
     pub fn is_paused(&self) -> bool {
         self.paused > 0
     }

@@ -175,7 +175,7 @@ impl Trace {
         whole.iter().all(|c| c.is_finite()).then_some(whole)
     }
 
-    /// True for a row before the first estimate of a method that starts itself: what stands there is none.
+    /// True for a row before the first estimate of a method that starts itself: what is there is none.
     pub fn is_before_the_first(&self, row: usize) -> bool {
         self.options.method.starts_itself() && self.covariance(row).is_none()
     }
@@ -330,13 +330,13 @@ impl Trace {
         &self.faults
     }
 
-    /// Samples that the guard had held back, or during which it let the estimate stand still, up to
-    /// each row.
+    /// Samples that the guard had held back, or during which it let the estimate stay constant, up
+    /// to each row.
     pub fn held(&self) -> &[u64] {
         &self.held
     }
 
-    /// True where a guard stood in front of the recursion.
+    /// True where a guard was in front of the recursion.
     pub fn is_guarded(&self) -> bool {
         self.guarded
     }
@@ -371,7 +371,7 @@ impl Trace {
         self.averaged
     }
 
-    /// Delay of the rows behind the estimates by the moving average, s: half its length.
+    /// Delay of the rows after the estimates by the moving average, s: half its length.
     pub fn averaging_delay_s(&self) -> f64 {
         (self.averaged - 1) as f64 / 2.0 * self.every as f64 * self.sample_time.s()
     }
@@ -484,8 +484,8 @@ fn unpack(packed: &[f64], p: usize) -> Vec<f64> {
     whole
 }
 
-/// Mean of each column over the last `rows` rows, over those that there are in the beginning. NaN
-/// stays within its reach.
+/// Mean of each column over the last `rows` rows, over those that there are in the start. NaN stays
+/// within its reach.
 fn causal_mean(values: &[f64], width: usize, rows: usize) -> Vec<f64> {
     if width == 0 {
         return Vec::new();

@@ -151,7 +151,7 @@ impl Tracker {
         }
     }
 
-    /// What became of a sample behind a guard.
+    /// What became of a sample after a guard.
     #[inline]
     fn guarded(&mut self, guarded: Guarded, skipped: bool) -> Outcome {
         let taken = guarded.outcome.filter(|_| !guarded.held);
@@ -174,7 +174,7 @@ impl Tracker {
         of_guard.or_else(|| self.stationary.as_ref()?.event())
     }
 
-    /// True while the estimate stands still, by the guard or because nothing arrives.
+    /// True while the estimate stays constant, by the guard or because nothing arrives.
     pub fn is_paused(&self) -> bool {
         let of_guard = self.guard.as_ref().is_some_and(|guard| guard.is_paused());
         of_guard
@@ -184,7 +184,7 @@ impl Tracker {
                 .is_some_and(|stationary| stationary.is_paused())
     }
 
-    /// Seconds since the guard began the estimate again, where it has.
+    /// Seconds since the guard started the estimate again, where it has.
     pub fn since_restart_s(&self) -> Option<f64> {
         self.guard.as_ref()?.since_restart_s()
     }

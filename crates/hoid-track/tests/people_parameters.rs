@@ -6,7 +6,7 @@ use hoid_sim::people::{Person, Plant, Population, RemnantKind, Task};
 use hoid_track::{Method, TrackOptions, Tracker};
 
 const PEOPLE: u64 = 45;
-/// In the first second of an estimate, in the contest of the rivals, and behind it.
+/// In the first second of an estimate, in the contest of the rivals, and after it.
 const AT_S: [f64; 3] = [2.0, 15.0, 30.0];
 
 #[test]

@@ -1,5 +1,5 @@
-//! The recursions of the reference text as its users get them, against its equations written down
-//! once more: P as a plain matrix, nothing shared with the library.
+//! The recursions of the thesis as its users get them, against its equations written down once more:
+//! P as a plain matrix, nothing shared with the library.
 //!
 //! ```text
 //! RLS, eq. 25 and 5.26:  psi = [-u(t-1) -u(t-2) x(t) x(t-1)],  eps = u - psi' theta
@@ -206,7 +206,7 @@ fn an_hour_of_silence_leaves_every_number_finite() {
         if method == Method::rpem() {
             continue;
         }
-        // After it the estimate is that of a run that begins there.
+        // After it the estimate is that of a run that starts there.
         let alone = track(&run, &of_the_text(method.clone(), &[]), loud).unwrap();
         let (last, first) = (trace.theta(trace.len() - 1), alone.theta(alone.len() - 1));
         for (a, b) in last.iter().zip(first) {

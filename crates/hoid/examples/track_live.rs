@@ -2,7 +2,7 @@
 //! `cargo run --example track_live`.
 //!
 //! The samples come from a simulated run whose task changes at 40.96 s. The default tracker is told
-//! nothing of the person and begins with the first sample.
+//! nothing of the person and starts with the first sample.
 #![allow(clippy::print_stdout)]
 
 use std::error::Error;

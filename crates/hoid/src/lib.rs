@@ -56,7 +56,7 @@
 //! | `io` | [`io`]: files; [`analysis`]: from recordings to a result and its verdict | yes |
 //! | `study` | [`study`]: Monte Carlo studies and groups of runs | |
 //! | `report` | [`report`]: figures and HTML pages; with `study` | |
-//! | `thesis` | [`thesis`]: the reference text, reproduced; with `report` | |
+//! | `thesis` | [`thesis`]: the thesis, reproduced; with `report` | |
 //! | `pdf-png` | figures as PDF and PNG; with `report` | |
 //!
 //! With `default-features = false` nothing that reads files is built.

@@ -1,5 +1,5 @@
 //! A person who changes: the two-sided estimate against the causal one, and the methods that stand
-//! beside for comparison.
+//! next to for comparison.
 
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 

@@ -230,7 +230,7 @@ fn a_fault_counts_at_its_place_alone() {
 #[test]
 fn traces_are_judged_at_the_end_and_on_the_way() {
     let json = json!({"verdict": {"level": "trustworthy", "findings": []}});
-    // Off by ten errors for 8 s behind a fault of 1 s, then near.
+    // Off by ten errors for 8 s after a fault of 1 s, then near.
     let off_until = |end: f64| -> Vec<Row> {
         let row = |i: u32| {
             let t = f64::from(i) * 0.1;
@@ -283,7 +283,7 @@ fn tables_count() {
 
 /// The gate: no number that is wrong goes unflagged.
 #[test]
-#[ignore = "not all faults are found yet; it runs the program `hoid`, which must be built beside this test"]
+#[ignore = "not all faults are found yet; it runs the program `hoid`, which must be built next to this test"]
 fn nothing_is_wrong_and_not_flagged() {
     let here = std::env::current_exe().unwrap();
     let folder = here.parent().unwrap().parent().unwrap();

@@ -295,7 +295,7 @@ fn fast_loop_biases_simulated_instruments_but_not_external_ones() {
         let label = format!("{method} from f_t");
         let samples = fit_all(&label, &records, |r| operator_iv(method, external(), nk).fit(one(r)));
         // The estimate is not linear in the data: a second-order bias of some per cent, where a
-        // spread is 13 %, is no surprise.
+        // spread is 13 %, is not a surprise.
         assert_unbiased(&label, &samples, 3.5, 0.02);
         for (i, (ours, theirs)) in samples.iter().zip(&by_pem).enumerate() {
             let ratio = (ours.spread() / theirs.spread()).powi(2);

@@ -58,7 +58,7 @@ def controlled_element(
     """A controlled element as text, or its numerator and denominator, in one or two values."""
     if isinstance(element, str):
         if den is not None:
-            raise OptionError(f"the controlled element {element!r} is whole, expected no den beside it")
+            raise OptionError(f"the controlled element {element!r} is whole, expected no den next to it")
         return element
     try:
         parts: tuple[Any, ...] = tuple(element) if den is None else (element, den)

@@ -149,7 +149,7 @@ def recalled(result: Any, state: Any, names: Sequence[str]) -> None:
     expected = {"version", "own", "call", "answers", "seal"}
     if not isinstance(state, dict) or set(state) != expected:
         raise DataError(
-            f"this is no pickle of a {type(result).__name__}: expected a state with"
+            f"this is not a pickle of a {type(result).__name__}: expected a state with"
             f" {', '.join(sorted(expected))}; pickle the result again"
         )
     answers = state["answers"]

@@ -364,7 +364,7 @@ class Tracker:
 
     @property
     def trouble(self) -> str | None:
-        """Why the last start fit failed, or why the warm-up began again."""
+        """Why the last start fit failed, or why the warm-up started again."""
 
     @property
     def sample_time(self) -> float: ...
@@ -417,7 +417,7 @@ class Tracker:
 
     @property
     def paused(self) -> bool:
-        """True while the guard lets the estimate stand still."""
+        """True while the guard lets the estimate stay constant."""
 
     @property
     def start(self) -> Fit | None: ...

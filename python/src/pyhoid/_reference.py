@@ -1,4 +1,4 @@
-"""Figures of the reproduction of the reference text, from the tables beside its own figures.
+"""Figures of the reproduction of the thesis, from the tables next to its own figures.
 
 The columns of a table tell what kind of figure it is: box plots over nk and the noise level, maps
 over nk and m, Bode plots, estimates over time, or curves.

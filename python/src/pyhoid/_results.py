@@ -98,7 +98,7 @@ class Result:
         name = type(self).__name__
         if not isinstance(state, dict) or set(state) != _PARTS or not isinstance(state["text"], str):
             raise DataError(
-                f"this is no pickle of a {name}: expected a state with {', '.join(sorted(_PARTS))};"
+                f"this is not a pickle of a {name}: expected a state with {', '.join(sorted(_PARTS))};"
                 " pickle the result again"
             )
         text = state["text"]

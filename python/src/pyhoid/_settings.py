@@ -58,7 +58,7 @@ class MethodSettings(TypedDict, total=False):
     """Options of the recursive methods."""
 
     # Covariance P at the start: X times the unit matrix, in units of the innovation variance
-    # (the reference text: 0.1). For rls, rpem, physical, fused.
+    # (the thesis: 0.1). For rls, rpem, physical, fused.
     covariance: float | None
 
     # Standard deviations beyond which an innovation moves the estimate no further. For rls,
@@ -103,7 +103,7 @@ class MethodSettings(TypedDict, total=False):
     rate: float | None
 
     # Guard: outliers of e and u are held back, spans that no tracking makes are left out, and
-    # the estimate begins again after them. For rls, rpem, physical, multiple-model, adaptive.
+    # the estimate starts again after them. For rls, rpem, physical, multiple-model, adaptive.
     guard: Literal["yes", "no"] | None
 
     # Signals of psi: gradient (D/(C F) as one filter), cascade (1/F before D/C; for
@@ -160,7 +160,7 @@ class MethodSettings(TypedDict, total=False):
     # dual-ekf.
     delay_drift: float | None
 
-    # Error that enters the neuromuscular part beside e, share of the size of e. For dual-ekf.
+    # Error that enters the neuromuscular part next to e, share of the size of e. For dual-ekf.
     state_noise: float | None
 
     # Root mean square of e. For dual-ekf.
@@ -310,13 +310,13 @@ METHODS = """``"rls"``: recursive least squares;
         ``"ukf"``: unscented Kalman filter of state and parameters, for comparison;
         ``"dual-ekf"``: two extended Kalman filters that take turns, of state and of parameters,
         for comparison;
-        ``"linear-network"``: single linear layer that learns K_e and K_e_dot behind a known
+        ``"linear-network"``: single linear layer that learns K_e and K_e_dot after a known
         neuromuscular part, for comparison."""
 
 #: The options, as the documentation of `track` lists them.
 SETTINGS = """covariance : float
             Covariance P at the start: X times the unit matrix, in units of the innovation
-            variance (the reference text: 0.1). For rls, rpem, physical, fused.
+            variance (the thesis: 0.1). For rls, rpem, physical, fused.
         limit : float
             Standard deviations beyond which an innovation moves the estimate no further. For
             rls, rpem, physical, multiple-model, adaptive, fused.
@@ -342,7 +342,7 @@ SETTINGS = """covariance : float
             For forgetting by the gradient: step size. For rls, rpem, physical.
         guard : Literal['yes', 'no']
             Guard: outliers of e and u are held back, spans that no tracking makes are left out,
-            and the estimate begins again after them. For rls, rpem, physical, multiple-model,
+            and the estimate starts again after them. For rls, rpem, physical, multiple-model,
             adaptive.
         regressor : Literal['gradient', 'cascade', 'pseudo-linear']
             Signals of psi: gradient (D/(C F) as one filter), cascade (1/F before D/C; for
@@ -386,7 +386,7 @@ SETTINGS = """covariance : float
             Drift of tau_e in a root second, share of its start, behind a Padé approximation.
             For dual-ekf.
         state_noise : float
-            Error that enters the neuromuscular part beside e, share of the size of e. For
+            Error that enters the neuromuscular part next to e, share of the size of e. For
             dual-ekf.
         error_size : float
             Root mean square of e. For dual-ekf.

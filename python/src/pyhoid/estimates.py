@@ -15,7 +15,7 @@ __all__ = ["Estimate", "Operator", "Remnant"]
 
 _T = TypeVar("_T")
 
-#: Units of parameters, those of gains beside the units of u and e.
+#: Units of parameters, those of gains next to the units of u and e.
 UNITS: Mapping[str, str] = {
     "K_e": "",
     "T_L": "s",
@@ -39,7 +39,7 @@ _GAINS = ("K", "K_e", "K_e_dot", "K_over_T_I", "K_I")
 def unit_of(name: str, units: tuple[str, str] = ("", ""), own: str | None = None) -> str:
     """The unit of a parameter; of a gain only where those of e and u are declared.
 
-    `own` is the unit that it has beside that of u/e; by default that of its name.
+    `own` is the unit that it has next to that of u/e; by default that of its name.
 
     >>> unit_of("T_L"), unit_of("K_e")
     ('s', '')

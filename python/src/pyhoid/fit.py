@@ -105,7 +105,7 @@ class Fit(Model, Result):
     def polynomials(self) -> dict[str, FloatArray]:
         """A, B, C, D and F by ascending powers of q^-1.
 
-        B begins with the zeros of its delay, the others with 1.
+        B starts with the zeros of its delay, the others with 1.
         """
         return self._native.polynomials
 
@@ -157,7 +157,7 @@ class Fit(Model, Result):
 
     @property
     def levels(self) -> list[Estimate | None]:
-        """The level of u of each record: the constant that is no response to e, in the unit of u.
+        """The level of u of each record: the constant that is not a response to e, in the unit of u.
 
         Estimated of recorded data; empty for simulated runs and with ``faults="keep"``. None where
         the model has no static gain.

@@ -117,7 +117,7 @@ def identify(
         none. What was found is ``fit.faults``. Of recorded data a level of u is estimated too
         (``fit.levels``), and ``fit.records`` are without their means; keep leaves data as they are.
     decimate : "auto", "off" or int
-        Keep every n-th sample behind a linear-phase low-pass filter. ``"auto"``: above 200 Hz by the
+        Keep every n-th sample after a linear-phase low-pass filter. ``"auto"``: above 200 Hz by the
         number that comes nearest to 100 Hz for operators; polynomial structures, whose orders and
         delay count samples, take all samples unless a number is given.
         ``fit.records`` are the decimated records.
@@ -190,7 +190,7 @@ def from_json(text: str) -> OperatorFit | Fit | TimeVaryingFit:
     Raises
     ------
     DataError
-        For a text that is no result, was changed, or is of another version.
+        For a text that is not a result, was changed, or is of another version.
 
     Examples
     --------

@@ -56,7 +56,7 @@ class OperatorFit(Model, Result):
     excitation : str or None
         Its channel.
     agreement : dict or None
-        The methods beside each other: coordinates (each by ``prediction_error``, ``lines`` and
+        The methods next to each other: coordinates (each by ``prediction_error``, ``lines`` and
         ``riv_bj``), pairs of methods with chi2 and p_value, and chi2 and p_value of the pair that
         agrees least (p_value times the number of pairs).
     riv_bj : dict or None

@@ -493,7 +493,7 @@ def box_plots(
 
 
 def reference(name: str, directory: str | PathLike[str]) -> Figure:
-    """Draw a figure of the reproduction of the reference text from its data.
+    """Draw a figure of the reproduction of the thesis from its data.
 
     Parameters
     ----------

@@ -99,7 +99,7 @@ def read(
     new_sampling_frequency : float, optional
         Another sampling frequency in Hz, after a low-pass filter.
     run_in : float
-        Seconds dropped at the beginning.
+        Seconds dropped at the start.
     detrend : {"none", "mean", "linear"}
         The trend removed from input and output, as the last step.
 

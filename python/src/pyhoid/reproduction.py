@@ -1,4 +1,4 @@
-"""The tables, figures and claims of the reference text."""
+"""The tables, figures and claims of the thesis."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def reproduce(
     jobs: int | None = None,
     progress: Progress = False,
 ) -> Reproduction:
-    """Make the tables, figures and claims of the reference text (Ortiz Moya 2023).
+    """Make the tables, figures and claims of the thesis (Ortiz Moya 2023).
 
     This does what ``hoid reproduce`` does. Studies that are already there are not run again; one
     that was interrupted goes on.

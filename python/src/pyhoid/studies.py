@@ -116,7 +116,7 @@ class Results(Mapping[str, Table]):
     estimates : int
         Number of estimates that this run made.
     pages : list of Path
-        The pages beside the tables, for a group.
+        The pages next to the tables, for a group.
 
     Examples
     --------

@@ -41,7 +41,7 @@ class Tracker(_pyhoid.Tracker):
     controlled_element : str or (sequence of float, sequence of float), optional
         What the person controls, as in `track`: then `crossover` and `phase_margin` are told.
     decimate : "auto", "off" or int
-        As in `track`: above 200 Hz every n-th sample is tracked by default, .15 s behind the last one
+        As in `track`: above 200 Hz every n-th sample is tracked by default, .15 s after the last one
         taken; between them the estimate stays, and `step` returns NaN. `decimation` says what is
         done.
     record : Record, optional

@@ -1,7 +1,7 @@
 """A fresh interpreter that runs the Python blocks of a page one after another.
 
 It reads a block a line, as JSON, and answers by a line of JSON on the file that its first argument
-numbers: null, or what went wrong. A comment behind an expression that is a number, a list or a text
+numbers: null, or what went wrong. A comment after an expression that is a number, a list or a text
 is what the reader is told to expect, and compared.
 """
 

@@ -1,4 +1,4 @@
-"""Pages, their code blocks, and the marks that stand before them.
+"""Pages, their code blocks, and the marks that are before them.
 
 A mark is a comment of HTML, which readers do not see:
 
@@ -36,7 +36,7 @@ MARK = re.compile(r"<!--\s*(file|given|then|picture|smaller|ends with|not run):\
 
 @dataclass
 class Block:
-    """One code block, with the marks that stand before it."""
+    """One code block, with the marks that are before it."""
 
     line: int
     language: str

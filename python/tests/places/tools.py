@@ -17,7 +17,7 @@ HERE = Path(__file__).parent
 
 @dataclass(frozen=True)
 class Tools:
-    #: The program hoid; what is built with it lies beside it.
+    #: The program hoid; what is built with it lies next to it.
     binary: Path
     #: Where work may be done.
     folder: Path

@@ -1,10 +1,9 @@
 //! The challenge (`hoid_challenge`): methods of tracking in cases that can refute them.
 //!
-//! `cargo xtask slow challenge [--cases NAME,...] [--methods NAME,...] [--seeds open|sealed] [--runs N]
-//! [--part I/N] [--out DIRECTORY] [--page FILE --measured TEXT] [--list]`: 4 runs of every case, all
-//! contestants, the open seeds, and lines of JSON in `challenge-results/` by default. What is there is
-//! not computed again. A case is named by its name, its beginning (`none-`) or its theme. `--page`
-//! writes the page of the book; `--list` tells the cases alone.
+//! `cargo xtask slow challenge [--cases NAME,...] [--methods NAME,...] [--seeds open|sealed] [--runs N] [--part I/N] [--out DIRECTORY] [--page FILE --measured TEXT] [--list]`:
+//! 4 runs of every case, all contestants, the open seeds, and lines of JSON in `challenge-results/` by default. What is
+//! there is not computed again. A case is named by its name, its start (`none-`) or its theme. `--page` writes the page
+//! of the book; `--list` tells the cases alone.
 #![allow(clippy::print_stdout, clippy::print_stderr)]
 
 use std::{path::PathBuf, process::ExitCode};
@@ -56,7 +55,7 @@ fn run() -> Result<(), String> {
             "--out" => options.directory = PathBuf::from(value),
             "--page" => file = Some(PathBuf::from(value)),
             "--measured" => measured = Some(value),
-            _ => return Err(format!("{name} is no option; see the head of this example")),
+            _ => return Err(format!("{name} is not an option; see the head of this example")),
         }
     }
     let lines = challenge(&options, &|run| eprintln!("{run}")).map_err(|e| e.to_string())?;

@@ -5,7 +5,7 @@ use super::operator::{Parameter, Plant};
 /// The operator's form; its parameters are drawn anew in each run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Form {
-    /// Gain and lead: the operator of the reference text.
+    /// Gain and lead: the operator of the thesis.
     Lead,
     /// A gain alone.
     Gain,
@@ -13,7 +13,7 @@ pub enum Form {
     LeadLag,
     /// Gain, two leads and a lag: people on plants of second order.
     Lead2Lag,
-    /// Gain and lead behind a neuromuscular system of third order.
+    /// Gain and lead after a neuromuscular system of third order.
     ThirdOrder,
     /// Gain and lead, and the dynamics of a stick of 20 to 30 rad/s.
     StickDynamics,
@@ -103,7 +103,7 @@ pub enum Blemish {
 /// A change of the operator alone: remnant, plant and forcing stay.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Shift {
-    /// When it begins, s.
+    /// When it starts, s.
     pub at_s: f64,
     /// How long it takes, s; the factor grows geometrically.
     pub takes_s: f64,

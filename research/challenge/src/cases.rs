@@ -1,6 +1,6 @@
 //! The cases.
 //!
-//! A change begins at 45 s where nothing else is said and takes half a second. Sizes that no loop
+//! A change starts at 45 s where nothing else is said and takes half a second. Sizes that no loop
 //! bears (a delay times two on `1/s^2`) are those of the persons who bear them: who would lose
 //! control is drawn again ([`draw`](super::draw)).
 
@@ -9,7 +9,7 @@ use super::{
     operator::{Parameter, Plant},
 };
 
-/// When a change begins, and how long it takes, s.
+/// When a change starts, and how long it takes, s.
 const AT_S: f64 = 45.0;
 const TAKES_S: f64 = 0.5;
 
@@ -260,7 +260,7 @@ fn courses() -> Vec<Case> {
         Case {
             blemish: Blemish::Missing,
             shifts: vec![Shift { at_s: 60.0, ..twice }],
-            ..default("missing-change", "K_e_dot doubles as 3 s of NaN begin")
+            ..default("missing-change", "K_e_dot doubles as 3 s of NaN start")
         },
         Case {
             blemish: Blemish::IdleStart(15.0),
@@ -300,7 +300,7 @@ fn delays() -> Vec<Case> {
     vec![
         Case {
             delay: DelayKnown::Fraction,
-            ..default("delay-half", "half a sample beside what is told")
+            ..default("delay-half", "half a sample next to what is told")
         },
         Case {
             rate_hz: 60.0,

@@ -83,7 +83,7 @@ pub struct Moment {
 /// A change, and whether it was found.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ChangeOutcome {
-    /// When it began, s.
+    /// When it started, s.
     pub at_s: f64,
     /// Logarithm of the true likelihood ratio within 5 and 8 s.
     pub evidence: [f64; 2],
@@ -199,7 +199,7 @@ impl Posed {
         let at = |omega: f64, t_s: f64| truth.response(omega, t_s);
         let mut line = scored(&self.task, &self.labels, &at, method, answer, &self.changes);
         (line.case, line.run) = (self.case.name.clone(), self.number);
-        // Parameters have names where the operator is that of the reference text, as it was recorded.
+        // Parameters have names where the operator is that of the thesis, as it was recorded.
         let named = truth.operator(0.0).is_lead() && !matches!(self.case.blemish, Blemish::Polarity(_));
         for moment in &mut line.moments {
             match named {

@@ -104,8 +104,8 @@ impl Operator {
         polynomial::value(&self.numerator(), s) / polynomial::value(&self.denominator(), s) * (-s * self.tau_e_s).exp()
     }
 
-    /// Its names and values as those of the operator of the reference text: K_e, K_e_dot in s,
-    /// omega_nm in rad/s, zeta_nm, tau_e in s.
+    /// Its names and values as those of the operator of the thesis: K_e, K_e_dot in s, omega_nm in
+    /// rad/s, zeta_nm, tau_e in s.
     pub fn named(&self) -> [(&'static str, f64); 5] {
         [
             ("K_e", self.gain),
@@ -116,7 +116,7 @@ impl Operator {
         ]
     }
 
-    /// True where it is the operator of the reference text: gain, lead, neuromuscular system, delay.
+    /// True where it is the operator of the thesis: gain, lead, neuromuscular system, delay.
     pub fn is_lead(&self) -> bool {
         self.leads == 1 && self.lag_s == 0.0 && self.third_s == 0.0 && self.stick_rad_s == 0.0
     }
@@ -124,7 +124,7 @@ impl Operator {
     /// `Y P`.
     ///
     /// # Errors
-    /// [`ModelError`] for numbers that are no transfer function.
+    /// [`ModelError`] for numbers that are not a transfer function.
     pub(super) fn open_loop(&self, plant: Plant) -> Result<ContinuousTransferFunction, ModelError> {
         let descending = |ascending: Vec<f64>| ascending.into_iter().rev().collect::<Vec<_>>();
         let own = ContinuousTransferFunction::new(&descending(self.numerator()), &descending(self.denominator()))?;

@@ -1,13 +1,11 @@
 //! The same measures on recorded people.
 //!
-//! Trials of one person, each 40 s behind its ramp at 60 Hz, are joined: one on `1/s` to one on
-//! `1/(s(s+1))` and the other way round, a change of the plant and so of the person at 40 s, and two
-//! of one plant, a seam without a change. The second trial brings its own ramp as history
-//! ([`Seam`]): no filter jumps. Single trials are time without a change. The truth is the person's
-//! average describing function over their other trials on that plant, at the seven lowest lines of
-//! the disturbance: `sum U conj(D) / sum E conj(D)` over trials of two whole periods. Nothing is told
-//! of the delay. The control of a row was read a sample before it was written: e(k) stands beside
-//! u(k+1).
+//! Trials of one person, each 40 s after its ramp at 60 Hz, are joined: one on `1/s` to one on `1/(s(s+1))` and the
+//! other way round, a change of the plant and so of the person at 40 s, and two of one plant, a seam without a change.
+//! The second trial brings its own ramp as history ([`Seam`]): no filter jumps. Single trials are time without a
+//! change. The truth is the person's average describing function over their other trials on that plant, at the seven
+//! lowest lines of the disturbance: `sum U conj(D) / sum E conj(D)` over trials of two whole periods. Nothing is told
+//! of the delay. The control of a row was read a sample before it was written: e(k) is next to u(k+1).
 //!
 //! The recordings are not part of the project.
 
@@ -25,7 +23,7 @@ use super::{
 };
 use crate::ChallengeError;
 
-/// Seconds of the ramp, of a trial behind it, and of a period.
+/// Seconds of the ramp, of a trial after it, and of a period.
 const RAMP_S: f64 = 5.0;
 const TRIAL_S: f64 = 40.0;
 const PERIOD_S: f64 = 20.0;
@@ -56,7 +54,7 @@ pub struct PeopleOptions {
     pub portion: Portion,
 }
 
-/// A trial: e and u with the ramp, and what they have at the lines behind it.
+/// A trial: e and u with the ramp, and what they have at the lines after it.
 struct Trial {
     e: Vec<f64>,
     u: Vec<f64>,
@@ -129,7 +127,7 @@ fn read_all(directory: &Path) -> Result<Cells, ChallengeError> {
         let record = read_record(&directory.join(name), &options)?.record;
         let own = Trial::new(record.input(), record.output(), record.channel("d")).ok_or_else(|| {
             refused(format!(
-                "{name} is no trial of {} s with the column d",
+                "{name} is not a trial of {} s with the column d",
                 RAMP_S + TRIAL_S
             ))
         })?;
@@ -306,7 +304,7 @@ impl Posed {
 mod tests {
     use super::*;
 
-    /// A trial whose control is its error behind a delay of one sample and a gain: the describing
+    /// A trial whose control is its error after a delay of one sample and a gain: the describing
     /// function is that gain, the sample is the shift of the recorder.
     #[test]
     fn the_describing_function_of_a_gain_is_the_gain() {

@@ -1,6 +1,6 @@
 //! Runs of the challenge, on all threads, kept on disk.
 //!
-//! Each run of a case is a file, a line of JSON for each contestant. It is written beside and
+//! Each run of a case is a file, a line of JSON for each contestant. It is written next to and
 //! renamed; what is there is not computed again, so that a challenge can be stopped, go on, take in
 //! another contestant, or be done in parts on several machines. Nothing depends on the number of
 //! threads.
@@ -28,7 +28,7 @@ pub struct ChallengeOptions {
     pub seeds: Seeds,
     /// Runs of each case.
     pub runs: u64,
-    /// Names of cases, their beginnings (`none-`), or themes; none for all.
+    /// Names of cases, their starts (`none-`), or themes; none for all.
     pub cases: Vec<String>,
     /// Names of contestants; none for all. `batch` is the batch fit that knows the changes.
     pub methods: Vec<String>,
@@ -53,7 +53,7 @@ pub(super) fn chosen_contestants(names: &[String]) -> Result<(Vec<Box<dyn Entran
     Ok((all, names.is_empty() || names.iter().any(|n| n == "batch")))
 }
 
-/// The cases of these names, beginnings or themes; all where there are none.
+/// The cases of these names, starts or themes; all where there are none.
 ///
 /// # Errors
 /// [`ChallengeError::Refused`] for a name of nothing.

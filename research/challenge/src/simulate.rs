@@ -6,7 +6,7 @@
 //! that is seen all the time with its values between the steps. Nothing here is shared with the
 //! simulators of [`hoid_sim`] but the random streams.
 //!
-//! Beside the signals a run keeps what only an oracle knows: the remnant, the course of its
+//! Next to the signals a run keeps what only an oracle knows: the remnant, the course of its
 //! strength, the true response, and what the person of before each change would have answered to
 //! the same errors.
 

@@ -7,7 +7,8 @@ use super::{
     oracle::CERTAIN,
 };
 
-/// Methods beside each other in a table that fits a page 1200 pixels wide: of numbers, and of words.
+/// Methods next to each other in a table that fits a page 1200 pixels wide: of numbers, and of
+/// words.
 const BESIDE: usize = 7;
 const WORDS_BESIDE: usize = 5;
 
@@ -57,7 +58,7 @@ pub fn tables(lines: &[Line]) -> String {
                 .any(|line| line.method == *m && line.false_alarms.is_some())
         })
         .collect();
-    text += "\n### Alarms an hour without a change\n\nThose that are said to be of the remnant alone are behind the plus sign.\n\n";
+    text += "\n### Alarms an hour without a change\n\nThose that are said to be of the remnant alone are after the plus sign.\n\n";
     head(&mut text, "case", &[&["hours"], declaring.as_slice()].concat());
     for case in &cases {
         let hours = |method: &str| own(lines, case, method).map(|line| line.exposed_s).sum::<f64>() / 3600.0;
@@ -121,7 +122,7 @@ pub fn tables(lines: &[Line]) -> String {
         share(inside, all)
     });
 
-    text += "\n### Parameters\n\nMedian relative error in percent and coverage, in runs whose operator is that of the reference text; from 8 s after a change on or where nobody changes.\n\n";
+    text += "\n### Parameters\n\nMedian relative error in percent and coverage, in runs whose operator is that of the thesis; from 8 s after a change on or where nobody changes.\n\n";
     let names = ["K_e", "K_e_dot", "omega_nm", "zeta_nm", "tau_e"];
     head(&mut text, "method", &names);
     let named = |m: &&&str| {
@@ -162,7 +163,7 @@ pub fn tables(lines: &[Line]) -> String {
 
 /// Each contestant in a row.
 fn overview(lines: &[Line], methods: &[&str], cases: &[&str]) -> String {
-    let mut text = "\n### In a row each\n\nError of H from 8 s after a change on or where nobody changes: median and largest of the cases. Coverage of its bands in percent. Alarms an hour in runs without a change, those of the remnant alone behind the plus sign. Changes found of those that the oracle finds with certainty, within 5 and 8 s.\n\n".to_owned();
+    let mut text = "\n### In a row each\n\nError of H from 8 s after a change on or where nobody changes: median and largest of the cases. Coverage of its bands in percent. Alarms an hour in runs without a change, those of the remnant alone after the plus sign. Changes found of those that the oracle finds with certainty, within 5 and 8 s.\n\n".to_owned();
     head(
         &mut text,
         "method",
@@ -297,7 +298,7 @@ fn in_order<'a>(names: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
 }
 
 /// A row for each case and a column for each method, in as many tables, one below the other, as a page needs that has
-/// room for so many methods beside each other.
+/// room for so many methods next to each other.
 fn by_case(text: &mut String, cases: &[&str], methods: &[&str], beside: usize, cell: impl Fn(&str, &str) -> String) {
     let each = methods.len().div_ceil(methods.len().div_ceil(beside).max(1)).max(1);
     for (i, some) in methods.chunks(each).enumerate() {

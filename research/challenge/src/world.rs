@@ -106,7 +106,7 @@ impl World {
         }
     }
 
-    /// What reaches the operator at start, middle and end of the step that begins at a place, in steps.
+    /// What reaches the operator at start, middle and end of the step that starts at a place, in steps.
     fn input(&self, place: f64) -> [f64; 3] {
         match self.sight {
             Sight::Held => [self.mean_held(place); 3],
@@ -114,7 +114,7 @@ impl World {
         }
     }
 
-    /// Mean of the held error over the step that begins at a place, in steps.
+    /// Mean of the held error over the step that starts at a place, in steps.
     fn mean_held(&self, place: f64) -> f64 {
         let n = self.steps as f64;
         let (first, last) = (place / n, (place + 1.0) / n);

@@ -1,5 +1,5 @@
 //! The tables of the page "A person who changes, compared" of the book, from the results of the
-//! study, as they stand there:
+//! study, as they are there:
 //!
 //! `hoid study run adaptation --out adaptation` and
 //! `cargo run --release -p hoid-evidence --example adaptation_tables -- adaptation`
@@ -91,7 +91,7 @@ impl Tables {
     /// Median errors over the better of RLS and RPEM, cell by cell.
     fn relative(&self, quantity: &str, conditions: &[&str], name: &str) -> Vec<f64> {
         let of = |name: &str| self.medians(quantity, "all", conditions, name);
-        // A method without a single convertible estimate is no number, which min leaves out.
+        // A method without a single convertible estimate is not a number, which min leaves out.
         let better: Vec<f64> = of("RLS").iter().zip(of("RPEM")).map(|(a, b)| a.min(b)).collect();
         of(name)
             .iter()
@@ -326,7 +326,7 @@ fn line(name: &str, cells: impl Iterator<Item = String>) {
     println!("| {name} | {} |", cells.collect::<Vec<_>>().join(" | "));
 }
 
-/// Two digits behind the point below ten, none above a hundred.
+/// Two digits after the point below ten, none above a hundred.
 fn short(value: f64) -> String {
     match value.abs() {
         v if v > 999.0 => ">999".to_owned(),

@@ -1,11 +1,11 @@
-//! The default tracker beside what came before it in the conditions of the reference text: errors, coverage
-//! and changes of each cell, and the ratio of the errors to those of the best of the others.
+//! The default tracker next to what came before it in the conditions of the thesis: errors, coverage and changes of
+//! each cell, and the ratio of the errors to those of the best of the others.
 //!
 //! `cargo run --release -p hoid-evidence --example conditions_evidence -- [RUNS] [M,..] [LEVEL,..] [METHOD,..] [CONDITION,..]`
 //!
-//! Methods: `adaptive` is told nothing; `multiple-model`, `rls` and `rpem` are told the delay and start from a fit
-//! of the first 30.72 s (RLS and RPEM by the settings of the text). Their first rows are therefore not causal:
-//! the ratios are of the rows from then on, and those of 10 s on stand beside.
+//! Methods: `adaptive` is told nothing; `multiple-model`, `rls` and `rpem` are told the delay and start from a fit of
+//! the first 30.72 s (RLS and RPEM by the settings of the text). Their first rows are therefore not causal: the ratios
+//! are of the rows from then on, and those of 10 s on are alongside.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 use hoid_evidence::task::{CHANGE_S, START_S, median, on_all_cores, scenario};
@@ -35,7 +35,7 @@ impl Cell {
         !matches!(self.condition, Condition::C1 | Condition::C2)
     }
 
-    /// When the change begins: 1.8 % of a sigmoid are through 4/G before its middle.
+    /// When the change starts: 1.8 % of a sigmoid are through 4/G before its middle.
     fn begins_s(&self) -> f64 {
         match self.condition {
             Condition::C3 | Condition::C5 => CHANGE_S - 8.0,
@@ -44,9 +44,9 @@ impl Cell {
     }
 }
 
-/// What a run of a method gave: RMS relative errors from 30.72 s and from 10 s on in per cent, coverage of
-/// 1.96 standard errors in each span, changes declared where there is none, and the delay of the first one
-/// from where the change begins to 10 s behind its middle, after the middle.
+/// What a run of a method gave: RMS relative errors from 30.72 s and from 10 s on in per cent, coverage of 1.96
+/// standard errors in each span, changes declared where there is none, and the delay of the first one from where the
+/// change starts to 10 s after its middle, after the middle.
 struct RunResult {
     errors: [[f64; 5]; 2],
     covered: [[f64; 5]; 3],

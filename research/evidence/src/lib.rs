@@ -3,7 +3,7 @@
 //!
 //! | module | what it holds |
 //! |---|---|
-//! | [`task`] | the conditions of the reference text, and runs on all cores |
+//! | [`task`] | the conditions of the thesis, and runs on all cores |
 //! | [`told`] | methods that are told the delay |
 //! | [`oracle`] | what is known at most of a change: both persons are known |
 //! | [`pilots`] | the folder of recorded pilots |

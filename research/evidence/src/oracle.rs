@@ -1,8 +1,8 @@
 //! What somebody could know at most: the likelihood ratio of the person after a change against the person
 //! before it, where both are known.
 //!
-//! The gains s of each are those of all trials of that element (but the one that is looked at), in the
-//! basis of the usual person; behind the whitening filter of the first trial's remnant, with its variance,
+//! The gains s of each are those of all trials of that element (but the one that is looked at), in the basis of the
+//! usual person; after the whitening filter of the first trial's remnant, with its variance,
 //!
 //! `log Lambda = sum (limited (y - x' s_0))^2 - (limited (y - x' s_1))^2) / 2 sigma^2`
 //!
@@ -40,7 +40,7 @@ impl Rows {
         }
     }
 
-    /// Rows behind the whitening filter `1 + d_1 q^-1 + ..`, without their means.
+    /// Rows after the whitening filter `1 + d_1 q^-1 + ..`, without their means.
     fn whitened(&self, d: &[f64]) -> (Vec<Vector3<f64>>, Vec<f64>) {
         let rows = self.from..self.u.len();
         let x: Vec<Vector3<f64>> = rows

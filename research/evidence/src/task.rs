@@ -11,7 +11,7 @@ pub const START_S: f64 = 30.72;
 /// The change, s.
 pub const CHANGE_S: f64 = 40.96;
 
-/// A condition with K_c in the output matrix, as in the reference text.
+/// A condition with K_c in the output matrix, as in the thesis.
 pub fn scenario(condition: Condition, remnant_order: usize, level: f64) -> Scenario {
     let mut scenario = Scenario::condition(condition);
     scenario.remnant.order = remnant_order;

@@ -24,7 +24,7 @@ use crate::process::output;
 struct Point {
     n: usize,
     seconds: f64,
-    /// Memory beyond what stood before, bytes; none where the system does not say.
+    /// Memory beyond what was before, bytes; none where the system does not say.
     memory: Option<u64>,
 }
 

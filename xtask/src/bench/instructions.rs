@@ -3,8 +3,8 @@
 //! Times of a shared machine say little; the number of instructions of a program is the same to a
 //! few in a thousand whatever else runs. Callgrind (Valgrind) counts those of one run of the
 //! example `tasks` and of three: half of the difference belongs to one run of the task. The numbers
-//! that are kept stand in [`KEPT`] with the compiler that gave them. More than [`ALLOWED`] above
-//! them fails; with another compiler it is only said.
+//! that are kept are in [`KEPT`] with the compiler that gave them. More than [`ALLOWED`] above them
+//! fails; with another compiler it is only said.
 
 use std::{
     collections::BTreeMap,
@@ -55,7 +55,7 @@ pub fn gate(program: &Path, data: &Path, keep: bool) -> Result<(), String> {
     match (over, same_compiler) {
         (false, _) => Ok(()),
         (true, true) => Err(format!(
-            "a task takes more than {:.0} % more instructions than {KEPT} says; mend it, or keep the new numbers with \
+            "a task takes more than {:.0} % more instructions than {KEPT} says; repair it, or keep the new numbers with \
              `cargo xtask bench --instructions --keep` and say why",
             100.0 * ALLOWED
         )),

@@ -145,7 +145,7 @@ fn data() -> PathBuf {
     Path::new(WORK).join("data")
 }
 
-/// Peers: scripts whose names begin with a letter.
+/// Peers: scripts whose names start with a letter.
 fn scripts() -> Result<Vec<PathBuf>, String> {
     let entries = fs::read_dir(PEERS).map_err(|e| format!("{PEERS}: {e}"))?;
     let mut found: Vec<PathBuf> = entries

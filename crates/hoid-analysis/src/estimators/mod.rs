@@ -80,7 +80,7 @@ pub struct Fitted<F> {
     pub fit: F,
     /// What it says of itself, and what a second opinion says.
     pub verdict: Verdict,
-    /// The describing function that stands beside it.
+    /// The describing function that is next to it.
     pub described: Option<Description>,
     /// What was taken out of e and u for it.
     pub taken_out: Detrend,
@@ -94,7 +94,7 @@ impl<E: BatchEstimator> Identification<E> {
     /// Sets an option of the registry by its name; false for one of another estimator.
     ///
     /// # Errors
-    /// [`AnalysisError`] for a text that is no value of it, or out of its bounds.
+    /// [`AnalysisError`] for a text that is not a value of it, or out of its bounds.
     pub fn set(&mut self, name: &str, text: &str) -> Result<bool, AnalysisError> {
         let option = E::options_of_analysis()
             .into_iter()

@@ -1,5 +1,5 @@
-//! The operator of a person, its form by evidence: beside the lines of a recorded excitation, with the loop
-//! in its verdict.
+//! The operator of a person, its form by evidence: next to the lines of a recorded excitation, with the loop in its
+//! verdict.
 
 use hoid_ident::{
     SearchOptions,
@@ -28,7 +28,7 @@ impl BatchEstimator for FamilyEstimator {
         vec![MethodSpec {
             name: OPERATOR,
             help: "the operator of a person: form, parameters with prior, errors by runs, a verdict",
-            source: "McRuer and Jex 1967; the reference text, equation 2.2",
+            source: "McRuer and Jex 1967; the thesis, equation 2.2",
             structures: &[Structure::BoxJenkins],
             settings: known(Self::options_of_analysis()),
         }]

@@ -108,7 +108,7 @@ impl BatchEstimator for Polynomials {
         let pem = MethodSpec {
             name: PEM,
             help: "polynomials by the prediction error method",
-            source: "Ljung 1999, chapters 7 and 10; the reference text, section III",
+            source: "Ljung 1999, chapters 7 and 10; the thesis, section III",
             structures: &Structure::ALL,
             settings: without(&of_instruments),
         };
@@ -145,7 +145,7 @@ impl BatchEstimator for Polynomials {
     }
 
     fn structure(&self) -> Setting {
-        // The default is no polynomial structure: whoever has one asked for it.
+        // The default is not a polynomial structure: whoever has one asked for it.
         Setting::new("structure", self.template.structure.name()).given(true)
     }
 
@@ -166,7 +166,7 @@ impl BatchEstimator for Polynomials {
         let told = progress::counter("candidates", combinations.len());
         let search = |estimator: &Estimator| fit_or_choose(estimator, &ranges, how.criterion, records, &told);
         let (mut fit, choice) = match search(&estimator) {
-            // What is not told from a level, as e that stands still, is fitted beside the means.
+            // What is not told from a level, as e that stays constant, is fitted next to the means.
             Err(IdentError::SingularRegressors { .. }) if estimator.level => {
                 estimator.level = false;
                 search(&estimator)?
@@ -196,7 +196,7 @@ impl BatchEstimator for Polynomials {
         let mut verdict = fit.verdict(records, choice.as_ref())?;
         let steps = records.iter().all(steps_from_level_to_level);
         if steps {
-            // What happens behind the steps is all that such data tell.
+            // What happens after the steps is all that such data tell.
             let others = verdict.findings().iter().filter(|finding| finding.kind != "stretch");
             verdict = Verdict::of(others.cloned().collect());
         }

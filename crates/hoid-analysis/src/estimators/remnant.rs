@@ -20,7 +20,7 @@ impl BatchEstimator for GreyBox {
         vec![MethodSpec {
             name: REMNANT,
             help: "operator and remnant in physical parameters, with a real delay",
-            source: "Ljung 1999, section 4.3; the reference text, equation 4",
+            source: "Ljung 1999, section 4.3; the thesis, equation 4",
             structures: &[Structure::BoxJenkins],
             settings: known(Self::options_of_analysis()),
         }]

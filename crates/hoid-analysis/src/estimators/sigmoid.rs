@@ -24,7 +24,7 @@ impl BatchEstimator for SigmoidChange {
         vec![MethodSpec {
             name: CHANGE,
             help: "the operator's gains change once, by a sigmoid; any form",
-            source: "Zaal 2016; the reference text, section II",
+            source: "Zaal 2016; the thesis, section II",
             structures: &[Structure::BoxJenkins],
             settings: known(Self::options_of_analysis()),
         }]

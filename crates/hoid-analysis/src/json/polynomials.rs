@@ -107,7 +107,7 @@ impl<'a> PolynomialAnswer<'a> {
         let validations = data.records.iter().map(|record| fit.validate(record));
         let validations = validations.collect::<Result<Vec<_>, _>>()?;
         let operator = fit.operator();
-        // Three poles or one are no gain with a lead, but may be another form.
+        // Three poles or one are not a gain with a lead, but may be another form.
         let family = match &operator {
             Err(NotConvertible::OtherOrders { poles: 1..=3, .. }) if with_input => Some(fit.family_operator(None)),
             _ => None,

@@ -210,8 +210,8 @@ fn not_a_result(found: String) -> AnalysisError {
 fn parsed(text: &str) -> Result<Map<String, Value>, AnalysisError> {
     match serde_json::from_str(text) {
         Ok(Value::Object(object)) => Ok(object),
-        Ok(_) => Err(not_a_result("it is no object".to_owned())),
-        Err(error) => Err(not_a_result(format!("it is no JSON: {error}"))),
+        Ok(_) => Err(not_a_result("it is not an object".to_owned())),
+        Err(error) => Err(not_a_result(format!("it is not JSON: {error}"))),
     }
 }
 

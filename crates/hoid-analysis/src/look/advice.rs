@@ -18,7 +18,7 @@ pub struct Advice {
     pub trial: Option<TrialChoice>,
     /// Sampling frequency, Hz.
     pub sampling_hz: Option<f64>,
-    /// Begin of the span of whole periods, s.
+    /// Start of the span of whole periods, s.
     pub from_s: Option<f64>,
     /// Its end, s.
     pub to_s: Option<f64>,

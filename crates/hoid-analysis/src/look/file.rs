@@ -52,7 +52,7 @@ impl Look {
         })
     }
 
-    /// The columns that say their unit, and it: beside the name, or in it as in `Stick [V]`.
+    /// The columns that say their unit, and it: next to the name, or in it as in `Stick [V]`.
     pub fn units(&self) -> Vec<(&str, &str)> {
         let all = self.survey.columns.iter();
         all.filter_map(|column| Some((column.path.as_str(), unit_of(column)?)))
@@ -65,7 +65,7 @@ pub(super) fn names(found: &FileSurvey) -> Vec<&str> {
     found.columns.iter().map(|column| column.path.as_str()).collect()
 }
 
-/// The unit of a column, beside its name or at its end in brackets.
+/// The unit of a column, next to its name or at its end in brackets.
 fn unit_of(column: &ColumnSurvey) -> Option<&str> {
     let beside = Some(column.unit.as_str()).filter(|unit| !unit.is_empty());
     beside.or_else(|| {

@@ -20,7 +20,7 @@ pub struct LookOptions {
     pub trial: Option<TrialChoice>,
     /// Sampling frequency, Hz; that of the column t where it is left out.
     pub sampling_hz: Option<f64>,
-    /// Begin of the span that counts, s.
+    /// Start of the span that counts, s.
     pub from_s: Option<f64>,
     /// End of the span that counts, s.
     pub to_s: Option<f64>,

@@ -1,9 +1,9 @@
-//! The excitation of a run: the channel whose power stands in single lines over a span of whole
-//! periods, and the longest such span.
+//! The excitation of a run: the channel whose power is in single lines over a span of whole periods,
+//! and the longest such span.
 //!
 //! Over a whole number of periods `T` a periodic signal has its power in the bins `n / T` of its
 //! Fourier transform, and in no other; over any other span it leaks into all bins. The spans between
-//! whole seconds are tried, from the longest down, until nearly all the power stands in single bins
+//! whole seconds are tried, from the longest down, until nearly all the power is in single bins
 //! ([`Excitation::found_in`]).
 
 use hoid_ident::frequency::{COMMON_EXCITATIONS, Excitation, LineSearch};
@@ -17,9 +17,9 @@ const MOST_CUT_S: f64 = 20.0;
 const MOST_CUT_SHARE: f64 = 0.4;
 /// Fewest lines that excite a person: of a sine a person knows what comes.
 const FEWEST_LINES: usize = 3;
-/// Shares of the power beside the lines that are no more than so many times another are alike.
+/// Shares of the power next to the lines that are no more than so many times another are alike.
 const LEAKS_ALIKE: f64 = 3.0;
-/// Share of the power that rounding to five digits or so may leave beside the lines.
+/// Share of the power that rounding to five digits or so may leave next to the lines.
 const ROUNDING: f64 = 1e-9;
 
 /// The excitation of a run.
@@ -104,7 +104,7 @@ fn in_channel(record: &Record, channel: &str, known: &LookOptions) -> Option<Per
 }
 
 /// The lines of a channel over a span, where they hold nearly all of its power, and the share of the
-/// power beside them.
+/// power next to them.
 fn lines_in(record: &Record, channel: &str, (from_s, to_s): (f64, f64)) -> Option<(Excitation, f64)> {
     let span = record.span(from_s, to_s).ok()?;
     let excitation = Excitation::found_in(&span, channel, &LineSearch::default()).ok()?;
@@ -158,7 +158,7 @@ mod tests {
 
     use super::*;
 
-    /// Noise-like error and control, and a disturbance of period 10 s that begins at 3 s.
+    /// Noise-like error and control, and a disturbance of period 10 s that starts at 3 s.
     fn record(lines: &[f64]) -> Record {
         let ts = SampleTime::new(0.02).unwrap();
         let n = 1300;
@@ -189,8 +189,8 @@ mod tests {
         assert_eq!(found.excitation.harmonics(), [1, 3, 7, 12]);
     }
 
-    /// Samples behind the last period, as of a recorder that is stopped late: the span that ends with the
-    /// record leaks little, and is no whole period.
+    /// Samples after the last period, as of a recorder that is stopped late: the span that ends with the record leaks
+    /// little, and is not a whole period.
     #[test]
     fn a_period_is_not_drawn_out_by_samples_at_the_end() {
         let whole = record(&[1.0, 2.0, 3.0]);

@@ -37,7 +37,7 @@ pub fn settings_of_recursion(
     }
     list.push(Setting::new("memory", options.memory_as_text(plan.sample_time())).given(memory_given));
     for one in &listed {
-        // The memory stands above with the defaults of all parameters.
+        // The memory is above with the defaults of all parameters.
         if let Some(text) = value(one.name) {
             let given = text != one.default;
             list.push(Setting::new(one.name.replace('_', " "), text).given(given));

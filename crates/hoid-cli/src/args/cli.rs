@@ -93,14 +93,14 @@ pub enum Command {
     Design(DesignArgs),
     /// A virtual experiment for `hoid group`
     ///
-    /// Simulates subjects, conditions and runs, with the truth beside them.
+    /// Simulates subjects, conditions and runs, with the truth next to them.
     SimulateGroup(SimulateGroupArgs),
     /// Monte Carlo studies: run a plan, join shards, list plans
     #[command(subcommand)]
     Study(StudyCommand),
-    /// The reference text: tables, figures, claims
+    /// The thesis: tables, figures, claims
     ///
-    /// The tables, figures and claims of the reference text, each from a named study.
+    /// The tables, figures and claims of the thesis, each from a named study.
     Reproduce(ReproduceArgs),
     /// Completions for bash, zsh, fish, PowerShell, Elvish
     ///

@@ -51,7 +51,8 @@ pub struct DesignArgs {
     /// Greatest rms of the control
     #[arg(long, value_name = "RMS")]
     pub max_u: Option<f64>,
-    /// A forcing function to be judged beside it: a scenario with a target or disturbance, or reference (the ten sines of the text)
+    /// A forcing function to be judged next to it: a scenario with a target or disturbance, or reference (the ten sines
+    /// of the text)
     #[arg(long, value_name = "SCENARIO.toml|reference")]
     pub against: Option<PathBuf>,
     /// Directory for the design: design.json, scenario.toml, forcing.csv
@@ -71,7 +72,7 @@ fn parse_wanted(text: &str) -> Result<Wanted, String> {
     let number: f64 = number
         .trim()
         .parse()
-        .map_err(|_| format!("{error:?} is no error; write NAME=5%"))?;
+        .map_err(|_| format!("{error:?} is not an error; write NAME=5%"))?;
     let name = match name.trim() {
         "margin" => "phase_margin",
         "delay" => "tau_e",

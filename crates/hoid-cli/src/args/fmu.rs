@@ -15,12 +15,12 @@ pub struct FmuArgs {
     /// File of the unit
     #[arg(long, value_name = "FILE.fmu")]
     pub out: PathBuf,
-    /// A unit that controls in place of a person: the operator of a condition of the reference text,
-    /// C1 to C6, or of a scenario file (TOML)
+    /// A unit that controls in place of a person: the operator of a condition of the thesis, C1 to
+    /// C6, or of a scenario file (TOML)
     #[arg(long, value_name = "SCENARIO", value_parser = parse_operator)]
     pub operator: Option<OperatorChoice>,
     /// Shared library that `cargo xtask ffi` has built; may be repeated, one for each platform
-    /// [default: libhoid beside this program]
+    /// [default: libhoid next to this program]
     #[arg(long = "library", value_name = "FILE")]
     pub libraries: Vec<PathBuf>,
     /// Version of the Functional Mock-up Interface

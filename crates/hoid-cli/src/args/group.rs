@@ -38,7 +38,7 @@ pub struct GroupRunArgs {
     /// Go on with a group that was stopped
     #[arg(long)]
     pub resume: bool,
-    /// Write CSV beside Parquet
+    /// Write CSV next to Parquet
     #[arg(long)]
     pub csv: bool,
     /// Estimate each person from all of them too: pooled.csv, and population.json (of several conditions
@@ -79,8 +79,8 @@ pub struct SimulateGroupArgs {
     /// Subjects
     #[arg(long, value_name = "N", default_value_t = 3)]
     pub subjects: u64,
-    /// People like people in place of subjects near the reference text: drawn over the family of
-    /// operators, on the elements of --plants, columns t, e, u, d, y
+    /// People like people in place of subjects near the thesis: drawn over the family of operators,
+    /// on the elements of --plants, columns t, e, u, d, y
     #[arg(long, conflicts_with_all = ["conditions", "between_subjects", "remnant_order", "noise_level"])]
     pub people: bool,
     #[command(flatten)]
@@ -157,5 +157,5 @@ fn parse_trouble(text: &str) -> Result<SamplingDefect, String> {
     SamplingDefect::ALL
         .into_iter()
         .find(|trouble| trouble.name() == text.trim())
-        .ok_or_else(|| format!("{text:?} is no trouble, expected some of {}", names()))
+        .ok_or_else(|| format!("{text:?} is not a trouble, expected some of {}", names()))
 }

@@ -270,7 +270,7 @@ const HELP: [Help; 19] = [
     },
 ];
 
-/// The headings of options that several commands share; what is left stands under the model.
+/// The headings of options that several commands share; what is left is under the model.
 const HEADINGS: [(&str, &[&str]); 2] = [
     (
         "Data",
@@ -323,7 +323,7 @@ const HEADINGS: [(&str, &[&str]); 2] = [
     ),
 ];
 
-/// The commands whose options stand under headings.
+/// The commands whose options are under headings.
 const WITH_HEADINGS: [&str; 4] = ["identify", "describe", "track", "stream"];
 
 /// The program as it is parsed and as it explains itself.
@@ -386,7 +386,7 @@ mod tests {
 
     use super::*;
 
-    /// The words of an example behind the program's name, as a shell would hand them over.
+    /// The words of an example after the program's name, as a shell would hand them over.
     fn words(example: &str) -> Vec<String> {
         let (_, typed) = example.split_once("hoid ").unwrap();
         let typed = typed.split([' ']).take_while(|word| !["<", ">", "|"].contains(word));

@@ -15,8 +15,8 @@ pub struct ReadArgs {
     /// Column of the output (control): a name, -name, or a difference
     #[arg(long, value_name = "COLUMN", default_value = "u", allow_hyphen_values = true)]
     pub output: String,
-    /// Column of the time, and its unit behind a colon where it is not found by itself: s, ms, us, ns,
-    /// min, h, iso (dates and times), sec+nanosec [default: t, or a default name of a time]
+    /// Column of the time, and its unit after a colon where it is not found by itself: s, ms, us, ns, min, h, iso
+    /// (dates and times), sec+nanosec [default: t, or a default name of a time]
     #[arg(long, value_name = "COLUMN[:UNIT]", value_parser = parse_time)]
     pub time: Option<TimeChoice>,
     /// Column that counts the trials of a file, each a record of its own (t: where the time starts again),
@@ -65,7 +65,7 @@ pub struct PrepareArgs {
     pub offset: Vec<(String, Offset)>,
     #[command(flatten)]
     pub rate: DecimateArgs,
-    /// Bring evenly sampled data to another sampling frequency in Hz, behind a low-pass filter on
+    /// Bring evenly sampled data to another sampling frequency in Hz, after a low-pass filter on
     /// all channels alike
     #[arg(long, value_name = "HZ", conflicts_with = "decimate")]
     pub new_fs: Option<f64>,
@@ -77,9 +77,9 @@ pub struct PrepareArgs {
 /// Whether the sampling rate is lowered.
 #[derive(Debug, Clone, Copy, Args)]
 pub struct DecimateArgs {
-    /// Keep every M-th sample behind a linear-phase low-pass filter on all channels alike; auto: above
-    /// 200 Hz by the M that comes nearest to 100 Hz, where an operator is fitted or tracked. A
-    /// polynomial structure, and a delay in samples, take the samples as they are unless M is named
+    /// Keep every M-th sample after a linear-phase low-pass filter on all channels alike; auto: above 200 Hz by the M
+    /// that comes nearest to 100 Hz, where an operator is fitted or tracked. A polynomial structure, and a delay in
+    /// samples, take the samples as they are unless M is named
     #[arg(long, value_name = "auto|off|M", default_value_t = Decimation::Auto)]
     pub decimate: Decimation,
 }

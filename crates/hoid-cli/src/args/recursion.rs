@@ -35,7 +35,7 @@ pub struct RecursionArgs {
     #[arg(long, value_name = "LIST")]
     pub orders: Option<String>,
     /// Delay of b0 in samples (29), or dead time in s (0.28s); a number or a range (20..40,
-    /// 0.1s..0.4s) to search on the start span [default: 0.05 to 0.6 s; adaptive begins at 0.2 s and
+    /// 0.1s..0.4s) to search on the start span [default: 0.05 to 0.6 s; adaptive starts at 0.2 s and
     /// follows the delay]
     #[arg(long, value_name = "N|Ss|LO..HI")]
     pub nk: Option<DelayRange>,
@@ -174,7 +174,7 @@ pub(super) fn method_names() -> impl TypedValueParser<Value = String> {
 fn parse_count(text: &str) -> Result<usize, String> {
     match text.trim().parse::<usize>() {
         Ok(n) if n > 0 => Ok(n),
-        _ => Err(format!("{text:?} is no number of samples; write 1 or more")),
+        _ => Err(format!("{text:?} is not a number of samples; write 1 or more")),
     }
 }
 
@@ -182,7 +182,7 @@ fn parse_frequency(text: &str) -> Result<f64, String> {
     match text.trim().parse::<f64>() {
         Ok(hz) if hz > 0.0 && hz.is_finite() => Ok(hz),
         _ => Err(format!(
-            "{text:?} is no frequency; write a positive number in Hz, as 100"
+            "{text:?} is not a frequency; write a positive number in Hz, as 100"
         )),
     }
 }

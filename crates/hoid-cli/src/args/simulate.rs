@@ -20,11 +20,11 @@ pub struct DemoArgs {
     pub seed: u64,
 }
 
-/// A condition of the reference text or a scenario file.
+/// A condition of the thesis or a scenario file.
 #[derive(Debug, Args)]
 #[group(required = true, multiple = false)]
 pub struct ScenarioChoice {
-    /// Condition of the reference text: C1 to C6
+    /// Condition of the thesis: C1 to C6
     #[arg(long, value_name = "C1..C6")]
     pub condition: Option<Condition>,
     /// Scenario file (TOML)
@@ -54,7 +54,7 @@ pub struct SimulateArgs {
     #[arg(long, value_name = "S")]
     pub sample_time: Option<f64>,
     /// Where K_c stands when it changes: in the input matrix (x stays continuous) or in the output
-    /// matrix (as in the reference text) [default: input, or the scenario's]
+    /// matrix (as in the thesis) [default: input, or the scenario's]
     #[arg(long, value_name = "WHERE", value_parser = choice_of(&Realisation::ALL))]
     pub realisation: Option<Realisation>,
     /// Seed of the random streams

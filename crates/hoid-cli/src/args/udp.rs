@@ -19,7 +19,7 @@ impl FromStr for UdpPlaces {
     fn from_str(text: &str) -> Result<Self, Self::Err> {
         let wrong = || {
             format!(
-                "{text:?} is no pair of ports; write 5005:5006 for ports of this computer, or \
+                "{text:?} is not a pair of ports; write 5005:5006 for ports of this computer, or \
                  0.0.0.0:5005:192.168.1.7:5006 with addresses (IPv4)"
             )
         };

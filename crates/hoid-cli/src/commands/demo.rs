@@ -17,7 +17,7 @@ use hoid::track::{Method, OPERATOR_COLUMNS, StartAt, Trace, TrackOptions, track}
 
 use crate::{args::DemoArgs, commands::output_paths, error::CliError, output, text};
 
-/// The spans of the reference text (V.B) that lie wholly before and wholly after the change, s.
+/// The spans of the thesis (V.B) that lie wholly before and wholly after the change, s.
 const SPANS: [(&str, f64, f64); 2] = [("before", 0.0, 30.72), ("after", 51.2, 81.92)];
 
 struct Stage {

@@ -18,7 +18,7 @@ use crate::{args::DesignArgs, error::CliError, json, output, text};
 /// `--against` of the ten sines of the text.
 const REFERENCE: &str = "reference";
 
-/// A forcing function that is judged beside the design, over the same time.
+/// A forcing function that is judged next to the design, over the same time.
 struct Other {
     name: String,
     expected: Expected,
@@ -97,7 +97,7 @@ fn family(path: &Path) -> Result<hoid::model::FamilyScenario, CliError> {
     match read_any_scenario(path)? {
         AnyScenario::Family(scenario) => Ok(*scenario),
         AnyScenario::Reference(_) => Err(CliError::Usage(format!(
-            "{} is a scenario of the reference text; write one with the key form, as form = \"lead\"",
+            "{} is a scenario of the thesis; write one with the key form, as form = \"lead\"",
             path.display()
         ))),
     }

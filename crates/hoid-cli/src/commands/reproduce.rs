@@ -1,4 +1,4 @@
-//! `hoid reproduce`: the tables, figures and claims of the reference text.
+//! `hoid reproduce`: the tables, figures and claims of the thesis.
 
 use std::sync::atomic::Ordering;
 

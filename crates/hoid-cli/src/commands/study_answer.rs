@@ -45,7 +45,7 @@ struct Row {
     estimator: String,
     /// All estimates.
     all: f64,
-    /// Rates of those that are no operator.
+    /// Rates of those that are not an operator.
     failed: f64,
     not_convertible: f64,
     /// Rate of those whose verdict is trustworthy, where there are verdicts.

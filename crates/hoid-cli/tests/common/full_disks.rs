@@ -1,5 +1,5 @@
-//! `study`, `group` and `track` on disks that are full before all is written: what stands there is whole, the blocks
-//! before the fault are not lost, and on another disk the command goes on to the files of a run that nothing befell.
+//! `study`, `group` and `track` on disks that are full before all is written: what is there is whole, the blocks before
+//! the fault are not lost, and on another disk the command goes on to the files of a run that nothing befell.
 //!
 //! A disk of a size drawn between a page and what a whole run takes at most is full at a write drawn alike.
 
@@ -19,7 +19,7 @@ const PAGE_KB: usize = 4;
 pub struct Outcome {
     /// Rounds whose disk was full.
     pub full: usize,
-    /// Whole blocks that stood there.
+    /// Whole blocks that was there.
     pub blocks: usize,
     pub failures: Vec<String>,
 }
@@ -31,7 +31,7 @@ pub fn rounds(bench: &Bench, work: &Work, count: usize, draw: &mut Draw) -> Opti
     bench.whole(work, "whole");
     let expected = files(&whole);
     let bytes = |all: &std::collections::BTreeMap<_, Vec<u8>>| all.values().map(Vec::len).sum::<usize>();
-    // Blocks stand beside the tables that are made of them.
+    // Blocks are next to the tables that are made of them.
     let largest_kb = PAGE_KB * (expected.len() + 2) + (1 + usize::from(work.has_parts)) * bytes(&expected) / 1024;
     let at = bench.at.join("disk");
     fs::create_dir_all(&at).unwrap();

@@ -34,13 +34,13 @@ pub struct Work {
     pub arguments: &'static [&'static str],
     /// What lets it go on.
     pub resume: &'static [&'static str],
-    /// Whether its blocks stand in `parts/` of the directory itself.
+    /// Whether its blocks are in `parts/` of the directory itself.
     pub has_parts: bool,
     /// What of its place is given to `--out`.
     pub out: &'static str,
 }
 
-/// Blocks that stand in `parts/`.
+/// Blocks that are in `parts/`.
 pub const STUDY: Work = Work {
     name: "study",
     arguments: &["study", "run", "plan.toml", "--jobs", "1"],
@@ -176,7 +176,7 @@ pub fn compare(expected: &BTreeMap<PathBuf, Vec<u8>>, directory: &Path, what: &s
     all.into_iter().filter_map(differs).collect()
 }
 
-/// The program that is built beside this example.
+/// The program that is built next to this example.
 pub fn beside_this() -> PathBuf {
     let mut path = std::env::current_exe().unwrap();
     path.pop();

@@ -181,7 +181,7 @@ impl Basis {
     }
 
     /// One at another point with the same lag and the same scale, whose slow mode goes on from here:
-    /// `g = 1/(s + a) e` is `Q^2 z_0` in the states of both. The fast modes begin at rest; they need
+    /// `g = 1/(s + a) e` is `Q^2 z_0` in the states of both. The fast modes start at rest; they need
     /// some `1/(zeta omega)` until they are what they would be. `error` is the delayed error of now.
     pub fn moved(&self, point: Point, error: f64) -> Option<Self> {
         let sound = point.omega > 0.0 && point.zeta > 0.0 && point.tau >= 0.0 && point.lag == self.point.lag;

@@ -1,8 +1,8 @@
 //! Sums over blocks of half a second, and what the last of them say against those before.
 //!
-//! Behind the whitening filter, with the regressors of gains and level r, those of what is held
-//! `q_j = sum_i theta_i dx_i/dj`, both where the estimate is at that sample, and the held values p of
-//! that sample, about those of the basis, to first order
+//! After the whitening filter, with the regressors of gains and level r, those of what is held
+//! `q_j = sum_i theta_i dx_i/dj`, both where the estimate is at that sample, and the held values p of that sample,
+//! about those of the basis, to first order
 //!
 //! `y + q' p = r' s + q' p' + eps`.
 //!

@@ -5,12 +5,12 @@
 //! is a better point of the basis (the corrections), a better noise model (`noise`, by the residuals) and how
 //! unevenly the innovations come (`volatility`). [`super::filter`] runs one after another over the data.
 //!
-//! `evidence` is the sum of the logarithms of the densities that it gave to blocks before it saw them (A. P.
-//! Dawid, *J. Royal Statistical Society* A 147 (1984) 278-292): by it candidates of the same data are compared.
-//! Each block was predicted from what was before it only, so that more parameters are no advantage. The
-//! density is that of Student with the variance of the last seconds and as many degrees of freedom as the block
-//! has samples, so that a change, which nobody predicts, decides nothing; and old evidence is forgotten, so
-//! that it is about what has been learnt and not about how fast.
+//! `evidence` is the sum of the logarithms of the densities that it gave to blocks before it saw them (A. P. Dawid, *J.
+//! Royal Statistical Society* A 147 (1984) 278-292): by it candidates of the same data are compared. Each block was
+//! predicted from what was before it only, so that more parameters are not advantage. The density is that of Student
+//! with the variance of the last seconds and as many degrees of freedom as the block has samples, so that a change,
+//! which nobody predicts, decides nothing; and old evidence is forgotten, so that it is about what has been learnt and
+//! not about how fast.
 
 use super::{
     basis::{Basis, Complex, Point, Regressors},
@@ -36,7 +36,7 @@ const FAR: [[f64; 2]; DYNAMICS] = [[-0.3, 0.4], [-0.4, 0.6], [-0.05, 0.05]];
 pub(super) const LATEST_S: f64 = 0.9;
 /// Frequencies at which gain and lead are nearest, rad/s.
 pub(super) const NEAR_RAD_S: [f64; 3] = [1.0, 2.0, 4.0];
-/// Time before which blocks are no evidence, s.
+/// Time before which blocks are not evidence, s.
 const UNSETTLED_S: f64 = 2.0;
 /// Time of the energies of which [`Volatility`] takes one, s.
 const BURST_S: f64 = 1.28;
@@ -68,7 +68,7 @@ pub(super) struct Candidate {
     outputs: [f64; LARGEST_ORDER],
     d: [f64; LARGEST_ORDER],
     pub noise: NoiseModel,
-    /// The block so far: samples as many as D reaches back, and those behind them.
+    /// The block so far: samples as many as D reaches back, and those after them.
     early: Moments,
     late: Moments,
     block: u64,
@@ -117,7 +117,7 @@ impl State for Candidate {
 }
 
 impl Candidate {
-    /// At rest. `d` is the noise model to begin with, solved.
+    /// At rest. `d` is the noise model to start with, solved.
     pub fn new(
         basis: Basis,
         d: &NoiseModel,

@@ -1,10 +1,9 @@
-//! What is usual of people, in seconds: where the recursion begins for a person of whom nothing is known.
+//! What is usual of people, in seconds: where the recursion starts for a person of whom nothing is known.
 //!
-//! The usual person (lag 3 s, neuromuscular system of 11 rad/s and .25, their form `(T_L s + 1)^2/(T_I s + 1)`)
-//! is what recorded people have been found to be. All other numbers were set on simulated people: those
-//! whose operator has a lag, whose delay is no whole number of samples, and whose remnant is an
-//! autoregression with a level that may change, and those of the conditions C1 to C6, seed 9000; none on
-//! recorded people.
+//! The usual person (lag 3 s, neuromuscular system of 11 rad/s and .25, their form `(T_L s + 1)^2/(T_I s + 1)`) is what
+//! recorded people have been found to be. All other numbers were set on simulated people: those whose operator has a
+//! lag, whose delay is not a whole number of samples, and whose remnant is an autoregression with a level that may
+//! change, and those of the conditions C1 to C6, seed 9000; none on recorded people.
 
 use super::{
     basis::Point,

@@ -17,13 +17,13 @@
 //!
 //! `-ln P(chi^2 > 2x) = x - ln (1 + x + .. + x^(nu/2-1)/(nu/2-1)!)`.
 //!
-//! A change is declared where one of them is above the threshold. When it was, and what changed, is told by the
-//! block that leaves least where all is free before it and behind it (R. E. Quandt, *J. American Statistical
-//! Association* 53 (1958) 873-880).
+//! A change is declared where one of them is above the threshold. When it was, and what changed, is told by the block
+//! that leaves least where all is free before it and after it (R. E. Quandt, *J. American Statistical Association* 53
+//! (1958) 873-880).
 //!
-//! The blocks are those of the candidate of now (`last_blocks`), all behind its noise model and in its
-//! basis: when another takes over, so do its blocks. From three seconds behind a gap on, what is behind it is held
-//! against what was before.
+//! The blocks are those of the candidate of now (`last_blocks`), all after its noise model and in its basis: when
+//! another takes over, so do its blocks. From three seconds after a gap on, what is after it is held against what was
+//! before.
 //!
 //! Sources: G. C. Chow, *Econometrica* 28 (1960) 591-605; the mean of the logarithm and the tail: M. Abramowitz and I. A.
 //! Stegun, 1964, eq. 6.3.3, 6.3.4, 26.4.5.
@@ -46,13 +46,13 @@ const OPERATOR_STATES: [usize; OPERATOR] = [0, 1, 2, LINEAR, LINEAR + 1, LINEAR 
 const PAIRS: u32 = OPERATOR as u32 / 2;
 /// Blocks between before and now.
 const GUARD_BLOCKS: usize = 2;
-/// Blocks behind a gap from which they are held against those before it.
+/// Blocks after a gap from which they are held against those before it.
 const LEAST_AFTER_GAP: usize = 4;
 /// Blocks that the supposed level of T, that of a chi-square, counts for.
 const PRIOR_BLOCKS: f64 = 60.0;
 /// Blocks that the level is a mean of at most.
 const LEVEL_MEMORY: f64 = 240.0;
-/// By so much a logarithm raises the level at most: a change is no usual variation.
+/// By so much a logarithm raises the level at most: a change is not a usual variation.
 const LARGEST_LOG_STEP: f64 = 3.0;
 
 /// What the detector looks at.
@@ -161,7 +161,7 @@ impl Detector {
     pub(super) fn test(&mut self, last: &LastBlocks, dynamics: [f64; DYNAMICS]) {
         self.declared = false;
         self.since += 1;
-        // What was before the last change is no measure of what comes.
+        // What was before the last change is not a measure of what comes.
         let known = last
             .all()
             .len()
@@ -197,10 +197,10 @@ impl Detector {
             .wald_statistic(OPERATOR_STATES)
     }
 
-    /// The change is supposed to be at the block that leaves least where all is free before it and behind it.
-    /// What changed is told in the metric of the noise model, whose covariance is raised by how much more the
-    /// scores show in the mean between the halves of what was before: that of the scores alone is too uncertain to
-    /// tell gains from a delay, and those behind the change have the change in them.
+    /// The change is supposed to be at the block that leaves least where all is free before it and after it. What
+    /// changed is told in the metric of the noise model, whose covariance is raised by how much more the scores show in
+    /// the mean between the halves of what was before: that of the scores alone is too uncertain to tell gains from a
+    /// delay, and those after the change have the change in them.
     fn locate_change(&mut self, blocks: &[Block], dynamics: [f64; DYNAMICS], recent: usize) {
         let mut best: Option<Contrast> = None;
         self.ago = recent.min(blocks.len().saturating_sub(1));
@@ -244,12 +244,12 @@ impl Detector {
         self.statistics.iter().fold(1.0, |most, s| s.scale().max(most))
     }
 
-    /// Before and behind the change that was declared last.
+    /// Before and after the change that was declared last.
     pub fn contrast(&self) -> &Contrast {
         &self.declared_contrast
     }
 
-    /// Mean square of the innovations before and behind it.
+    /// Mean square of the innovations before and after it.
     pub fn innovation_variances(&self) -> [f64; 2] {
         self.innovation_variances
     }

@@ -122,7 +122,8 @@ mod tests {
 
     #[test]
     fn the_simplest_set_that_explains_is_told() {
-        // Along the delay alone: neither gains nor delay differ by much beside their own errors.
+        // Along the delay alone: neither gains nor delay differ by much compared with their own
+        // errors.
         let told = Difference::of(&contrast([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.5])).unwrap();
         assert_eq!(told.changed, [false, false, true]);
         assert!((told.value[6] - 1.5).abs() < 1e-9 && told.value[0] == 0.0);

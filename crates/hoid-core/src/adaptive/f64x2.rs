@@ -1,8 +1,7 @@
 //! Two numbers side by side.
 //!
-//! Every processor with vector registers takes two at a time, where they stand at a multiple of 16 bytes.
-//! What is done to one does not depend on what stands beside it: the digits are those of one alone, on
-//! every machine.
+//! Every processor with vector registers takes two at a time, where they are at a multiple of 16 bytes. What is done to
+//! one does not depend on what is next to it: the digits are those of one alone, on every machine.
 
 use core::ops::{Add, AddAssign, Div, Mul, Sub, SubAssign};
 

@@ -54,8 +54,8 @@ pub struct AdaptiveFilter<E> {
     detector: Detector,
     history: History<E>,
     saturation: Saturation,
-    /// Sums of the squares of e, of u, and of u behind the noise model that is supposed, which no estimate leaves
-    /// more of than that of no response at all.
+    /// Sums of the squares of e, of u, and of u after the noise model that is supposed, which no estimate leaves more
+    /// of than that of no response at all.
     powers: [f64; 3],
     restarts: u64,
     age: u64,

@@ -44,7 +44,7 @@ pub(super) struct Hypothesis {
     pub variance: f64,
     pub residuals: f64,
     pub log_weight: f64,
-    /// Block of its birth, zero for those of the beginning.
+    /// Block of its birth, zero for those of the start.
     pub born: u64,
     pub class: usize,
     segments: [Segment; SEGMENTS],

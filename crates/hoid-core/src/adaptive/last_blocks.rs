@@ -1,8 +1,7 @@
-//! The last blocks of a candidate, behind one noise model and in one basis: what the detector compares.
+//! The last blocks of a candidate, after one noise model and in one basis: what the detector compares.
 //!
-//! Where samples are not taken for longer than a quarter of a second, or nothing moves, what is beside that
-//! gap is not kept: the samples before it may have been part of the same fault, and behind it the filters
-//! swing in.
+//! Where samples are not taken for longer than a quarter of a second, or nothing moves, what is next to that gap is not
+//! kept: the samples before it may have been part of the same fault, and after it the filters swing in.
 
 use super::blocks::{Block, EMPTY, Row};
 
@@ -10,7 +9,7 @@ use super::blocks::{Block, EMPTY, Row};
 pub const BLOCKS: usize = 96;
 /// Length of a block, s.
 pub const BLOCK_S: f64 = 0.5;
-/// Time from which samples that are not taken are a gap, and time that is not looked at behind one, s.
+/// Time from which samples that are not taken are a gap, and time that is not looked at after one, s.
 const GAP_S: f64 = 0.25;
 const BEHIND_S: f64 = 2.0;
 
@@ -70,7 +69,7 @@ impl LastBlocks {
         self.closed = true;
     }
 
-    /// A sample says nothing, and is no fault.
+    /// A sample says nothing, and is not a fault.
     pub fn pass_over(&mut self) {
         self.closed = false;
     }
@@ -142,7 +141,7 @@ mod tests {
         assert_eq!(last.all().len(), 2);
         (0..5).for_each(|_| last.skip());
         assert_eq!((last.all().len(), last.fresh()), (1, 0));
-        // Two seconds behind it are not looked at.
+        // Two seconds after it are not looked at.
         (0..49).for_each(|_| last.take(&ROW));
         assert_eq!(last.all().len(), 1);
         last.take(&ROW);

@@ -1,16 +1,15 @@
 //! When did the operator last change? A mixture over the answers.
 //!
 //! After each block the likeliest hypotheses have children that say that the operator changed in it: they are what
-//! their parents were before it, and the covariance of a change is added to that of the gains. A whitening filter
-//! D of order p has D(theta x) for D theta x while it reaches back to before the change: where the noise is steep,
-//! the step of the response is then hundreds of innovations, which no gains explain. So a child takes nothing of
-//! that block, and of the next one the samples behind the first p. A child starts with the prior probability of a
-//! change in the time since the last birth, and its probability follows its likelihood. When there is no
-//! room, the least likely of those that are old enough is pruned. So between changes the estimate rests on
-//! all data since the last one, and after a change it is that of the child that was born there (P.
-//! Andersson, *International Journal of Control* 42 (1985) 1175-1193; R. P. Adams and D. J. C. MacKay,
-//! *Bayesian online changepoint detection*, 2007; the births of A. S. Willsky and H. L. Jones, *IEEE
-//! Trans. Automatic Control* 21 (1976) 108-112, with all their likelihoods).
+//! their parents were before it, and the covariance of a change is added to that of the gains. A whitening filter D of
+//! order p has D(theta x) for D theta x while it reaches back to before the change: where the noise is steep, the step
+//! of the response is then hundreds of innovations, which no gains explain. So a child takes nothing of that block, and
+//! of the next one the samples after the first p. A child starts with the prior probability of a change in the time
+//! since the last birth, and its probability follows its likelihood. When there is no room, the least likely of those
+//! that are old enough is pruned. So between changes the estimate rests on all data since the last one, and after a
+//! change it is that of the child that was born there (P. Andersson, *International Journal of Control* 42 (1985)
+//! 1175-1193; R. P. Adams and D. J. C. MacKay, *Bayesian online changepoint detection*, 2007; the births of A. S.
+//! Willsky and H. L. Jones, *IEEE Trans. Automatic Control* 21 (1976) 108-112, with all their likelihoods).
 //!
 //! **Classes.** The numerator is any, or that of a gain with a lead, `(K_e + K_e_dot s)(s + a)`: the second
 //! is the first with a covariance that leaves the gains no other direction. Of each form the gains hardly
@@ -89,7 +88,7 @@ pub(super) struct NoiseScales {
     /// Ratio of u to e, and the root mean square of u.
     pub unit: f64,
     pub size: f64,
-    /// Innovation variance to begin with.
+    /// Innovation variance to start with.
     pub innovations: f64,
     pub sample_time: f64,
     /// Samples that count for one.
@@ -156,8 +155,8 @@ impl Mixture {
         &mut self.hypotheses[..self.count.min(HYPOTHESES)]
     }
 
-    /// Takes a block, its first samples as many as the whitening filter reaches back, and those behind them;
-    /// the least energy that any hypothesis left.
+    /// Takes a block, its first samples as many as the whitening filter reaches back, and those after them; the least
+    /// energy that any hypothesis left.
     pub fn update(
         &mut self,
         [early, late]: [&Moments; 2],

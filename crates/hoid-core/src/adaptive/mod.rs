@@ -5,10 +5,9 @@
 //! `Y(s) = N(s)/((T_I s + 1) (s^2/omega^2 + 2 zeta s/omega + 1)) e^{-tau s}`,
 //! `N(s) = n_0 + n_1 s + n_2 s^2`
 //!
-//! (D. T. McRuer and H. R. Jex, IEEE Trans. Human Factors in Electronics 8 (1967) 231-249). Data of
-//! seconds determine the numerator; poles, lag and delay they do not, and they are nearly the same
-//! for everybody. So those begin at what is usual ([`basis`]), and with the responses x_i of
-//! `s^i/(..)` to the error
+//! (D. T. McRuer and H. R. Jex, IEEE Trans. Human Factors in Electronics 8 (1967) 231-249). Data of seconds determine
+//! the numerator; poles, lag and delay they do not, and they are nearly the same for everybody. So those start at the
+//! default ([`basis`]), and with the responses x_i of `s^i/(..)` to the error
 //!
 //! `u = sum_i theta_i x_i + level + v`, `D(q^-1) v = eps`,
 //!
@@ -17,11 +16,11 @@
 //! there. The lag stays. A gain with a lead but without a lag is in the span: then
 //! `N = (K_e + K_e_dot s)(T_I s + 1)`, and is weighed against any numerator.
 //!
-//! - **Candidates** (`candidate`). One basis and one noise model read the data sample by sample: that is the
-//!   prediction error method for given D and a linearisation. The candidate of now answers; beside it another one
-//!   reads the record again ([`AdaptiveFilter`]), from where the estimate points, with what has been learnt of the
-//!   noise, and takes over when it has caught up. Every second one starts elsewhere. So the estimate is that of a
-//!   batch fit which is repeated again and again, at a bounded cost for each sample.
+//! - **Candidates** (`candidate`). One basis and one noise model read the data sample by sample: that is the prediction
+//!   error method for given D and a linearisation. The candidate of now answers; next to it another one reads the
+//!   record again ([`AdaptiveFilter`]), from where the estimate points, with what has been learnt of the noise, and
+//!   takes over when it has caught up. Every second one starts elsewhere. So the estimate is that of a batch fit which
+//!   is repeated again and again, at a bounded cost for each sample.
 //! - **Changes** ([`mixture`]). Within a candidate, hypotheses say when the operator last changed: they are born
 //!   in each block, weighed by what they predicted, and pruned. Of each there are forms and drifts.
 //! - **Noise** ([`noise`], `volatility`). D is a long autoregression of the residuals, by least squares. The
@@ -30,16 +29,15 @@
 //!   the innovations come says how many samples count for one.
 //! - **What else predicts as well** (`alternatives`). Other poles and delays that predict u about as well are in
 //!   the errors that are told.
-//! - **The end of the stick** (`saturation`). An output that stands there says that it would be at least so far.
+//! - **The end of the stick** (`saturation`). An output that is there says that it would be at least so far.
 //! - **Declared changes** ([`detector`]). From the difference of gains and what is held between the last seconds
 //!   and the time before (`blocks`, `last_blocks`), by least squares, with the errors that the scores show
 //!   ([`contrast`]; G. C. Chow, Econometrica 28 (1960) 591-605; H. White, Econometrica 48 (1980) 817-838). What
 //!   changed is told by [`difference`].
 //!
-//! Nothing has to be fitted before: the estimate begins with the first second, whose ratio of
-//! output to error gives the scale of the gains' prior. Where an earlier fit of the person is at hand
-//! ([`known`]), it begins there. [`AdaptiveFilter`] is the recursion: it needs no operating system, and its memory
-//! is an array of the caller's.
+//! Nothing has to be fitted before: the estimate starts with the first second, whose ratio of output to error gives the
+//! scale of the gains' prior. Where an earlier fit of the person is at hand ([`known`]), it starts there.
+//! [`AdaptiveFilter`] is the recursion: it needs no operating system, and its memory is an array of the caller's.
 //!
 //! ```
 //! use hoid_core::adaptive::{AdaptiveFilter, least_memory, defaults::DefaultOperator};

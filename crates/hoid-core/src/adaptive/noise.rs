@@ -79,8 +79,8 @@ impl NoiseModel {
         })
     }
 
-    /// Begins as if so many samples of a v had been seen, with this variance of eps and autocovariances over
-    /// it; false where they are none.
+    /// Starts as if so many samples of a v had been seen, with this variance of eps and autocovariances over it; false
+    /// where they are none.
     pub(super) fn set_prior(&mut self, lags: &Lags, variance: f64, samples: f64) -> bool {
         let positive = |x: f64| x > 0.0 && x.is_finite();
         if !(positive(variance) && lags[0] > 0.0 && lags.iter().all(|c| c.is_finite()) && positive(samples)) {
@@ -99,7 +99,7 @@ impl NoiseModel {
         true
     }
 
-    /// Coefficients behind the 1.
+    /// Coefficients after the 1.
     pub fn d(&self) -> &[f64] {
         &self.d[..self.order]
     }

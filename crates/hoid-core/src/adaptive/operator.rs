@@ -1,10 +1,9 @@
 //! The operator that is told: parameters and their covariance from gains and corrections.
 //!
-//! Gains of the basis are no parameters of an operator. K_e and K_e_dot are those of the gain and lead
-//! that are nearest to it at [`NEAR_RAD_S`], by least squares in
-//! `K_e + K_e_dot j omega = Y e^{j tau omega} (1 - omega^2/omega_nm^2 + 2 j zeta omega/omega_nm)`;
-//! exactly those of a person who has a gain and a lead. They are linear in the state s, so that their
-//! covariance is `M C M'`.
+//! Gains of the basis are not parameters of an operator. K_e and K_e_dot are those of the gain and lead that are
+//! nearest to it at [`NEAR_RAD_S`], by least squares in
+//! `K_e + K_e_dot j omega = Y e^{j tau omega} (1 - omega^2/omega_nm^2 + 2 j zeta omega/omega_nm)`; exactly those of a
+//! person who has a gain and a lead. They are linear in the state s, so that their covariance is `M C M'`.
 //!
 //! Their covariance is that of the mixture over changes ([`super::mixture`]) at the basis of now, and the
 //! scatter of other operators that predict u about as well ([`super::alternatives`]).

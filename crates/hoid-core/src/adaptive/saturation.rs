@@ -1,10 +1,10 @@
 //! Where the stick ends.
 //!
-//! A stick that stands at its end says only that they would have gone at least as far. Taken as it is, such
-//! an output says that they answered less than they do, and the samples behind it are held against a noise
-//! that was none. So nothing is learnt of it, and what goes on in the filters is the output that was
-//! predicted, where that lies beyond the end, and the end where it does not: the output given what is known,
-//! but for the noise (J. Tobin, *Econometrica* 26 (1958) 24-36, has the regression with both).
+//! A stick that is at its end says only that they would have gone at least as far. Taken as it is, such an output says
+//! that they answered less than they do, and the samples after it are held against a noise that was none. So nothing is
+//! learnt of it, and what goes on in the filters is the output that was predicted, where that lies beyond the end, and
+//! the end where it does not: the output given what is known, but for the noise (J. Tobin, *Econometrica* 26 (1958)
+//! 24-36, has the regression with both).
 //!
 //! The stick is at its end where two samples one after another are alike, and none has been farther out;
 //! from then on one sample there is enough. The first time, the sample before is only known to be at the end
@@ -85,7 +85,7 @@ mod tests {
     #[test]
     fn a_stick_that_stands_farther_out_than_ever_is_at_its_end() {
         let ends = after(&[0.1, -0.4, 1.0]);
-        // Foretold beyond the end, this side of it, and farther than can be.
+        // Predicted beyond the end, this side of it, and farther than can be.
         let beyond = |u: f64, predicted: f64| ends.end(u).map(|end| ends.beyond(end, u, predicted));
         assert_eq!(beyond(1.0, 1.3), Some(1.3));
         assert_eq!(beyond(1.0, 0.2), Some(1.0));
@@ -109,7 +109,7 @@ mod tests {
         let ends = after(&[0.1, 1.0, 1.0, -0.3]);
         assert_eq!(ends.end(1.0), Some(Use::AtUpperLimit));
         assert_eq!(ends.end(-0.3), Some(Use::AtLowerLimit));
-        // Farther out than the end is no end.
+        // Farther out than the end is not an end.
         assert_eq!(after(&[0.1, 1.0, 1.0, 1.2, 0.0]).end(1.2), None);
     }
 

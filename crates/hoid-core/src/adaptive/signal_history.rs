@@ -1,7 +1,6 @@
 //! The last signals of a basis, the newest first, without moving them at each sample.
 //!
-//! A ring that is kept twice, one copy behind the other: wherever it begins, its numbers stand one after
-//! another.
+//! A ring that is kept twice, one copy after the other: wherever it starts, its numbers stand one after another.
 
 use super::{
     f64x2::F64x2,
@@ -50,14 +49,14 @@ impl SignalHistory {
 }
 
 impl PartialEq for SignalHistory {
-    /// Wherever the ring begins.
+    /// Wherever the ring starts.
     fn eq(&self, other: &Self) -> bool {
         self.newest_first() == other.newest_first()
     }
 }
 
 impl State for SignalHistory {
-    /// The newest first, wherever the ring begins: it is turned to its beginning.
+    /// The newest first, wherever the ring starts: it is turned to its start.
     fn visit(&mut self, each: &mut dyn FnMut(&mut f64)) {
         self.twice[..LARGEST_ORDER].rotate_left(self.newest);
         self.newest = 0;

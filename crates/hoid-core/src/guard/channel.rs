@@ -1,21 +1,20 @@
 //! One signal: what its next sample may be.
 //!
-//! **Prediction.** With `nabla x(t) = x(t) - x(t-1)`, the polynomial of degree j-1 through the last j
-//! samples goes on to a value from which x(t) differs by exactly `r_j(t) = nabla^j x(t)` (Newton's
-//! backward formula). The backward differences of order 1 to 4 are therefore the errors of holding
-//! the last sample, of a line, of a parabola and of a cubic, at one subtraction each. The order with
-//! the smallest scale is used: 1 for a signal like white noise behind one lag, 3 or 4 for a smooth
-//! one.
+//! **Prediction.** With `nabla x(t) = x(t) - x(t-1)`, the polynomial of degree j-1 through the last j samples goes on
+//! to a value from which x(t) differs by exactly `r_j(t) = nabla^j x(t)` (Newton's backward formula). The backward
+//! differences of order 1 to 4 are therefore the errors of holding the last sample, of a line, of a parabola and of a
+//! cubic, at one subtraction each. The order with the smallest scale is used: 1 for a signal like white noise after one
+//! lag, 3 or 4 for a smooth one.
 //!
 //! **Scale.** q_j is the 99 % quantile of `|r_j|`, by stochastic approximation in its logarithm (H.
 //! Robbins and S. Monro, *Annals of Mathematical Statistics* 22 (1951) 400-407):
 //!
 //! `q <- q (1 + g (1 - p))` where `|r| > q`, else `q <- q (1 - g p)`, with p = .01, g = .05.
 //!
-//! The size of an outlier does not enter: one sample moves q by 5 % whatever it is. A quantile in the
-//! tail, and not a median: people's u rests and moves by pulses, and its tails are what the limit
-//! must let pass. p_j is the 90 % quantile, in the same way with g = .02. Samples at which the signal
-//! stands still say nothing of how it moves: they enter neither.
+//! The size of an outlier does not enter: one sample moves q by 5 % whatever it is. A quantile in the tail, and not a
+//! median: people's u rests and moves by pulses, and its tails are what the limit must let pass. p_j is the 90 %
+//! quantile, in the same way with g = .02. Samples at which the signal stays constant say nothing of how it moves: they
+//! enter neither.
 //!
 //! **Outliers.** A sample is held back where `|r_j| > max(m_j q_j, floor)` with
 //!
@@ -68,14 +67,14 @@ pub struct ChannelGuard {
     known: usize,
     /// Quantiles; those of nothing are zero.
     quantiles: [f64; ORDERS],
-    /// Those further in, from which the tail is foretold.
+    /// Those further in, from which the tail is predicted.
     inner: [f64; ORDERS],
     /// Mean of the squares of the quotients of the two, and what they were averaged over.
     heavy: [f64; ORDERS],
     averaged: u32,
     /// True once outliers are looked for.
     watching: bool,
-    /// A first difference within which the signal stands still.
+    /// A first difference within which the signal stays constant.
     resting: f64,
     /// Order less one that is used.
     order: usize,
@@ -154,8 +153,8 @@ impl ChannelGuard {
         self.watching
     }
 
-    /// True for samples in a row, the first of them behind a jump, that move as the signal does: the mean
-    /// magnitude of their differences of the order in use is below that of a signal about three times as large.
+    /// True for samples in a row, the first of them after a jump, that move as the signal does: the mean magnitude of
+    /// their differences of the order in use is below that of a signal about three times as large.
     pub fn moves_as_usual(&self, samples: impl Iterator<Item = f64>) -> bool {
         let (mut past, mut count, mut sum) = ([0.0; ORDERS], 0, 0.0);
         for x in samples {
@@ -182,7 +181,7 @@ impl ChannelGuard {
         self.limit(0)
     }
 
-    /// A first difference within which the signal stands still.
+    /// A first difference within which the signal stays constant.
     pub fn set_resting(&mut self, difference: f64) {
         self.resting = difference;
     }
@@ -192,7 +191,7 @@ impl ChannelGuard {
         self.last
     }
 
-    /// The last difference where the signal is foretold by more than its last value, else zero.
+    /// The last difference where the signal is predicted by more than its last value, else zero.
     pub fn slope(&self) -> f64 {
         if self.order_in_use() > 0 {
             self.differences[0]
@@ -201,7 +200,7 @@ impl ChannelGuard {
         }
     }
 
-    /// True where the signal is foretold by more than its last value.
+    /// True where the signal is predicted by more than its last value.
     pub fn has_slope(&self) -> bool {
         self.order > 0
     }
@@ -234,7 +233,7 @@ impl ChannelGuard {
         if limit > self.floor { limit } else { self.floor }
     }
 
-    /// True for errors beyond the limit, and for those that are no numbers. Nothing is beyond it
+    /// True for errors beyond the limit, and for those that are not numbers. Nothing is beyond it
     /// while the quantiles, or a sample before, are not known.
     #[inline(always)]
     pub fn is_outlier(&self, errors: &[f64; ORDERS]) -> bool {

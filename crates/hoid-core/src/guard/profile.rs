@@ -8,13 +8,13 @@
 //!
 //! | what | rule | why |
 //! |---|---|---|
-//! | frozen e | `a_e1 <= A_e1/1000` in a block | the error of somebody who tracks never stands still |
+//! | frozen e | `a_e1 <= A_e1/1000` in a block | the error of somebody who tracks never stays constant |
 //! | frozen u | `a_u1 <= A_u1/1000` in three blocks in a row, but for a rest ([`super::resting`]) in which `a_eps` is at most twice its long-run value | a hand may rest |
 //! | idle | e and u each within a range of `M_c/20` in two blocks in a row | silence, with noise |
 //! | larger | `a_c1 > 5 A_c1` and `a_c3 > 5 A_c3` for e and u in two blocks in a row | both signals are what they were, times a factor |
 //! | rescaled | all four `a_cj/A_cj` of one channel above 3.5 and within a factor of 1.5 of each other, those of the other below 2, in two blocks in a row | another unit, a gain that was turned |
 //! | swapped | the sum over blocks of `d(own) - d(other) - 1`, at most 4 a block and never below 0, reaches 6 | e is as u was and u as e was; d is the sum over both channels of `\|log a_1/A_1\| + \|log a_3/A_3\|` |
-//! | misfit | `R = a_eps/min_j a_uj` is above 4 times its long-run value, and above 1.5, and a_eps above twice its own, in two blocks in a row | what u has been for the last samples foretells it better than the model does, which knows e too, and did not before |
+//! | misfit | `R = a_eps/min_j a_uj` is above 4 times its long-run value, and above 1.5, and a_eps above twice its own, in two blocks in a row | what u has been for the last samples predicts it better than the model does, which knows e too, and did not before |
 //!
 //! The sum for swapped channels is a one-sided CUSUM (E. S. Page, *Biometrika* 41 (1954) 100-115) of
 //! a difference that is negative for channels as they were and at most the distance of the two
@@ -29,8 +29,7 @@ pub const CHANNELS: usize = 2;
 const LEARNT: u32 = 10;
 /// Weight of a block thereafter.
 const WEIGHT: f64 = 1.0 / 60.0;
-/// Limits of the rules.
-/// Share of the usual mean difference up to which a signal stands still.
+/// Limits of the rules. Share of the usual mean difference up to which a signal stays constant.
 pub const STILL: f64 = 1e-3;
 const FROZEN_U_BLOCKS: u32 = 3;
 const IDLE: f64 = 0.05;
@@ -45,9 +44,9 @@ const SWAPPED: f64 = 6.0;
 /// What one block says at most.
 const MOST_EVIDENCE: f64 = 4.0;
 const MISFIT: f64 = 4.0;
-/// R below which no model foretells too little.
+/// R below which no model predicts too little.
 const LEAST_RATIO: f64 = 1.5;
-/// Growth of the innovations without which it is no misfit.
+/// Growth of the innovations without which it is not a misfit.
 const LEAST_GROWTH: f64 = 2.0;
 const MISFIT_BLOCKS: u32 = 2;
 /// Distance of a block that is as usual: four logarithms of four.
@@ -149,9 +148,9 @@ impl Block {
 /// What is wrong with a block.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Trouble {
-    /// e stands still.
+    /// e stays constant.
     FrozenInput,
-    /// u stands still.
+    /// u stays constant.
     FrozenOutput,
     /// e and u are nearly silent.
     Idle,
@@ -163,7 +162,7 @@ pub enum Trouble {
     RescaledOutput,
     /// e is as u was, and u as e was.
     Swapped,
-    /// The model foretells u worse than the past of u does.
+    /// The model predicts u worse than the past of u does.
     Misfit,
 }
 
@@ -327,8 +326,8 @@ impl Profile {
         }
     }
 
-    /// What is wrong with the means of a block, in the light of those before it; `rests` where u stands
-    /// still at its end as the person rests.
+    /// What is wrong with the means of a block, in the light of those before it; `rests` where u stays constant at its
+    /// end as the person rests.
     pub fn judge(&mut self, block: &Block, rests: bool) -> Option<Trouble> {
         if !self.is_known() {
             return None;
@@ -357,7 +356,7 @@ impl Profile {
         self.swapped = (self.swapped + evidence).clamp(0.0, 2.0 * SWAPPED);
         let limit = (MISFIT * self.ratio).max(LEAST_RATIO);
         let misfit = self.ratios >= LEARNT && block.ratio().is_some_and(|ratio| ratio > limit);
-        // Of somebody who rests the past foretells all, and the model need not be wrong.
+        // Of somebody who rests the past predicts all, and the model need not be wrong.
         let as_foretold = self.ratios < LEARNT || block.innovation <= LEAST_GROWTH * self.innovation;
         let misfit = misfit && !as_foretold;
         self.misfits = count(self.misfits, misfit);
@@ -382,7 +381,7 @@ impl Profile {
         }
     }
 
-    /// The least and the largest ratio of the differences of a channel to what is usual.
+    /// The least and the largest ratio of the differences of a channel to the default.
     fn ratios_of(&self, block: &Block, c: usize) -> [f64; 2] {
         let mut ends = [f64::INFINITY, 0.0];
         for (found, typical) in block.differences[c].iter().zip(&self.typical.differences[c]) {
@@ -398,7 +397,7 @@ impl Profile {
         for (c, typical) in of.into_iter().enumerate() {
             for j in [0, 2] {
                 let (found, typical) = (block.differences[c][j], self.typical.differences[typical][j]);
-                // Zero against zero is no difference.
+                // Zero against zero is not a difference.
                 let log = if found == typical {
                     0.0
                 } else {
@@ -438,7 +437,7 @@ mod tests {
         profile
     }
 
-    /// Squares that underflow: infinite innovations are no long-run value, and nothing panics after them.
+    /// Squares that underflow: infinite innovations are not a long-run value, and nothing panics after them.
     #[test]
     fn numbers_without_a_size_are_not_learnt() {
         let mut profile = known();
@@ -483,8 +482,7 @@ mod tests {
         }
     }
 
-    /// The stick stands where it rests and e goes on; not so where the person does what nobody foretold, or e
-    /// stands too.
+    /// The stick is where it rests and e goes on; not so where the person does what nobody predicted, or e stands too.
     #[test]
     fn a_rest_is_not_frozen_but_a_rest_that_does_not_fit_is() {
         let still = block([0.02, 0.0], [0.1, 1.1]);

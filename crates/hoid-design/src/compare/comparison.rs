@@ -22,7 +22,7 @@ pub struct PersonEstimate {
     pub value: f64,
     /// Its standard error.
     pub standard_error: Option<f64>,
-    /// Runs behind it.
+    /// Runs after it.
     pub runs: usize,
 }
 
@@ -66,7 +66,7 @@ pub struct Difference {
     pub estimate: Coefficient,
     /// Degrees of freedom of t.
     pub degrees_of_freedom: usize,
-    /// p beside all other differences of this comparison.
+    /// p next to all other differences of this comparison.
     pub p_adjusted: f64,
     /// Its size.
     pub effect_size: Option<EffectSize>,
@@ -184,7 +184,7 @@ impl Comparison {
     /// [`AnalysisError::NotAResult`] for a text that is none, is damaged, or is of another version.
     pub fn from_json(text: &str) -> Result<Self, AnalysisError> {
         let none = |found: String| AnalysisError::NotAResult { found };
-        let object: Value = serde_json::from_str(text).map_err(|error| none(format!("it is no JSON: {error}")))?;
+        let object: Value = serde_json::from_str(text).map_err(|error| none(format!("it is not JSON: {error}")))?;
         if object["kind"] != KIND {
             return Err(none(format!("its kind is {}, expected {KIND:?}", object["kind"])));
         }

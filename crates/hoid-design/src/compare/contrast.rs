@@ -4,8 +4,9 @@
 //!   that a second factor is averaged out. One contrast a person, and its mean over people: no assumption on how the conditions of
 //!   a person scatter together (sphericity) is left, and a mixed model of the balanced experiment says the same.
 //! - A factor **between** people: the mean over the conditions that they have, and the difference of two groups of people.
-//! - **Two factors within**: beside each of them their interaction, by how much the effect of the first differs between the
-//!   levels of the second. **One within, one between**: the effect of the first, compared between the groups.
+//! - **Two factors within**: next to each of them their interaction, by how much the effect of the first differs
+//!   between the levels of the second. **One within, one between**: the effect of the first, compared between the
+//!   groups.
 
 use std::collections::BTreeMap;
 
@@ -82,7 +83,7 @@ impl Resolved {
         let pool = if of_people { &subjects } else { &conditions };
         if let Some(other) = all.iter().find(|member| !pool.contains(member)) {
             return Err(bad(format!(
-                "{other} is no condition and nobody in this group: the conditions are {}, the people {}",
+                "{other} is not a condition and nobody in this group: the conditions are {}, the people {}",
                 conditions.join(", "),
                 subjects.join(", ")
             )));
@@ -339,7 +340,7 @@ mod tests {
         let people = [("P", "a"), ("P", "b"), ("Q", "a"), ("Q", "b")];
         for (factors, word) in [
             (&["display"][..], "levels are not known"),
-            (&["x:a;z"], "z is no condition"),
+            (&["x:a;z"], "z is not a condition"),
             (&["who:one=P;two=Q", "else:1=P;2=Q"], "one of them at a time"),
         ] {
             let error = of(&people, factors).unwrap_err().to_string();

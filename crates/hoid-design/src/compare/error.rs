@@ -15,7 +15,7 @@ pub enum CompareError {
         /// The least number of them.
         expected: usize,
     },
-    /// A value or an error that is no number.
+    /// A value or an error that is not a number.
     #[error("an estimate or its standard error is not finite, or negative: leave that person out")]
     NotFinite,
     /// Columns that cannot be told apart.

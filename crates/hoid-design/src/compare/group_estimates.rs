@@ -61,7 +61,7 @@ impl GroupEstimates {
         };
         if !place.is_dir() {
             let bytes = hoid_io::read_bytes(place).map_err(StudyError::Io)?;
-            let object = serde_json::from_slice(&bytes).map_err(|error| none(format!("it is no JSON: {error}")))?;
+            let object = serde_json::from_slice(&bytes).map_err(|error| none(format!("it is not JSON: {error}")))?;
             return Self::of_json(&object).map_err(none);
         }
         let path = place.join(MANIFEST);

@@ -6,7 +6,7 @@
 //!
 //! - **tau^2** maximises the restricted likelihood (D. A. Harville, *J. Am. Stat. Assoc.* 72 (1977) 320-338)
 //!   `l = -1/2 sum log(v_i + tau^2) - 1/2 log |X'W X| - 1/2 y'P y`, whose slope is `1/2 (y'P P y - tr P)`: the best
-//!   place of a grid, then the zero of the slope beside it. l may have two maxima where errors differ much.
+//!   place of a grid, then the zero of the slope next to it. l may have two maxima where errors differ much.
 //! - **The weights** are those of the tau^2 that maximises `l + log tau^2`, which is never zero (the idea of Y. Chung,
 //!   S. Rabe-Hesketh and I.-H. Choi, *Stat. Med.* 32 (2013) 4071-4089, who add `log tau`): with few people l is at its greatest at zero
 //!   by chance, and the one with the smallest error decides alone. Three people whose errors are .1, .3 and .5 and who
@@ -288,7 +288,7 @@ impl Model {
         let heights: Vec<f64> = grid.iter().map(|tau| height(*tau)).collect::<Option<_>>()?;
         let best = (0..grid.len()).max_by(|a, b| heights[*a].total_cmp(&heights[*b]))?;
         let rises = slope(grid[best])? > 0.0;
-        // At the edges nothing is beside it.
+        // At the edges nothing is next to it.
         if (best == 0 && !rises) || (best + 1 == grid.len() && rises) {
             return Some(grid[best]);
         }

@@ -184,7 +184,7 @@ pub(super) fn folder(uri: &str) -> Option<PathBuf> {
         return Some(PathBuf::from(uri));
     };
     let path = match rest.strip_prefix("//") {
-        // Behind the host, which is empty or this one.
+        // After the host, which is empty or this one.
         Some(rest) => rest.find('/').map_or("", |slash| &rest[slash..]),
         None => rest,
     };

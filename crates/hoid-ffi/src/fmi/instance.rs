@@ -32,7 +32,7 @@ pub(super) struct Instance {
     pub(super) settings: FmuSettings,
     pub(super) variables: Vec<FmuVariable>,
     pub(super) values: Vec<FmuStart>,
-    /// Texts as C wants them, by value reference; empty for what is no text.
+    /// Texts as C wants them, by value reference; empty for what is not a text.
     texts: Vec<CString>,
     first_output: usize,
     pub(super) phase: Phase,
@@ -146,10 +146,10 @@ impl Instance {
         Ok(())
     }
 
-    /// The experiment begins at this time, s.
+    /// The experiment starts at this time, s.
     pub fn begins_at(&mut self, start_s: f64) -> Done {
         if !start_s.is_finite() {
-            return Err(format!("the experiment begins at {start_s} s, expected a finite time"));
+            return Err(format!("the experiment starts at {start_s} s, expected a finite time"));
         }
         if self.phase != Phase::Setup {
             return Err("the experiment runs already".to_owned());
@@ -193,7 +193,7 @@ impl Instance {
             ));
         }
         if !(t_s >= self.end_s - OFF * ts && t_s.is_finite()) {
-            return Err(format!("the step begins at {t_s} s, expected {} s", self.end_s));
+            return Err(format!("the step starts at {t_s} s, expected {} s", self.end_s));
         }
         self.end_s = t_s + step_s;
         let time_of = |k: u64| self.start_s + k as f64 * ts;

@@ -38,7 +38,7 @@ impl Model {
         })
     }
 
-    /// Numbers beside the recursion, and its bytes. It does not change.
+    /// Numbers next to the recursion, and its bytes. It does not change.
     pub fn saved(&mut self) -> (Vec<f64>, Vec<u8>) {
         match self {
             Self::Tracker(tracker) => {
@@ -135,7 +135,7 @@ impl TrackerModel {
         }
         let prior = given.text("prior");
         let of_unit = prior == "fit";
-        // Methods that begin with the record have no prior.
+        // Methods that start with the record have no prior.
         if !of_unit && !["", "population"].contains(&prior) {
             options.insert("prior".to_owned(), prior.into());
         }

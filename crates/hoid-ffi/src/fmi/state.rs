@@ -1,10 +1,9 @@
 //! The state of an instance, to go back to it or to go on elsewhere with the same digits (FMI 2.0.4, section
 //! 2.1.8; FMI 3.0.1, section 2.2.10).
 //!
-//! A state in the hands of an importer is what it is serialised to (`packed`). The
-//! description is the token of the unit, where the instance is in its experiment and the values of all
-//! variables; the bytes are those of the tracker, or the numbers of the operator. Numbers of 64 bits stand in
-//! the description by their bits, for JSON has no NaN.
+//! A state in the hands of an importer is what it is serialised to (`packed`). The description is the token of the
+//! unit, where the instance is in its experiment and the values of all variables; the bytes are those of the tracker,
+//! or the numbers of the operator. Numbers of 64 bits are in the description by their bits, for JSON has no NaN.
 
 #![allow(missing_docs, non_snake_case, clippy::missing_safety_doc)]
 
@@ -243,7 +242,7 @@ macro_rules! states {
             let read = |_: &mut Instance| {
                 // SAFETY: by the contract of the interface.
                 let bytes = unsafe { list(bytes, size) }?;
-                opened(MAGIC, bytes).map_err(|_| "the bytes are no state, or were changed or cut".to_owned())?;
+                opened(MAGIC, bytes).map_err(|_| "the bytes are not a state, or were changed or cut".to_owned())?;
                 // SAFETY: by the contract of the interface.
                 unsafe { hand_over(bytes.to_vec(), state) }
             };

@@ -1,18 +1,17 @@
 //! Initial states of a record, eliminated exactly.
 //!
-//! What a record does not say about its own past enters the residuals linearly: the nf past values
-//! of w through the free responses of `1/F` (as `-(D/C) h`, h the impulse response of `1/F`), the
-//! nc past innovations through those of `1/C`. With G the matrix of these responses and `G = Q R`,
-//! the states of least squares are `x = -R^-1 Q' eps_0` and the residuals `eps = (I - Q Q') eps_0`.
-//! The responses die away, so that Q is short beside the record. Source: G. H. Golub and V.
-//! Pereyra, *SIAM J. Numer. Anal.* 10 (1973) 413-432.
+//! What a record does not say about its own past enters the residuals linearly: the nf past values of w through the
+//! free responses of `1/F` (as `-(D/C) h`, h the impulse response of `1/F`), the nc past innovations through those of
+//! `1/C`. With G the matrix of these responses and `G = Q R`, the states of least squares are `x = -R^-1 Q' eps_0` and
+//! the residuals `eps = (I - Q Q') eps_0`. The responses die away, so that Q is short compared with the record. Source:
+//! G. H. Golub and V. Pereyra, *SIAM J. Numer. Anal.* 10 (1973) 413-432.
 //!
 //! With a stationary past ([`crate::criterion::stationary_noise`]) the states of the noise model
 //! have a known covariance `sigma^2 L L'`: they are `L z` with z of variance sigma^2, and z counts
 //! as further residuals. G then has the rows `[I; G L]` for them.
 //!
-//! A level of u, the constant that is no response to e, enters as linearly, through `-(D/C) 1`, and is
-//! eliminated with the states. It does not die away: its basis vector is as long as the record.
+//! A level of u, the constant that is not a response to e, enters as linearly, through `-(D/C) 1`, and is eliminated
+//! with the states. It does not die away: its basis vector is as long as the record.
 
 use hoid_core::filter::{SecondOrder, divide_in_place};
 
@@ -199,7 +198,7 @@ impl InitialStateResponses {
                     .iter()
                     .all(|x| x.abs() < DEAD)
         };
-        // A basis vector has the size one, an impulse response begins with one.
+        // A basis vector has the size one, an impulse response starts with one.
         self.h.len() < rows && self.basis().all(dead)
     }
 

@@ -35,8 +35,8 @@
 //!
 //! **Weights** multiply the squared residuals; they serve the robust loss.
 //!
-//! **A long record** passes span by span behind its first part ([`pass`]), so that a fit needs no
-//! memory beside the record.
+//! **A long record** passes span by span after its first part ([`pass`]), so that a fit needs no memory compared with
+//! the record.
 //!
 //! | module | what it holds |
 //! |---|---|

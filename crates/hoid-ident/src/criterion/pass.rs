@@ -6,12 +6,11 @@
 //! samples of the span before in front of it. Nothing then grows with the record, and a sample
 //! costs the same in a long one.
 //!
-//! The initial states act on the beginning alone. Their responses must have died away within the
-//! head
+//! The initial states act on the start alone. Their responses must have died away within the head
 //! ([`InitialStateResponses::have_died`](crate::criterion::initial_state_responses::InitialStateResponses::have_died));
-//! where a pole is so near the circle that they have not, the record is passed whole. So it is with
-//! weights, of which there is one a sample, and with a stationary past, whose columns are whitened
-//! one by one. The sums differ from those over the whole by rounding alone.
+//! where a pole is so near the circle that they have not, the record is passed whole. So it is with weights, of which
+//! there is one a sample, and with a stationary past, whose columns are whitened one by one. The sums differ from those
+//! over the whole by rounding alone.
 
 use std::ops::Range;
 
@@ -98,7 +97,7 @@ impl Criterion<'_> {
         Some(states)
     }
 
-    /// The signals of the next span, behind their last samples, which stand in front.
+    /// The signals of the next span, after their last samples, which are in front.
     fn next_span(
         &self,
         parts: &Polynomials<'_>,

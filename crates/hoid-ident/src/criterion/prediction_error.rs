@@ -10,7 +10,7 @@ use crate::linalg::products::variance;
 pub(crate) struct Data<'a> {
     pub e: &'a [f64],
     pub u: &'a [f64],
-    /// Whether u has a constant that is no response to e, an unknown as the initial states are.
+    /// Whether u has a constant that is not a response to e, an unknown as the initial states are.
     pub level: bool,
 }
 

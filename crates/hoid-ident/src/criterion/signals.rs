@@ -81,7 +81,7 @@ impl Criterion<'_> {
         states
     }
 
-    /// `w = B s` and `v = A u - w` of these samples, the first of which stands at `from` in the
+    /// `w = B s` and `v = A u - w` of these samples, the first of which is at `from` in the
     /// workspace.
     pub(super) fn response(
         &self,

@@ -389,7 +389,7 @@ fn long_records_pass_span_by_span_to_the_same_sums() {
                 for (a, b) in residuals.iter().zip(c.residuals_of(&theta, 0, &mut ws)) {
                     assert!((a - b).abs() < 1e-12, "{initial:?} {orders}: {a} and {b}");
                 }
-                // Each product beside the size that it can have.
+                // Each product next to the size that it can have.
                 let size = |i: usize| whole.gram[i * p + i].sqrt();
                 for i in 0..p {
                     let scale = size(i) * whole.sum_of_squares.sqrt();

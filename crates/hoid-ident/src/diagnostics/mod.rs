@@ -1,7 +1,7 @@
 //! What speaks for and against a result.
 //!
-//! Each rule is one observation with its own kind ([`hoid_model::Finding`]), and the
-//! [`hoid_model::Verdict`] follows from them. The limits stand where they are used.
+//! Each rule is one observation with its own kind ([`hoid_model::Finding`]), and the [`hoid_model::Verdict`] follows
+//! from them. The limits are where they are used.
 //!
 //! | kind | what was observed |
 //! |---|---|
@@ -26,7 +26,7 @@
 //! | `operator` | gains, poles and delay of an operator |
 //! | `operator_step` | what a stretch of data says against an operator |
 //! | `second_opinion` | fits to records that no single sample can carry |
-//! | `whitened` | least squares behind an autoregression, for those that need one |
+//! | `whitened` | least squares after an autoregression, for those that need one |
 //! | `fit`, `grey_box`, `sigmoid` | the verdict of each kind of fit |
 
 pub(crate) mod constancy;

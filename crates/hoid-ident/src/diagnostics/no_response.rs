@@ -1,9 +1,9 @@
 //! Whether u responds to e at all.
 //!
-//! A search over forms, delays and orders finds a response in any two records; what it found says little of
-//! whether there is one. The question is asked beforehand, of all forms at once. Both channels are whitened by
-//! an autoregression each, so that nothing slow counts for many samples. At the frequencies `omega_k` of the record up to
-//! [`HIGHEST_RAD_S`] the whitened output is regressed on a gain, a lead and a lag of e behind a usual neuromuscular
+//! A search over forms, delays and orders finds a response in any two records; what it found says little of whether
+//! there is one. The question is asked beforehand, of all forms at once. Both channels are whitened by an
+//! autoregression each, so that nothing slow counts for many samples. At the frequencies `omega_k` of the record up to
+//! [`HIGHEST_RAD_S`] the whitened output is regressed on a gain, a lead and a lag of e after a usual neuromuscular
 //! system and a delay,
 //!
 //! `U_k = (A_u/A_e) N e^{-j omega tau} (b_1 + b_2 j omega + b_3/(j omega + a)) E_k + R_k`,
@@ -11,8 +11,8 @@
 //! b real, and the share of the power of U that this explains, the largest over delays of [`DELAYS_S`], is T. Records
 //! of the same spectra without a relation have the phases of E drawn at random (J. Theiler et al., *Physica D* 58
 //! (1992) 77-94); T of [`SURROGATES`] of them is what a search of this kind finds in nothing. Where u does not depend
-//! on e, T is one more draw: the probability that it exceeds all is 1/([`SURROGATES`] + 1), whatever the spectra are. Only
-//! what e did before counts, so that an e that answers to u alone is no response. Several records share b.
+//! on e, T is one more draw: the probability that it exceeds all is 1/([`SURROGATES`] + 1), whatever the spectra are.
+//! Only what e did before counts, so that an e that answers to u alone is not a response. Several records share b.
 
 use std::f64::consts::{PI, TAU};
 
@@ -86,7 +86,7 @@ struct Spectra {
     delays: Vec<Vec<Complex64>>,
 }
 
-/// Of records of a person; `None` where there is too little, or something is no number or does not move.
+/// Of records of a person; `None` where there is too little, or something is not a number or does not move.
 pub fn response(records: &[Record]) -> Option<Response> {
     let all: Option<Vec<Spectra>> = records.iter().map(Spectra::of).collect();
     let all = all?;
@@ -190,7 +190,7 @@ impl Spectra {
     }
 }
 
-/// The thinned channel behind its own autoregression, and its coefficients.
+/// The thinned channel after its own autoregression, and its coefficients.
 fn whitened(channel: &[f64], thin: usize) -> Option<(Vec<f64>, Vec<f64>)> {
     // The mean of what is left out holds what is faster.
     let mut thinned: Vec<f64> = (channel.chunks_exact(thin)).map(mean).collect();

@@ -1,7 +1,7 @@
 //! What a stretch of data says against an operator that was found otherwise: one step towards its own fit.
 //!
-//! The operator stands still, a noise model `D v = eps` of order [`NOISE`] is fitted to what it leaves of
-//! u, and with `psi = -d eps/d eta` for `eta = [K_e, K_e_dot, omega_nm, zeta_nm, tau_e]`
+//! The operator stays constant, a noise model `D v = eps` of order [`NOISE`] is fitted to what it leaves of u, and with
+//! `psi = -d eps/d eta` for `eta = [K_e, K_e_dot, omega_nm, zeta_nm, tau_e]`
 //!
 //! `delta = (psi' psi)^-1 psi' eps`
 //!
@@ -76,7 +76,7 @@ pub fn operator_step(operator: &OperatorParameters, record: &Record) -> Option<[
     };
     let fit = estimator.fit(std::slice::from_ref(record)).ok()?;
     let (theta, first) = (fit.model().theta(), first_residual(&orders, fit.initial_state()));
-    // Coefficients of B stand first, those of F last.
+    // Coefficients of B are first, those of F last.
     let places = [0, 1, 2, theta.len() - 2, theta.len() - 1];
     let mut workspace = Workspace::of_thread();
     let mut scores = |_: usize, data: Data<'_>| {

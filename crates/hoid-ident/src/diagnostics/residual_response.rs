@@ -41,8 +41,8 @@ pub struct ResidualResponse {
     pub share: f64,
 }
 
-/// Tests whether columns, all as long as e and u, are all that there is of a response of u to e in samples
-/// `from..`. The level need not be among them. `None` where there is too little, or something is no number.
+/// Tests whether columns, all as long as e and u, are all that there is of a response of u to e in samples `from..`.
+/// The level need not be among them. `None` where there is too little, or something is not a number.
 pub fn residual_response(
     columns: &[Vec<f64>],
     e: &[f64],

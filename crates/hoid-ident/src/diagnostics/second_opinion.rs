@@ -23,7 +23,7 @@ use crate::{
     faults::{PERIOD_S, held, without_slow},
 };
 
-/// Periods of the slowest pole of a system that are slow beside it.
+/// Periods of the slowest pole of a system that are slow compared with it.
 const SLOW_PERIODS: f64 = 10.0;
 /// Standard errors by which two fits differ.
 const DIFFERENT: f64 = 3.0;
@@ -108,7 +108,7 @@ pub fn of_polynomials(
     })
 }
 
-/// What is slow beside a system: the periods of a person, or ten of its slowest pole.
+/// What is slow compared with a system: the periods of a person, or ten of its slowest pole.
 fn slow_period_s(fit: &Fit) -> f64 {
     let poles = fit.roots();
     let poles = poles.iter().filter(|root| matches!(root.polynomial, 'a' | 'f'));
@@ -137,8 +137,8 @@ pub fn of_grey_box(
     })
 }
 
-/// Of an operator of the family: its form and the orders of its noise model stay. A fit at the lines of a
-/// recorded excitation stands beside it already, and knows nothing of what is slow.
+/// Of an operator of the family: its form and the orders of its noise model stay. A fit at the lines of a recorded
+/// excitation is next to it already, and knows nothing of what is slow.
 pub fn of_family(
     estimator: &FamilyEstimator,
     fit: &FamilyFit,

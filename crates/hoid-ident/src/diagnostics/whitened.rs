@@ -1,4 +1,4 @@
-//! Least squares behind an autoregression: what remains of u when some columns are taken out, white.
+//! Least squares after an autoregression: what remains of u when some columns are taken out, white.
 //!
 //! Of `u = X b + level + v`, `D v = eps`, noise model of order [`NOISE`] and b in turn, residuals beyond
 //! so many standard deviations limited to it where a limit is asked for.
@@ -29,14 +29,14 @@ pub(super) struct Whitened {
     pub v: DVector<f64>,
     /// `d_1 ..` of its noise model.
     pub d: Vec<f64>,
-    /// Columns behind the noise model, the level last; [`NOISE`] rows fewer.
+    /// Columns after the noise model, the level last; [`NOISE`] rows fewer.
     pub x: DMatrix<f64>,
     /// Residuals, limited.
     pub eps: DVector<f64>,
 }
 
 impl Whitened {
-    /// Of these samples of columns and u; `None` where something is no number, or columns are not independent, or
+    /// Of these samples of columns and u; `None` where something is not a number, or columns are not independent, or
     /// nothing but rounding is left. Residuals are limited to `limit` standard deviations.
     pub fn of(columns: &[Vec<f64>], u: &[f64], samples: &[usize], limit: f64) -> Option<Self> {
         let (n, p) = (samples.len(), columns.len() + 1);
@@ -99,7 +99,7 @@ fn limited(x: &DMatrix<f64>, y: &DVector<f64>, limit: f64) -> Option<DVector<f64
 
 fn clipped(eps: &DVector<f64>, limit: f64) -> DVector<f64> {
     let most = limit * (eps.norm_squared() / eps.len() as f64).sqrt();
-    // No limit for residuals that are all zero is no number; min and max leave it out.
+    // No limit for residuals that are all zero is not a number; min and max leave it out.
     eps.map(|v| v.max(-most).min(most))
 }
 

@@ -45,7 +45,7 @@ pub enum AgreementMethod {
 }
 
 impl AgreementMethod {
-    /// As it stands in a sentence.
+    /// As it is in a sentence.
     pub fn words(self) -> &'static str {
         match self {
             Self::PredictionError => "the prediction error fit",

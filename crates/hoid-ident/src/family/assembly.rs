@@ -43,14 +43,14 @@ pub(super) struct AtLines<'d> {
     pub why_none: Option<String>,
 }
 
-/// The search of a form that counts beside the one in front.
+/// The search of a form that counts next to the one in front.
 pub(super) struct Beside<'a> {
     pub fit: PredictionFit<'a>,
     pub lines: Option<LineFit>,
     pub weight: f64,
 }
 
-/// The search of the form in front, and what its result is made from beside it.
+/// The search of the form in front, and what its result is made from next to it.
 pub(super) struct Chosen<'p, 'a> {
     pub fit: PredictionFit<'a>,
     pub weight: f64,
@@ -189,7 +189,7 @@ impl<'a> Chosen<'_, 'a> {
         })
     }
 
-    /// The fit with the lines beside it, where there are lines, noise, and one operator of all records.
+    /// The fit with the lines next to it, where there are lines, noise, and one operator of all records.
     fn joint(
         &self,
         fit: &PredictionFit<'a>,
@@ -294,7 +294,7 @@ fn add_bias(
     covariances.widen(fit, &mut errors.profiles);
 }
 
-/// All methods beside each other, over the coordinates whose parameters are determined and owe
+/// All methods next to each other, over the coordinates whose parameters are determined and owe
 /// little to the prior; `None` for fewer than two with errors.
 fn agreement_of(
     fit: &PredictionFit<'_>,
@@ -443,7 +443,7 @@ fn coherent_share(describing: &DescribingFunction) -> Option<f64> {
     all.filter(|all| !all.is_empty()).map(|all| mean(&all))
 }
 
-/// Whether a form beside the one in front knows the response: one whose parameters make up for each other, the data
+/// Whether a form next to the one in front knows the response: one whose parameters make up for each other, the data
 /// leave as open as if they were fewer, and their errors say nothing.
 fn knows_the_response(of: &OperatorInForm) -> bool {
     let errors = response_errors(&of.operator, of.covariance.as_deref());

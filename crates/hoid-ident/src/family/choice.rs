@@ -1,4 +1,4 @@
-//! Which forms the data leave, and which of them stands in front.
+//! Which forms the data leave, and which of them is in front.
 //!
 //! Each form has Akaike's criterion, `chi^2 + 2 p` at the lines of an excitation, or `n ln V/kappa + 2 p` of the
 //! prediction error, kappa the inflation of variances; with little noise Schwarz's ([`super::comparison`]). Estimates are averaged over forms by their weights
@@ -30,7 +30,7 @@ pub struct FormFigures {
     pub converged: bool,
 }
 
-/// Difference of Akaike's criterion that is no evidence.
+/// Difference of Akaike's criterion that is not evidence.
 const NO_EVIDENCE: f64 = 2.0;
 /// Weight below which a form is left out: its part in a mean is less than its error.
 const LEAST_WEIGHT: f64 = 0.02;

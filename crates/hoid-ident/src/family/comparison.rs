@@ -32,7 +32,7 @@ pub(super) struct Tried<'a> {
     pub fit: Result<PredictionFit<'a>, IdentError>,
 }
 
-/// What all forms are worth, and which of them stands in front.
+/// What all forms are worth, and which of them is in front.
 pub(super) struct Comparison {
     /// Place of the form in front; `None` where none could be fitted.
     pub front: Option<usize>,

@@ -39,7 +39,7 @@ pub(super) const BAND_RAD_S: [f64; 5] = [0.7, 1.3, 2.4, 4.3, 8.0];
 pub(super) struct Covariances {
     pub clustered: Vec<f64>,
     pub model_based: Vec<f64>,
-    /// Variances that single elements have besides. They are no part of the covariance: the
+    /// Variances that single elements have besides. They are not a part of the covariance: the
     /// response is known better than they are, since the elements err together.
     pub besides: Vec<f64>,
 }
@@ -63,7 +63,7 @@ impl Covariances {
     /// Errors are to first order, and the other estimate may be far along a ridge of the criterion,
     /// as a gain and a lag that grow together are: `J d`, J the gradient of the response, is then no
     /// difference of responses. There the [difference](responding) that explains that of the
-    /// responses stands in place of d.
+    /// responses is in place of d.
     pub fn add_bias(&mut self, fit: &PredictionFit<'_>, other: &[f64]) {
         let p = fit.parameters();
         let mut difference = vec![0.0; p];
@@ -128,8 +128,8 @@ const MOST_OVERSTATED: f64 = 2.0;
 /// Part of its diagonal that makes `J' J` regular.
 const RIDGE: f64 = 1e-9;
 
-/// The least squares solution of `J d = H - H_other` over the band of manual control and an octave beside it,
-/// relative to |H|; `None` where the differences of the elements explain it, or elements belong to single records.
+/// The least squares solution of `J d = H - H_other` over the band of manual control and an octave next to it, relative
+/// to |H|; `None` where the differences of the elements explain it, or elements belong to single records.
 fn responding(fit: &PredictionFit<'_>, other: &[f64], differences: &[(usize, f64)]) -> Option<Vec<(usize, f64)>> {
     let layout = fit.layout();
     let places = &layout.positions(0)[..layout.coordinates()];

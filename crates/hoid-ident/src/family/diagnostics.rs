@@ -42,7 +42,7 @@ pub(super) struct DiagnosticInputs<'a> {
     pub parameters: &'a [Parameter],
     pub prior: &'a OperatorPrior,
     pub residuals: ResidualMeasures,
-    /// Share of the power of u that is left, where it is no noise.
+    /// Share of the power of u that is left, where it is not noise.
     pub noise_free: Option<f64>,
     /// A doubt where the person is not the same throughout.
     pub not_constant: Option<Finding>,
@@ -191,7 +191,7 @@ fn determined(judged: &DiagnosticInputs<'_>, all: &mut Vec<Finding>) {
             true => "tau_e is determined by the prior alone".to_owned(),
             false => "tau_e is not determined".to_owned(),
         };
-        // As with other parameters: it has no digits, and what is reported beside it stands.
+        // As with other parameters: it has no digits, and what is reported next to it stands.
         all.push(Finding::note("delay", words));
     }
     if let Some((t_i, (low, high))) = find("T_I").and_then(|t| Some((t, t.interval?)))
@@ -284,7 +284,7 @@ fn methods(judged: &DiagnosticInputs<'_>, all: &mut Vec<Finding>) {
     if let Some(why) = failed {
         all.push(Finding::note(
             "no-instruments",
-            format!("no RIV-BJ beside the other methods: {why}"),
+            format!("no RIV-BJ next to the other methods: {why}"),
         ));
     }
     if let Some(free) = judged.free_model

@@ -32,7 +32,7 @@ const MOST_NOISE_PAIRS: usize = 60;
 /// Why nothing is fitted to the lines where there is little noise.
 const TOO_LITTLE_NOISE: &str = "there is less noise than leakage";
 
-/// Where the searches of a form begin.
+/// Where the searches of a form start.
 struct Start {
     form: Form,
     /// The fit at the lines.
@@ -60,7 +60,7 @@ impl FamilyEstimator {
     }
 
     /// As [`FamilyEstimator::fit`], with a describing function that was made elsewhere, or the
-    /// reason why there is none: of other spans of the same runs, or with an offset that is no
+    /// reason why there is none: of other spans of the same runs, or with an offset that is not a
     /// whole number of samples.
     ///
     /// # Errors
@@ -165,7 +165,7 @@ impl FamilyEstimator {
             return Err(IdentError::BadOption {
                 option: "the forms of the operator".to_owned(),
                 found: self.forms.iter().map(|f| f.name()).collect::<Vec<_>>().join(", "),
-                expected: "a form that is no pure derivative without neuromuscular dynamics: gain, lag or lead-lag"
+                expected: "a form that is not a pure derivative without neuromuscular dynamics: gain, lag or lead-lag"
                     .to_owned(),
             });
         }

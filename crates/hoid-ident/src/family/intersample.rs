@@ -4,7 +4,7 @@
 //! |---|---|---|---|
 //! | `zoh` | is held: a simulation or a display of the same rate | `sin(x)/x e^{-jx}` | as simulated |
 //! | `foh` | runs straight: logged from what is faster or continuous | `(sin(x)/x)^2` | Ts/2 longer |
-//! | `auto` | is smooth, and the delay is that of a held one | `(sin(x)/x)^2 e^{-jx}` | as behind a hold |
+//! | `auto` | is smooth, and the delay is that of a held one | `(sin(x)/x)^2 e^{-jx}` | as after a hold |
 //!
 //! with `x = omega Ts/2` (K. J. Astrom and B. Wittenmark, *Computer-Controlled Systems*, 1997, sections 3.2 and 3.4).
 //! `foh` and `auto` are one model with two names of its delay, so that no data decide between them. `zoh` differs from

@@ -1,4 +1,4 @@
-//! The prediction error fit with the lines of the excitation as measurements of the response beside it.
+//! The prediction error fit with the lines of the excitation as measurements of the response next to it.
 //!
 //! In a closed loop the prediction error fit is biased by as much as its noise model is wrong; the fit at the lines is
 //! not, and has larger errors. With H_P and H_L their responses, V_P and V_L the variances of these, the difference
@@ -41,7 +41,7 @@ const FEWEST_RUNS: usize = 3;
 /// Largest part of the way to the lines.
 const LARGEST_SHARE: f64 = 0.9;
 
-/// The fit with the lines beside it; `None` where both agree, or it has no end.
+/// The fit with the lines next to it; `None` where both agree, or it has no end.
 pub(super) fn with_lines<'a>(
     prediction: &Prediction<'a>,
     fit: &PredictionFit<'a>,

@@ -196,7 +196,7 @@ fn distance_from_the_limit(
 mod tests {
     use super::*;
 
-    /// 2.5/s behind a gain with a neuromuscular resonance at 9 rad/s: |L| is one at three frequencies.
+    /// 2.5/s after a gain with a neuromuscular resonance at 9 rad/s: |L| is one at three frequencies.
     fn resonant(omega: f64) -> Complex64 {
         let s = Complex64::new(0.0, omega);
         Complex64::from_polar(1.0, -0.15 * omega) * 81.0 / (s * s + s + 81.0)

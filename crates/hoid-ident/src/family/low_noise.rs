@@ -1,11 +1,11 @@
 //! Recordings with little noise, or none: simulations, and what anybody tries first.
 //!
-//! The frequency response from which searches begin is off by more than such noise, so that an autoregression of what it
-//! leaves of u would model the operator in place of the noise. Where a form leaves little, all of them are searched by
-//! output error first, `u = c + Y e + v` with v taken for white and without a prior (L. Ljung, *System Identification*,
-//! 1999, section 8.4: it is consistent in a closed loop where v vanishes): its end is near the truth, and from there the
-//! noise is modelled. Without any noise it is the truth, to the digits of the data, also of what the error does between
-//! its samples ([`Intersample`]).
+//! The frequency response from which searches start is off by more than such noise, so that an autoregression of what
+//! it leaves of u would model the operator in place of the noise. Where a form leaves little, all of them are searched
+//! by output error first, `u = c + Y e + v` with v taken for white and without a prior (L. Ljung, *System
+//! Identification*, 1999, section 8.4: it is consistent in a closed loop where v vanishes): its end is near the truth,
+//! and from there the noise is modelled. Without any noise it is the truth, to the digits of the data, also of what the
+//! error does between its samples ([`Intersample`]).
 //!
 //! **Level.** The means that were taken out of e and u are those of a steady state, and a record is none: what a response
 //! owes to the time before its first sample stays in u as a constant. Where a mean was taken out, c is an unknown of each
@@ -27,7 +27,7 @@ const LITTLE: f64 = 5e-3;
 /// Share below which what is left is rounding, which no search is to go on for.
 const ROUNDING: f64 = 1e-25;
 /// Points of a grid from which a form is searched that has not been found without noise, and how often: the second time
-/// beside the best that the first has found.
+/// next to the best that the first has found.
 const MORE_STARTS: usize = 4;
 const ROUNDS: usize = 2;
 /// Share that one course of the error leaves over that of another which decides. Of an error that is continuous the
@@ -246,8 +246,8 @@ mod tests {
         FamilyOperator::new(Form::Lead, true, &X).unwrap()
     }
 
-    /// 25 s at 40 Hz of an error that is not zero in the mean, with this much white noise, begun away from rest and with a
-    /// level of u.
+    /// 25 s at 40 Hz of an error that is not zero in the mean, with this much white noise, started away from rest and
+    /// with a level of u.
     fn record(model: &HeldFamily, noise: f64) -> Record {
         let mut state = 7_u64;
         let mut uniform = move || {

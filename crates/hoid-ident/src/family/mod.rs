@@ -1,10 +1,9 @@
 //! Operators of recorded people: the family of operators with errors that hold.
 //!
-//! `u = Y e + (C/D) eps` with Y an operator of the family ([`hoid_model::operator_family`]). People
-//! differ from a simulation in three ways that decide whether their parameters mean anything: they
-//! integrate slow errors (a lag that the operator must have), their remnant is no filter of first
-//! order (the noise model must be rich), and they vary (error bars must come from the scatter
-//! between runs). What the data do not determine is said to be so.
+//! `u = Y e + (C/D) eps` with Y an operator of the family ([`hoid_model::operator_family`]). People differ from a
+//! simulation in three ways that decide whether their parameters mean anything: they integrate slow errors (a lag that
+//! the operator must have), their remnant is not a filter of first order (the noise model must be rich), and they vary
+//! (error bars must come from the scatter between runs). What the data do not determine is said to be so.
 //!
 //! 1. The describing function at the lines of a periodic excitation, where one was recorded
 //!    ([`crate::frequency`]); each form is fitted to it ([`LineFit`]). Without one, the response of
@@ -16,15 +15,15 @@
 //!    leave ([`WeighedForm`]).
 //! 4. Errors by the scatter of runs or blocks; intervals in coordinates that are nearly normal, by
 //!    profile likelihood where they are not ([`Parameter`]).
-//! 5. The operator by refined instrumental variables, where an excitation was recorded
-//!    ([`InstrumentalFit`]); all methods beside each other ([`Agreement`]), a free model of the same orders
-//!    ([`FreeModel`]), and the [`Verdict`](hoid_model::Verdict) on all of it.
+//! 5. The operator by refined instrumental variables, where an excitation was recorded ([`InstrumentalFit`]); all
+//!    methods next to each other ([`Agreement`]), a free model of the same orders ([`FreeModel`]), and the
+//!    [`Verdict`](hoid_model::Verdict) on all of it.
 //!
 //! | file | what it holds |
 //! |---|---|
 //! | `options` | [`FamilyEstimator`]: what may be chosen, by fields and by names |
 //! | `estimator` | the searches of all forms |
-//! | `comparison` | what each form is worth beside the others |
+//! | `comparison` | what each form is worth next to the others |
 //! | `assembly` | from the searches of the forms that count to the result |
 //! | `estimated` | the operator of a record with its errors |
 //! | `result` | [`FamilyFit`] |
@@ -39,12 +38,12 @@
 //! | `noise` | autoregressions: starts and orders of the noise model |
 //! | `prediction` | the prediction error fit of one form |
 //! | `prediction_fit` | what its search found |
-//! | `joint` | the prediction error fit with the lines beside it |
+//! | `joint` | the prediction error fit with the lines next to it |
 //! | `clusters`, `covariances` | runs or blocks; the covariance by them |
 //! | `jackknife` | covariances from estimates without each part, and from a prior |
 //! | `sensitivity` | what the estimate owes to the choice of a noise model |
 //! | `profile` | intervals by profile likelihood |
-//! | `choice` | the weights of the forms, and which of them stands in front |
+//! | `choice` | the weights of the forms, and which of them is in front |
 //! | `mixture` | an estimate over several forms |
 //! | `agreement` | do methods agree |
 //! | `intersample` | what the error does between its samples |

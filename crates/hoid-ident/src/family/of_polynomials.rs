@@ -4,7 +4,7 @@
 //! The poles say which is the lag and which are the neuromuscular system ([`super::pole_reading`]).
 //!
 //! The exact model of an operator ([`FamilyOperator::hold`]) has fewer parameters than B has
-//! coefficients, so that estimated polynomials lie beside it. The operator is the one whose exact
+//! coefficients, so that estimated polynomials lie next to it. The operator is the one whose exact
 //! model M(x) is nearest to the response H of the polynomials over the band of manual control,
 //!
 //! `min_x sum_j |H(omega_j) - M(omega_j, x)|^2 / |H(omega_j)|^2`,
@@ -451,7 +451,7 @@ mod tests {
         assert_eq!(found.real_poles.len(), 1);
         assert_eq!(found.real_poles[0].role, PoleRole::Lag);
         assert!((found.real_poles[0].rate - 0.12).abs() < 1e-6);
-        // An overdamped neuromuscular system: three real poles, of which a lead of .6 s beside a
+        // An overdamped neuromuscular system: three real poles, of which a lead of .6 s next to a
         // slow lag leaves one reading. Any reading has the same response: the first that is exact.
         let x = [5.0, 0.6, 0.12, 11.0_f64.ln(), 1.3_f64.ln(), 0.137];
         let overdamped = FamilyOperator::new(Form::LeadLag, true, &x).unwrap();

@@ -194,7 +194,7 @@ impl Crossover {
 pub fn followed_margin_deg(open_loop: impl Fn(f64) -> Complex64, crossover_rad_s: f64) -> f64 {
     let at = |i: usize| RANGE_RAD_S.0 * (crossover_rad_s / RANGE_RAD_S.0).powf(i as f64 / POINTS as f64);
     let mut last = open_loop(RANGE_RAD_S.0.min(crossover_rad_s));
-    // A double integrator begins at -180 deg, on either side of the cut.
+    // A double integrator starts at -180 deg, on either side of the cut.
     let mut phase = last.arg();
     if phase > FRAC_PI_3 {
         phase -= TAU;

@@ -13,7 +13,7 @@ use crate::{
 
 /// Highest order of the noise model.
 pub const HIGHEST_NOISE_ORDER: usize = 24;
-/// Highest nd that is searched beside an nc: an ARMA model needs few.
+/// Highest nd that is searched next to an nc: an ARMA model needs few.
 const HIGHEST_BESIDE_NC: usize = 8;
 
 /// What is to be estimated of a person, and how.
@@ -39,9 +39,9 @@ pub struct FamilyEstimator {
     pub period_s: Option<f64>,
     /// Coordinates that each record has for itself; all others are common to the records.
     pub individual: Vec<Coordinate>,
-    /// What the gain of a person varies by from one run to the next, as a part of it: it stands in
-    /// the error bars of fewer than five records, whose blocks cannot show it. Default 0.06: between
-    /// 4 and 9 % in repeated runs of three people, each left out in turn.
+    /// What the gain of a person varies by from one run to the next, as a part of it: it is in the
+    /// error bars of fewer than five records, whose blocks cannot show it. Default 0.06: between 4
+    /// and 9 % in repeated runs of three people, each left out in turn.
     pub run_to_run: f64,
     /// What is taken out of e and u of each record beforehand: an operator with a lag integrates an
     /// offset. Default their mean.
@@ -77,8 +77,7 @@ impl Default for FamilyEstimator {
 }
 
 impl FamilyEstimator {
-    /// With orders nc and nd of the noise that are named; an nd that is not is searched, beside an nc from 0 to
-    /// 8.
+    /// With orders nc and nd of the noise that are named; an nd that is not is searched, next to an nc from 0 to 8.
     ///
     /// # Errors
     /// [`IdentError::BadOption`] for another order, and for one that is too high.

@@ -1,13 +1,12 @@
 //! An operator of the family with its noise model, by prediction error.
 //!
-//! The model is `u = Y e + (C/D) eps` with Y the operator behind a hold, exactly discretised, and
+//! The model is `u = Y e + (C/D) eps` with Y the operator after a hold, exactly discretised, and
 //! the criterion that of the general model ([`crate::criterion`]) in the coordinates of the family.
-//! A prior stands beside the data as `kappa sigma^2 sum_i (g_i - m_i)^2/s_i^2`. Its weight is in
-//! units of the innovation variance sigma^2, and of kappa, by how much the variances of clusters
-//! (runs, or blocks of one) exceed those that white residuals would give: people vary in ways that
-//! no stationary noise holds, so that their samples say less than as many of a simulation (M.
-//! Ribatet, D. Cooley and A. C. Davison, *Statistica Sinica* 22 (2012) 813-845, the magnitude
-//! adjustment).
+//! A prior is next to the data as `kappa sigma^2 sum_i (g_i - m_i)^2/s_i^2`. Its weight is in units
+//! of the innovation variance sigma^2, and of kappa, by how much the variances of clusters (runs,
+//! or blocks of one) exceed those that white residuals would give: people vary in ways that no
+//! stationary noise holds, so that their samples say less than as many of a simulation (M. Ribatet,
+//! D. Cooley and A. C. Davison, *Statistica Sinica* 22 (2012) 813-845, the magnitude adjustment).
 
 use hoid_model::{
     SampleTime,
@@ -34,7 +33,7 @@ use crate::{
     optimize::Minimum,
 };
 
-/// Share of the power of u below which what an operator leaves is no noise, but the digits of a file.
+/// Share of the power of u below which what an operator leaves is not noise, but the digits of a file.
 pub(super) const NONE: f64 = 1e-8;
 /// Share below which one form does not fit better than another: where a search without noise comes to rest is chance.
 pub(super) const EQUAL: f64 = 1e-18;
@@ -231,7 +230,7 @@ impl<'a> Prediction<'a> {
         self.data.iter().map(of).sum()
     }
 
-    /// Share of the power of u that is left, where it is no noise.
+    /// Share of the power of u that is left, where it is not noise.
     pub fn noise_free(&self) -> Option<f64> {
         self.little_noise.filter(|share| *share < NONE)
     }

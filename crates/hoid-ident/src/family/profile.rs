@@ -3,8 +3,8 @@
 //! With `S(x) = min over all else of the criterion at coordinate x`, the interval of 95 % is where
 //! `S(x) - S_min <= kappa sigma^2 t^2`, t the quantile, kappa the inflation of variances (D. M.
 //! Bates and D. G. Watts, *Nonlinear Regression Analysis and Its Applications*, 1988, section 6.1).
-//! Near the estimate it is the interval of the standard error; where the criterion is no parabola
-//! (a lag that is nearly an integration) it is the one that holds.
+//! Near the estimate it is the interval of the standard error; where the criterion is not a
+//! parabola (a lag that is nearly an integration) it is the one that holds.
 
 use super::prediction_fit::PredictionFit;
 use crate::{SearchOptions, criterion::Workspace};

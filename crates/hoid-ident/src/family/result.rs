@@ -104,7 +104,7 @@ pub struct FamilyFit {
     pub instrumental: Option<InstrumentalFit>,
     /// Why there is none.
     pub no_instrumental: Option<String>,
-    /// The methods beside each other.
+    /// The methods next to each other.
     pub agreement: Option<Agreement>,
     /// Box-Jenkins of the same orders.
     pub free_model: Option<FreeModel>,
@@ -136,7 +136,7 @@ pub struct FamilyFit {
     /// By how much e was moved when its rate was lowered, for a hold that is longer than the recorded one, s.
     #[serde(default)]
     pub lead_s: f64,
-    /// Share of the power of u that the operator leaves, where that is no noise.
+    /// Share of the power of u that the operator leaves, where that is not noise.
     #[serde(default)]
     pub noise_free: Option<f64>,
     /// Time between two samples.

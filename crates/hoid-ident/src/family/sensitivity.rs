@@ -1,17 +1,15 @@
 //! What the estimate owes to the choice of a noise model.
 //!
-//! In a closed loop the prediction error method is biased by as much as the noise model is wrong
-//! (L. Ljung, *System Identification*, 1999, section 13.4: by the part of the spectrum of e that
-//! the remnant makes, times what the noise model misses), and the scatter between runs does not show
-//! it, since all runs share it. The remnant of people is no autoregression of any order. How wrong
-//! the chosen one may be shows where others are put in its place: the same form is fitted with
-//! autoregressions of a quarter, half and all of the highest order, and with an ARMA model of the
-//! orders that a sum of a drift, a broad band and a resonance has when it is sampled (4, 5). Each
-//! difference is taken for a bias and enters the covariance by its square, as the difference to the
-//! fit at the lines does where an excitation was recorded. That fit speaks for what the lines
-//! determine; for the rest, which is its prior, the other noise models speak: for each element by
-//! itself, since the response in the band of manual control, and with it crossover and margin, is
-//! known from the lines.
+//! In a closed loop the prediction error method is biased by as much as the noise model is wrong (L. Ljung, *System
+//! Identification*, 1999, section 13.4: by the part of the spectrum of e that the remnant makes, times what the noise
+//! model misses), and the scatter between runs does not show it, since all runs share it. The remnant of people is not
+//! an autoregression of any order. How wrong the chosen one may be shows where others are put in its place: the same
+//! form is fitted with autoregressions of a quarter, half and all of the highest order, and with an ARMA model of the
+//! orders that a sum of a drift, a broad band and a resonance has when it is sampled (4, 5). Each difference is taken
+//! for a bias and enters the covariance by its square, as the difference to the fit at the lines does where an
+//! excitation was recorded. That fit speaks for what the lines determine; for the rest, which is its prior, the other
+//! noise models speak: for each element by itself, since the response in the band of manual control, and with it
+//! crossover and margin, is known from the lines.
 //!
 //! **Without lines** they do not tell all: where e is nearly the remnant alone, above the band of
 //! the forcing function, all noise models share most of the bias. Their squares count one and a half times, and

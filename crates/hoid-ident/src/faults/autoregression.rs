@@ -5,7 +5,7 @@
 //! (the weights of Mallows on the regressors), and, in the rounds that follow, where eps lies within
 //! [`BEYOND`] of its robust scale (R. A. Maronna, R. D. Martin, V. J. Yohai, *Robust Statistics*,
 //! 2006, sections 5.11 and 8.4). A small white part is added to x, of [`FLOOR`] of its deviation: it
-//! keeps the normal equations of a smooth channel regular, and what is smaller is no fault.
+//! keeps the normal equations of a smooth channel regular, and what is smaller is not a fault.
 
 use super::robust::quantile;
 use crate::linalg::{gram::Gram, least_squares::solve_symmetric};

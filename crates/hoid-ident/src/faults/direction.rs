@@ -14,8 +14,8 @@
 //! [`AT_ONCE`] and [`TIMES`] times that of e, input and output are exchanged. Where neither answers at
 //! once nothing is said.
 //!
-//! **Sign.** All that a person does with an error begins in its direction: `sum_j b_j` is positive. It
-//! is the wrong sign where the sum lies [`WRONG`] standard errors below zero.
+//! **Sign.** All that a person does with an error starts in its direction: `sum_j b_j` is positive. It is the wrong
+//! sign where the sum lies [`WRONG`] standard errors below zero.
 
 use hoid_model::{FaultKind, Record};
 use hoid_numerics::statistics::mean;

@@ -8,9 +8,8 @@
 //! that is told from the holds there. A hold that the channel jumps to and
 //! back from, by more than it moves from one sample to the next in 999 of 1000, is a dropout.
 //!
-//! *Idle* is a stretch of [`IDLE_S`] or more in which e and u stay both within [`QUIET`] of their
-//! deviations, in each half second: before a run begins, or behind its end. Nobody who tracks can do
-//! that: e is never at rest.
+//! *Idle* is a stretch of [`IDLE_S`] or more in which e and u stay both within [`QUIET`] of their deviations, in each
+//! half second: before a run starts, or after its end. Nobody who tracks can do that: e is never at rest.
 
 use std::ops::Range;
 
@@ -93,7 +92,7 @@ fn range_of(values: &[f64]) -> f64 {
     high - low
 }
 
-/// Stretches in which all channels are idle, beside what is `out` of use.
+/// Stretches in which all channels are idle, next to what is `out` of use.
 pub(super) fn idle(channels: &[&[f64]], out: &[bool], sample_time_s: f64) -> Vec<Range<usize>> {
     let n = channels.first().map_or(0, |c| c.len());
     let block = ((BLOCK_S / sample_time_s).round() as usize).max(5);

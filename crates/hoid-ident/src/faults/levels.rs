@@ -3,15 +3,15 @@
 //! A *large* change from one sample to the next is beyond [`LARGE`] times the 99 % quantile of all
 //! changes.
 //!
-//! **Wrap.** A channel that is kept within a range of the modulus M leaves it at one end and comes in
-//! at the other: large changes that are all M within that quantile, which taken out leave no large
-//! change. M is 360, 2 pi, 180, pi or 65536 (or one less, or 4096), or what four changes or more
-//! agree in. Of these a pair of changes less than [`BRIDGED_S`](super::limits::BRIDGED_S) apart is a spike; of
-//! a known modulus it is a turn there and back, and unwrapping mends either.
+//! **Wrap.** A channel that is kept within a range of the modulus M leaves it at one end and comes in at the other:
+//! large changes that are all M within that quantile, which taken out leave no large change. M is 360, 2 pi, 180, pi or
+//! 65536 (or one less, or 4096), or what four changes or more agree in. Of these a pair of changes less than
+//! [`BRIDGED_S`](super::limits::BRIDGED_S) apart is a spike; of a known modulus it is a turn there and back, and
+//! unwrapping repairs either.
 //!
-//! **Step.** At one large change the median of [`BESIDE_S`] before and behind differ by more than
-//! [`STEPPED`] times the deviation within each of the two, and by four fifths of the change: the
-//! person has not answered it away, as they do with a step of the target.
+//! **Step.** At one large change the median of [`BESIDE_S`] before and after differ by more than [`STEPPED`] times the
+//! deviation within each of the two, and by four fifths of the change: the person has not answered it away, as they do
+//! with a step of the target.
 //!
 //! **Scale.** The deviation from the level in each second, over its median over all seconds, beyond
 //! [`UNITS`], of a stick with a [rest](super::rest) that of the samples away from it: no person grows by that much from one second to the next. Edges are those samples beyond
@@ -25,9 +25,9 @@ use super::{
 };
 
 const LARGE: f64 = 6.0;
-/// Span beside a step, s.
+/// Span next to a step, s.
 const BESIDE_S: f64 = 5.0;
-/// Least step, in deviations beside it.
+/// Least step, in deviations next to it.
 const STEPPED: f64 = 6.0;
 /// Ratio of the deviations of seconds that is another unit.
 const UNITS: f64 = 100.0;
@@ -98,7 +98,7 @@ pub(super) fn wrap(values: &[f64], sample_time_s: f64) -> Option<Wrap> {
     })
 }
 
-/// Steps of the level: the first sample behind each, and by how much.
+/// Steps of the level: the first sample after each, and by how much.
 pub(super) fn steps(values: &[f64], sample_time_s: f64) -> Vec<(usize, f64, f64)> {
     let beside = (BESIDE_S / sample_time_s) as usize;
     let typical = typical_change(values);

@@ -7,7 +7,7 @@
 //! | file | fault | statistic |
 //! |---|---|---|
 //! | `levels` | wraps, stretches in other units, steps | changes and deviations against their quantiles |
-//! | `rest` | | the value at which a stick with a dead zone rests, which is no fault |
+//! | `rest` | | the value at which a stick with a dead zone rests, which is not a fault |
 //! | `holds` | frozen channels, dropouts, idle stretches | lengths of runs of equal values, ranges |
 //! | `spikes` | spikes | two explanations of a large innovation: fault or push |
 //! | `interpolation` | | the samples that those around them make most likely, and what they explain |
@@ -17,10 +17,10 @@
 //! | `search`, `mending`, `limits` | | their order, and what becomes of the record |
 //! | `autoregression`, `robust` | | fits and scales that faults cannot carry |
 //!
-//! Each channel is judged by itself, since its own neighbours know a sample better than any other
-//! channel does; only what *nothing* happens in is told by e and u together. No model of the person
-//! is needed. What people do is no fault: their remnant comes in pulses and bursts, but through
-//! their muscles, and the statistics of the spikes tell pushes from faults.
+//! Each channel is judged by itself, since its own neighbours know a sample better than any other channel does; only
+//! what *nothing* happens in is told by e and u together. No model of the person is needed. What people do is not a
+//! fault: their remnant comes in pulses and bursts, but through their muscles, and the statistics of the spikes tell
+//! pushes from faults.
 //!
 //! [`repair`] looks at a record and does what [`FaultHandling`](hoid_model::FaultHandling) says: by default it bridges what lasts
 //! up to [`BRIDGED_S`], cuts the record at what is longer, and leaves segments of [`SHORTEST_S`] or

@@ -26,7 +26,7 @@ pub struct RepairedRecord {
     pub findings: Vec<Finding>,
 }
 
-/// The faults of e and u of a record, mended as is said, and the spikes of its excitation.
+/// The faults of e and u of a record, repaired as is said, and the spikes of its excitation.
 ///
 /// # Errors
 /// None that a record can give; [`ModelError`] is that of making one.

@@ -1,15 +1,15 @@
-//! One or few samples that those before and behind them rule out.
+//! One or few samples that those before and after them rule out.
 //!
-//! Two explanations of a large innovation stand against each other (A. J. Fox, *J. Royal Statistical
-//! Society B* 34 (1972) 350-363; I. Chang, G. C. Tiao and C. Chen, *Technometrics* 30 (1988) 193-204).
-//! A *push* of the person enters the innovations: it moves the channel, which then goes on as it always
-//! does. A *fault* is added to the samples alone: each innovation behind it is off by a coefficient of
-//! A, and the channel goes on as if nothing had been. For m samples from s on,
+//! Two explanations of a large innovation stand against each other (A. J. Fox, *J. Royal Statistical Society B* 34
+//! (1972) 350-363; I. Chang, G. C. Tiao and C. Chen, *Technometrics* 30 (1988) 193-204). A *push* of the person enters
+//! the innovations: it moves the channel, which then goes on as it always does. A *fault* is added to the samples
+//! alone: each innovation after it is off by a coefficient of A, and the channel goes on as if nothing had been. For m
+//! samples from s on,
 //!
 //! | explanation | what it leaves of `S = sum eps^2/sigma^2` |
 //! |---|---|
 //! | m pushes | `S` without the m largest terms |
-//! | m faulty samples | `S` behind the [interpolation](super::interpolation) of them |
+//! | m faulty samples | `S` after the [interpolation](super::interpolation) of them |
 //!
 //! Both have m unknowns. The fewest samples are a fault where their interpolation
 //!
@@ -47,7 +47,7 @@ const PART: f64 = 0.2;
 const DECISIVE: f64 = 20.0;
 /// Largest innovation that is left, as sigma.
 const CLEAN: f64 = 5.0;
-/// Innovation that a search begins at, as sigma.
+/// Innovation that a search starts at, as sigma.
 const SEED: f64 = 4.0;
 /// Least change of a sample, of the deviation of the channel.
 const SMALLEST: f64 = 1.5;
@@ -55,7 +55,7 @@ const SMALLEST: f64 = 1.5;
 const WILD: f64 = 20.0;
 const ROUNDS: usize = 4;
 
-/// Samples that are no part of the channel.
+/// Samples that are not a part of the channel.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Spike {
     pub samples: Range<usize>,
@@ -207,7 +207,7 @@ impl Search<'_> {
         found
     }
 
-    /// The fault that begins at this sample, and how its samples change.
+    /// The fault that starts at this sample, and how its samples change.
     fn at(&self, x: &[f64], eps: &[f64], start: usize) -> Option<(Spike, Vec<f64>)> {
         let sigma = self.sigma.at(start);
         let all = Interpolation::new(self.ar, eps, start, self.longest);

@@ -33,7 +33,7 @@ pub struct Line {
     /// Standard deviation of the ratios of single runs, as the root of the mean square modulus;
     /// `None` for one run.
     pub spread: Option<f64>,
-    /// sigma as the remnant beside the line has it: of `N = U - H E` at the nearest bins off the
+    /// sigma as the remnant next to the line has it: of `N = U - H E` at the nearest bins off the
     /// lines, where there is nothing but remnant. It does not hold what differs between runs, and
     /// exists for one run too.
     pub neighbour_error: f64,
@@ -100,7 +100,7 @@ pub struct RunSummary {
     pub noise_ratio: f64,
 }
 
-/// A describing function with what the records say beside it.
+/// A describing function with what the records say next to it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DescribingFunction {
     /// The lines, by frequency.
@@ -371,7 +371,7 @@ fn line(runs: &[Run], harmonic: usize, omega_rad_s: f64, options: &DescribingOpt
     })
 }
 
-/// sigma of a line from the bins beside it: `sigma^2 = sum_i |D_i|^2 S_i / |sum_i b_i|^2` with S_i
+/// sigma of a line from the bins next to it: `sigma^2 = sum_i |D_i|^2 S_i / |sum_i b_i|^2` with S_i
 /// the mean of `|U - H E|^2` over the nearest bins of run i off the lines, `b_i = E_i D_i*`.
 fn neighbour_error(runs: &[Run], line: &Line, harmonics: &[usize]) -> f64 {
     let mut squares = 0.0;

@@ -184,7 +184,7 @@ fn excitation_of(record: &Record, options: &DescriptionOptions) -> Result<(Excit
         (Some(_), None) => {
             return refuse(
                 "the lines of the excitation",
-                "no period beside them",
+                "no period next to them",
                 "the period in s, of which they are harmonics",
             );
         }
@@ -207,7 +207,7 @@ fn excitation_of(record: &Record, options: &DescriptionOptions) -> Result<(Excit
             (Ok(found), None) => return Ok((found, Some(name.to_owned()))),
             (Ok(found), Some(given)) if found == *given => return Ok((found, Some(name.to_owned()))),
             (Ok(_), Some(_)) => {}
-            // A target of zero beside a disturbance is none, and not what is wrong.
+            // A target of zero next to a disturbance is none, and not what is wrong.
             (Err(IdentError::NoExcitation { .. }), _) => {}
             (Err(error), _) => {
                 reason.get_or_insert(error);

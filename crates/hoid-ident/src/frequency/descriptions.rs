@@ -156,7 +156,7 @@ fn a_person_who_does_not_follow_is_not_described() {
         }
     }
     assert!((7..=33).contains(&followed), "{followed}");
-    // Lines that are lost in noise beside others that are not.
+    // Lines that are lost in noise next to others that are not.
     let slow = |k: usize| (TAU * (2 * k) as f64 / PERIOD as f64).sin() + (TAU * (5 * k) as f64 / PERIOD as f64).sin();
     let runs: Vec<Record> = (0..6)
         .map(|i| {

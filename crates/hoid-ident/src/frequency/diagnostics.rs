@@ -10,7 +10,7 @@
 //! | finding | severity |
 //! |---|---|
 //! | `unrelated`: together the lines do not differ from chance | undetermined |
-//! | `low-coherence`: single lines do not | doubt beside the crossover or at half of the lines, else a note |
+//! | `low-coherence`: single lines do not | doubt next to the crossover or at half of the lines, else a note |
 //! | `few-runs`: one run has no errors, those of two are rough | doubt |
 //! | `periods-as-runs`: the errors are those between periods of one or two runs | note |
 //! | `no-reference`: no channel of the excitation | note |

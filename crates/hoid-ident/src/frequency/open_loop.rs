@@ -69,7 +69,7 @@ impl DescribingFunction {
     }
 
     /// The open loop with any frequency response over rad/s, such as that of the controlled element
-    /// behind its hold.
+    /// after its hold.
     pub fn open_loop_with(&self, element: impl Fn(f64) -> Complex64) -> OpenLoop {
         let known: Vec<Complex64> = self.lines.iter().map(|l| element(l.omega_rad_s)).collect();
         self.loop_of(|k, _| known[k], |k, _| known[k])
@@ -266,7 +266,7 @@ mod tests {
 
     #[test]
     fn the_gain_margin_is_where_the_phase_falls_through_the_negative_axis() {
-        // 4/s behind 0.3 s: -180 deg at pi/0.6, where the gain is 4 * 0.6/pi.
+        // 4/s after 0.3 s: -180 deg at pi/0.6, where the gain is 4 * 0.6/pi.
         let omega = [0.7, 3.0, 9.0, 14.0];
         let response: Vec<Complex64> = omega
             .iter()

@@ -15,7 +15,7 @@ pub enum Averaging {
         /// Name of the channel.
         channel: String,
     },
-    /// The same with D_i = 1: every run (and period) begins at the same phase of the same
+    /// The same with D_i = 1: every run (and period) starts at the same phase of the same
     /// excitation.
     SameExcitation,
 }

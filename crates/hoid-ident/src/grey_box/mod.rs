@@ -22,7 +22,7 @@
 //! | `layout` | order and bounds of the physical parameters |
 //! | `parametrisation` | what the criterion needs to know of physical parameters |
 //! | `objective` | the criterion in physical parameters, and its derivatives |
-//! | `starts` | where the searches begin |
+//! | `starts` | where the searches start |
 //! | `result` | the fit with its uncertainty |
 
 mod estimator;

@@ -80,7 +80,7 @@ pub(crate) struct Penalty {
 }
 
 impl Penalty {
-    /// The same beside innovations of this variance.
+    /// The same next to innovations of this variance.
     pub fn beside(self, variance: f64) -> Self {
         Self { variance, ..self }
     }
@@ -107,7 +107,7 @@ impl Penalty {
         self.weight() * (self.mean - value).powi(2)
     }
 
-    /// `v g'(eta_i)^2/s^2`, its element of the matrix P that stands beside `psi' psi`.
+    /// `v g'(eta_i)^2/s^2`, its element of the matrix P that is next to `psi' psi`.
     pub fn curvature(&self, eta: &[f64]) -> f64 {
         let (_, slope) = self.value_and_slope(eta);
         self.weight() * slope * slope

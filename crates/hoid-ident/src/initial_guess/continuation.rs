@@ -6,8 +6,8 @@
 //! the poles of the minimum that it finds, taken back by the K-th root, start the search on the
 //! record itself. The delay becomes a fraction of a sample, so that B gets one coefficient more.
 //!
-//! Only a start: where the system is fast beside K samples it is a bad one, and others are tried as
-//! well.
+//! Only a start: where the system is fast compared with K samples it is a bad one, and others are
+//! tried as well.
 
 use hoid_model::{Complex64, Orders, SampleTime, polynomial, polynomial_model::monic};
 
@@ -44,8 +44,8 @@ pub(crate) struct SlowPoles {
     /// Polynomials F, best first; none where the records are short or the model has no poles in F
     /// alone.
     pub f: Vec<Vec<f64>>,
-    /// True when all poles of the best one are slow beside the average, so that it determines
-    /// nearly all that the record does.
+    /// True when all poles of the best one are slow compared with the average, so that it
+    /// determines nearly all that the record does.
     pub complete: bool,
 }
 

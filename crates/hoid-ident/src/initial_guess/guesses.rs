@@ -19,9 +19,9 @@
 //! 5. `instruments`: ARX, instrumental variables twice, the residual, C and D from it
 //!    ([`crate::iv`]).
 //!
-//! The last three only where the poles of the first are not all slow beside its average: there it
-//! determines nearly all that the record does. The proposals are ranked by their loss with the
-//! initial states eliminated; the search runs from the best of them, and the best minimum wins.
+//! The last three only where the poles of the first are not all slow compared with its average:
+//! there it determines nearly all that the record does. The proposals are ranked by their loss with
+//! the initial states eliminated; the search runs from the best of them, and the best minimum wins.
 //! Short records and larger models have more minima than these find: there others are tried
 //! afterwards ([`crate::initial_guess::broad`]).
 

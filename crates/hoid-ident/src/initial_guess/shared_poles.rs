@@ -1,4 +1,4 @@
-//! Starts for models whose A stands beside a noise model or beside F: which poles belong to A?
+//! Starts for models whose A is next to a noise model or next to F: which poles belong to A?
 //!
 //! A belongs to the system and to the noise, F to the system and D to the noise alone, and the loss
 //! has a minimum at many a confusion of them: ARARX with a1 = -0.65, a2 = 0.11, d1 = -0.93 ends 40
@@ -31,7 +31,7 @@ const STEPS: usize = 8;
 /// Poles, or pairs of them, that are dealt out at most.
 const MAX_GROUPS: usize = 6;
 
-/// True where A stands beside other polynomials that could take its poles.
+/// True where A is next to other polynomials that could take its poles.
 pub(crate) fn concerns(o: &Orders) -> bool {
     o.na > 0 && o.nb > 0 && o.nc + o.nd + o.nf > 0
 }

@@ -5,7 +5,7 @@ use hoid_model::Structure;
 use super::equation::IvProblem;
 use crate::{IdentError, Termination, criterion::Criterion};
 
-/// A method: each stands in a file of its own and is listed in [`IvMethod`](super::IvMethod).
+/// A method: each is in a file of its own and is listed in [`IvMethod`](super::IvMethod).
 pub(super) struct Algorithm {
     /// Short name, as in options and tables.
     pub name: &'static str,

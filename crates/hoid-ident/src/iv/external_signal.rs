@@ -188,7 +188,7 @@ mod tests {
     #[test]
     fn filters_are_orthonormal() {
         let mut impulse = vec![0.0; 4000];
-        // Behind the samples that the invented past is made of.
+        // After the samples that the invented past is made of.
         impulse[300] = 1.0;
         let columns = laguerre(&[&impulse], 0.9, 12);
         for (i, a) in columns.iter().enumerate() {

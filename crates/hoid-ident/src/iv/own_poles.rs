@@ -165,7 +165,7 @@ pub(super) fn solve_for_own_poles(
             return Ok(last);
         }
         system = match &nearest {
-            // The extrapolation has led astray.
+            // The extrapolation has led diverged.
             Some((least, near)) if moved > ASTRAY * least => {
                 extrapolation = Extrapolation::default();
                 near.system.clone()

@@ -102,7 +102,7 @@ impl<'s> MultiStart<'s> {
         self.starts.iter().position(|start| start.next_block().is_some())
     }
 
-    /// Begins the searches, with the best start.
+    /// Starts the searches, with the best start.
     fn rank(&mut self) {
         self.starts.retain(|start| start.value.is_finite());
         self.starts.sort_by(|a, b| a.value.total_cmp(&b.value));
@@ -111,7 +111,7 @@ impl<'s> MultiStart<'s> {
         self.begin();
     }
 
-    /// Begins at the next start.
+    /// Starts at the next start.
     fn begin(&mut self) {
         while let (None, Some(Start { label, theta, .. })) = (&self.searching, self.starts.pop()) {
             let known = self.best().map(|minimum| minimum.at.sum_of_squares);

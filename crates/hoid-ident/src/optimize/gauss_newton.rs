@@ -284,7 +284,7 @@ impl<'s> GaussNewton<'s> {
         Progress::Ended(Some(if lost { Reason::SmallDecrease } else { Reason::NoDescent }))
     }
 
-    /// Makes theta behind a step the next evaluation point; false where there is no predictor.
+    /// Makes theta after a step the next evaluation point; false where there is no predictor.
     fn ask(&mut self, delta: &[f64], factor: f64) -> bool {
         self.evaluation_point.clear();
         self.evaluation_point

@@ -39,8 +39,8 @@ impl Linearisation {
 }
 
 /// A sum of squares over theta with its derivatives: what the search needs to know of a model. The
-/// search takes it as `dyn`: a call is nothing beside a pass over a record, and it is compiled once
-/// for all models.
+/// search takes it as `dyn`: a call is nothing compared with a pass over a record, and it is
+/// compiled once for all models.
 pub(crate) trait Objective {
     /// True where the predictor exists: finite theta, stable polynomials.
     fn is_feasible(&self, theta: &[f64]) -> bool;

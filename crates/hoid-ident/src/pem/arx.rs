@@ -4,13 +4,12 @@
 //! 5.31), from the first sample at which phi lies inside the record (eq. 5.33) in each record, or
 //! with zeros for what lies before it.
 //!
-//! **How it is solved.** The columns are shifts of two signals, so that `Phi' Phi` costs a few
-//! passes over the record, a tenth of an orthogonal factorisation. A solution of the normal
-//! equations has an error of `cond(Phi' Phi) eps`; one step of refinement from the residuals
-//! themselves, `theta + (Phi' Phi)^-1 Phi' (y - Phi theta)`, squares that factor (A. Bjorck,
-//! *Numerical Methods for Least Squares Problems*, 1996, sec. 2.9.3). Where the regressors are too
-//! close to dependence for it, where the fit is exact, where u has a level, and where zeros stand before the
-//! record, QR with column pivoting decides and solves.
+//! **How it is solved.** The columns are shifts of two signals, so that `Phi' Phi` costs a few passes over the record,
+//! a tenth of an orthogonal factorisation. A solution of the normal equations has an error of `cond(Phi' Phi) eps`; one
+//! step of refinement from the residuals themselves, `theta + (Phi' Phi)^-1 Phi' (y - Phi theta)`, squares that factor
+//! (A. Bjorck, *Numerical Methods for Least Squares Problems*, 1996, sec. 2.9.3). Where the regressors are too close to
+//! dependence for it, where the fit is exact, where u has a level, and where zeros are before the record, QR with
+//! column pivoting decides and solves.
 
 use hoid_model::{Orders, SampleTime, Structure};
 use nalgebra::{DMatrix, DVector};
@@ -149,7 +148,7 @@ fn by_normal_equations(orders: &Orders, data: &[Data<'_>], first: usize) -> Opti
     });
     let factor = scaled.cholesky()?;
     let inverse = factor.inverse();
-    // Not <=: NaN is no condition either.
+    // Not <=: NaN is not a condition either.
     let well_conditioned = p as f64 * inverse.trace() < WELL_CONDITIONED;
     if !well_conditioned {
         return None;

@@ -1,4 +1,4 @@
-//! What a fit by the prediction error method needs to know beside the records.
+//! What a fit by the prediction error method needs to know next to the records.
 
 use std::collections::BTreeMap;
 

@@ -4,7 +4,7 @@
 //! | module | what it holds |
 //! |---|---|
 //! | `constraints` | bounds and priors |
-//! | `fit_settings` | what a fit needs to know beside the records |
+//! | `fit_settings` | what a fit needs to know next to the records |
 //! | `prediction_focus`, `simulation_focus` | the fit by the prediction error, and of models that are to simulate |
 //! | `arx` | structures that are linear in theta |
 //! | `fit_problem` | the searches from all starts of one fit, and the fit at the lowest minimum |

@@ -46,7 +46,7 @@ impl<E: 'static, X: 'static> BatchOption<E, X> {
     /// Sets it from its text.
     ///
     /// # Errors
-    /// For a text that is no value of it, or contradicts what was set before.
+    /// For a text that is not a value of it, or contradicts what was set before.
     pub fn set(&self, of: &mut E, text: &str) -> Result<(), X> {
         (self.set)(of, &self.setting, text)
     }

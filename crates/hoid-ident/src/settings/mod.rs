@@ -54,7 +54,8 @@ pub trait Settings {
     /// Sets an option from its text; false when the name is not among them.
     ///
     /// # Errors
-    /// [`IdentError::BadOption`] for a text that is no value of the option, or out of its bounds.
+    /// [`IdentError::BadOption`] for a text that is not a value of the option, or out of its
+    /// bounds.
     fn set(&mut self, name: &str, text: &str) -> Result<bool, IdentError>;
 
     /// The value of an option as text; `None` where it has none, or the name is not among them.

@@ -117,7 +117,7 @@ impl Setting {
         }
     }
 
-    /// Refuses it beside others, with the reason.
+    /// Refuses it next to others, with the reason.
     pub fn error(&self, reason: impl Into<String>) -> IdentError {
         IdentError::Option {
             name: self.name,

@@ -167,7 +167,7 @@ impl Value for Prior {
     }
 }
 
-/// Names behind each other, as `K,T_L`.
+/// Names after each other, as `K,T_L`.
 impl Value for Vec<String> {
     const KIND: Kind = Kind::Names;
 

@@ -39,8 +39,8 @@ impl ChangedOperator {
         self.parameters.iter().find(|p| p.name == name).map(|p| p.estimate)
     }
 
-    /// The same by the names of the reference text; `None` for another form than a gain and a lead
-    /// with the neuromuscular part.
+    /// The same by the names of the thesis; `None` for another form than a gain and a lead with the
+    /// neuromuscular part.
     pub fn lead(&self) -> Option<OperatorEstimate> {
         if self.operator.form() != Form::Lead {
             return None;
@@ -121,7 +121,7 @@ impl ThetaEstimate<'_> {
     fn constant_part(&self, gradient: &[f64]) -> Vec<f64> {
         let mut whole = vec![0.0; self.theta.len()];
         for (place, slope) in self.layout.poles().into_iter().zip(&gradient[self.layout.varying..]) {
-            // omega_nm and zeta_nm stand in theta themselves.
+            // omega_nm and zeta_nm are in theta themselves.
             let logarithmic = self.layout.muscles.is_some_and(|own| own.contains(&place));
             whole[place] = if logarithmic { slope / self.theta[place] } else { *slope };
         }
@@ -129,7 +129,7 @@ impl ThetaEstimate<'_> {
     }
 
     /// The parameters of an operator whose gradients are `wanted`; `of` makes from a gradient along
-    /// the coordinates that along theta, and a variance beside.
+    /// the coordinates that along theta, and a variance alongside.
     fn named(
         &self,
         operator: &FamilyOperator,

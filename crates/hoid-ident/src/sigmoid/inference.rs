@@ -79,7 +79,7 @@ pub struct Comparison {
     pub bic_difference: f64,
 }
 
-/// What the minimum with a change says beside theta.
+/// What the minimum with a change says next to theta.
 pub(super) struct Inference {
     /// Variance of the innovations, weighted where the noise level changes.
     pub innovation_variance: f64,

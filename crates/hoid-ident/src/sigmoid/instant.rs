@@ -18,7 +18,7 @@ pub(crate) struct Instant {
     pub values: [f64; MOST_VARYING],
     /// The numerator over its gain, by ascending powers of s.
     pub shape: [f64; 3],
-    /// Derivatives of the shape along the parameters beside the gain.
+    /// Derivatives of the shape along the parameters next to the gain.
     pub slopes: [[f64; 3]; 2],
 }
 

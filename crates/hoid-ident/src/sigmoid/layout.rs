@@ -4,11 +4,11 @@
 //!
 //! `theta = [v1 v2 of each of the numerator, t_M, ln G, 1/T_I, omega_nm, zeta_nm, tau_e, d1 .. d_nd]`
 //!
-//! where the numerator has the gain (K, with a lag K/T_I), and beside it T_L, or c_1 and c_2, or T_L
-//! and alpha ([`Form::shape`]); what a form does not have has no place. For the operator of a gain
-//! and a lead that is `[K_e1, K_e2, T_L1, T_L2, t_M, ln G, omega_nm, zeta_nm, tau_e, d1 .. d_nd]`.
-//! The rate enters by its logarithm: it is positive, and its likelihood is far more nearly a
-//! parabola in ln G than in G. A lag enters by `1/T_I`, for the same reason.
+//! where the numerator has the gain (K, with a lag K/T_I), and next to it T_L, or c_1 and c_2, or T_L and alpha
+//! ([`Form::shape`]); what a form does not have has no place. For the operator of a gain and a lead that is
+//! `[K_e1, K_e2, T_L1, T_L2, t_M, ln G, omega_nm, zeta_nm, tau_e, d1 .. d_nd]`. The rate enters by its logarithm: it is
+//! positive, and its likelihood is far more nearly a parabola in ln G than in G. A lag enters by `1/T_I`, for the same
+//! reason.
 
 use hoid_model::{
     FamilyOperator, Form, ModelError, Orders,
@@ -32,7 +32,7 @@ pub const SIGMOID_NAMES: [(&str, &str); 9] = [
 /// Most parameters of a numerator.
 pub(crate) const MOST_VARYING: usize = 3;
 
-/// Where everything stands in theta.
+/// Where everything is in theta.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub(crate) struct Layout {
     pub form: Form,

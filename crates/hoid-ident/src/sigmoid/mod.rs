@@ -2,7 +2,7 @@
 //! change estimated.
 //!
 //! `u(t) = sum_i n_i(t - tau) y_i(t) + (1/D) eps`, where y_i is the exact response of `s^i` over the
-//! poles of the operator, behind their delay, to the held error ([`objective`]), and n_i the
+//! poles of the operator, after their delay, to the held error ([`objective`]), and n_i the
 //! coefficients of their numerator. Its parameters, the gain and T_L (or c_1 and c_2, or T_L and
 //! alpha), go from their initial to their last value as `1/(1 + e^{-G (t - t_M)})` (eq. 5); the lag,
 //! the neuromuscular part and the delay stay. Every form of [`hoid_model::operator_family`] will do;

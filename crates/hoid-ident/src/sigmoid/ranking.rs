@@ -3,7 +3,7 @@
 //! `u = sum_i (n_i1 (1 - s) + n_i2 s) y_i` with the share s of the change and the responses y_i,
 //! whitened by D. From the coefficients n at either end follow the parameters of the numerator:
 //! where it has a coefficient less than parameters allow, those that lie nearest in the metric of
-//! the responses. A slow pole of the operator has a state where a record begins, which is one more
+//! the responses. A slow pole of the operator has a state where a record starts, which is one more
 //! unknown for each.
 
 use hoid_model::Form;
@@ -153,7 +153,7 @@ impl<'c, 'a> Ranking<'c, 'a> {
             .collect()
     }
 
-    /// Times behind the delay of the samples of a record.
+    /// Times after the delay of the samples of a record.
     fn times(&self, theta: &[f64], record: usize, first: usize, n: usize) -> impl Iterator<Item = f64> {
         let (data, ts) = (&self.criterion.data[record], self.criterion.sample_time.s());
         let from = first - self.criterion.layout.nd;

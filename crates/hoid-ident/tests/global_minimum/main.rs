@@ -1,15 +1,15 @@
 //! Own starts reach the global minimum on short records of textbook systems.
 //!
 //! **Experiment.** Random systems ([`systems`]) are fitted with their own orders from the own
-//! starts, and beside it from the true parameters and from random starts. The lowest loss of all is
-//! the reference; the own starts reach it where their loss is at most 1e-6 (relative) above it.
+//! starts, and next to it from the true parameters and from random starts. The lowest loss of all
+//! is the reference; the own starts reach it where their loss is at most 1e-6 (relative) above it.
 //!
 //! **What does not count.** Short records often have their lowest loss at a model that says nothing
 //! about the system: a root of C or F on the unit circle (farther out than 1 - 1e-4), where the
 //! estimated initial state of that root removes a trend or a sinusoid from the record; or common
-//! factors, a zero of B beside a root of F or a root of C beside one of D (closer than 0.01), where
-//! the parameters of both are not determined. Where the reference is such a minimum, the system is
-//! counted apart.
+//! factors, a zero of B next to a root of F or a root of C next to one of D (closer than 0.01),
+//! where the parameters of both are not determined. Where the reference is such a minimum, the
+//! system is counted apart.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 mod systems;

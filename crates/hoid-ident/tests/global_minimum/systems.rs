@@ -144,7 +144,7 @@ impl System {
     }
 }
 
-/// White, behind two equal poles, or steps to +1 and -1 that last 5 to 20 samples.
+/// White, after two equal poles, or steps to +1 and -1 that last 5 to 20 samples.
 fn input(draw: &mut Draw, mut white: Vec<f64>) -> Vec<f64> {
     match draw.one_of(3) {
         0 => {}

@@ -7,7 +7,7 @@
 use hoid_ident::{Estimator, InstrumentalVariable, Instruments, IvMethod};
 use hoid_model::{Channel, Orders, Record, SampleTime, Structure};
 
-/// The trials of a person and plant: e = r - y, paired with the u of the row behind it.
+/// The trials of a person and plant: e = r - y, paired with the u of the row after it.
 fn trials(cell: &str) -> Option<Vec<Record>> {
     let dir = std::env::var_os("HOID_HUMAN_DATA")?;
     let mut files: Vec<_> = std::fs::read_dir(dir)

@@ -1,7 +1,7 @@
-//! The even grid behind a recorded time, and how the time differs from it.
+//! The even grid after a recorded time, and how the time differs from it.
 //!
-//! Row i stands at `t_i = t_0 + k_i Ts + jitter`, with whole k that grow by one from row to row,
-//! and by more where rows are missing. The k are found by a phase that follows the times,
+//! Row i is at `t_i = t_0 + k_i Ts + jitter`, with whole k that grow by one from row to row, and by
+//! more where rows are missing. The k are found by a phase that follows the times,
 //! `k_i - k_{i-1} = round((t_i - g) / Ts)` with `g` pulled a small share of the way to each time:
 //! jitter of nearly half a sample is then no gap. A row taken too far is given back when the next
 //! seems to stand. Ts is the slope of least squares, found twice.
@@ -12,14 +12,14 @@
 /// Rows of a part, and the fewest that make one.
 const PART: usize = 256;
 const LEAST_PART: usize = 5;
-/// A gap of so many rows is a pause, behind which the grid begins anew.
+/// A gap of so many rows is a pause, after which the grid starts anew.
 const PAUSE: f64 = 10.0;
 /// Rows within which a step that was taken too far is set right.
 const NEAR: usize = 4;
-/// Times that say where a grid begins.
+/// Times that say where a grid starts.
 const BEGIN: usize = 8;
 
-/// Where the rows stand on an even grid.
+/// Where the rows are on an even grid.
 pub(crate) struct Grid {
     /// Rows whose time is later than that of all before.
     pub(crate) rows: Vec<usize>,
@@ -27,7 +27,7 @@ pub(crate) struct Grid {
     pub(crate) steps: Vec<f64>,
     /// Sample time, s; NaN where fewer than two rows advance.
     pub(crate) sample_time_s: f64,
-    /// Rows whose time stands still.
+    /// Rows whose time stays constant.
     pub(super) standing: Vec<usize>,
     /// Rows whose time lies before that of an earlier row.
     pub(super) back: Vec<usize>,
@@ -128,7 +128,7 @@ impl Grid {
 fn follow(times: &[f64], ts: f64, pull: f64, steps: &mut [f64]) {
     steps.fill(1.0);
     let mut owed: Option<usize> = None;
-    // Where a grid begins, the first times together say where it lies: one alone is off by its
+    // Where a grid starts, the first times together say where it lies: one alone is off by its
     // jitter.
     let begin = |i: usize| {
         let ahead = times[i..]

@@ -6,7 +6,7 @@
 //! a channel in steps L is ten times the length that nine of ten of its holds do not exceed; for
 //! one in full precision twice its longest hold while another channel moves, which is 0 unless it
 //! is printed with few decimals: then each hold of all channels is told, unless one of them is in
-//! steps and the hold is of one row. A channel that stands alone must be in full precision to be
+//! steps and the hold is of one row. A channel that is alone must be in full precision to be
 //! judged.
 
 use std::ops::Range;
@@ -27,7 +27,7 @@ pub(super) fn standing(signals: &Signals<'_>, grid: &Grid, found: &mut Vec<Quali
                 .all(|signal| signal.values[*row] == signal.values[row - 1] || signal.values[*row].is_nan())
     };
     let (repeated, others): (Vec<usize>, Vec<usize>) = grid.standing.iter().copied().partition(same);
-    // Of rows behind a time that was set back the first alone is earlier than the row before.
+    // Of rows after a time that was set back the first alone is earlier than the row before.
     let falls = |row: &usize| {
         signals
             .time
@@ -119,7 +119,7 @@ pub(super) fn stalls(signals: &Signals<'_>, levels: &[Levels], grid: Option<&Gri
                 2 * alone.iter().map(Range::len).max().unwrap_or(0)
             }
         };
-        // Beside a channel in steps, which holds often, one printed with few digits meets it at a
+        // Next to a channel in steps, which holds often, one printed with few digits meets it at a
         // peak by chance.
         let by_chance = usize::from(moving.iter().any(|(_, levels)| levels.is_coarse()));
         moving.iter().zip(&holds).map(natural).min().unwrap_or(0).max(by_chance)

@@ -16,7 +16,7 @@ const PLACES_WRITTEN: usize = 100;
 pub enum QualityIssueKind {
     /// Values that are missing or not finite.
     Missing,
-    /// Time that stands still or runs back.
+    /// Time that stays constant or runs back.
     Unordered,
     /// Rows that are there twice, time included.
     Repeated,
@@ -83,7 +83,7 @@ pub struct RowSpan {
     pub rows: usize,
     /// Time of the first row, s; none without a time.
     pub from_s: Option<f64>,
-    /// Time of the row behind the last, s.
+    /// Time of the row after the last, s.
     pub to_s: Option<f64>,
 }
 

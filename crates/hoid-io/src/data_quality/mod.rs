@@ -1,11 +1,11 @@
-//! The quality of recorded data: what is wrong with the sampling and the values, where and how
-//! much; nothing is mended unasked.
+//! The quality of recorded data: what is wrong with the sampling and the values, where and how much; nothing is
+//! repaired unasked.
 //!
 //! | module | what it holds |
 //! |---|---|
 //! | `issue` | [`QualityIssue`]: a finding |
 //! | `signals` | the columns that are looked at |
-//! | `grid` | the even grid behind a time |
+//! | `grid` | the even grid after a time |
 //! | `timing` | jitter, missing rows, a time that stands or runs back, a clock that is off or drifts |
 //! | `holds` | rows that are there twice, and channels that all hold their values |
 //! | `values` | saturation, quantisation, constants, missing values |

@@ -1,4 +1,4 @@
-//! The time against the even grid behind it: jitter, missing rows, a clock that is off or drifts.
+//! The time against the even grid after it: jitter, missing rows, a clock that is off or drifts.
 
 use super::grid::{Grid, slope};
 use super::issue::{QualityIssue, QualityIssueKind, RowSpan, at};
@@ -6,7 +6,7 @@ use super::signals::Signals;
 use crate::table::Precision;
 use crate::wording::{counted, decimal, short};
 
-/// Deviation from the grid that is no jitter, sample times; that of `sampling`.
+/// Deviation from the grid that is not jitter, sample times; that of `sampling`.
 const JITTER: f64 = 1e-3;
 /// Relative deviation of a clock from a given rate that is told; crystals are within 1e-4.
 const OFF: f64 = 2e-4;
@@ -101,7 +101,7 @@ fn gaps(signals: &Signals<'_>, grid: &Grid, found: &mut Vec<QualityIssue>) {
     });
 }
 
-/// The rate against the one that was given, or the usual one that it nearly is.
+/// The rate against the one that was given, or the default one that it nearly is.
 fn rate(signals: &Signals<'_>, grid: &Grid, rms: f64, unit: f64, found: &mut Vec<QualityIssue>) {
     let (ts, n) = (grid.sample_time_s, grid.rows.len() as f64);
     // Standard error of a slope, and what rounding of the ends can do.

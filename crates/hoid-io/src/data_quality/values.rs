@@ -134,7 +134,7 @@ pub(crate) fn rails(values: &[f64], levels: &Levels) -> Vec<Rail> {
         }
         let rows: usize = stays.iter().map(Range::len).sum();
         let beside: usize = next.iter().map(|level| count(*level)).sum();
-        // What begins or ends the record may be a value that settles.
+        // What starts or ends the record may be a value that settles.
         let inner = || {
             stays
                 .iter()

@@ -74,8 +74,8 @@ const MAC: [(u32, Platform); 2] = [
     ),
 ];
 
-/// Functions that the library of a unit hands out: that of hoid, of FMI 2 and of FMI 3. Their names stand in
-/// its table of symbols, each ended by a 0, whatever the system.
+/// Functions that the library of a unit hands out: that of hoid, of FMI 2 and of FMI 3. Their names are in its table of
+/// symbols, each ended by a 0, whatever the system.
 const FUNCTIONS: [&str; 3] = ["hoid_abi_version", "fmi2Instantiate", "fmi3InstantiateCoSimulation"];
 
 fn hands_out(bytes: &[u8], function: &str) -> bool {
@@ -116,7 +116,7 @@ impl Library {
     /// Reads a library; its platform is that of its head.
     ///
     /// # Errors
-    /// [`IoError::Unreadable`]; [`IoError::NoLibrary`] for what is no shared library of a known platform;
+    /// [`IoError::Unreadable`]; [`IoError::NoLibrary`] for what is not a shared library of a known platform;
     /// [`IoError::OtherLibrary`] for one of something else.
     pub fn read(path: &Path) -> Result<Self, IoError> {
         let bytes = read_bytes(path)?;

@@ -20,7 +20,7 @@ pub struct FmuSettings {
     /// Text of the scenario file of an operator.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub scenario: Option<String>,
-    /// A fit as `hoid identify --json` prints it, which a tracker begins with.
+    /// A fit as `hoid identify --json` prints it, which a tracker starts with.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub fit: Option<String>,
 }
@@ -53,7 +53,7 @@ impl FmuSettings {
         }
     }
 
-    /// With the text of a fit, which a tracker begins with.
+    /// With the text of a fit, which a tracker starts with.
     pub fn with_fit(self, text: String) -> Self {
         Self {
             fit: Some(text),

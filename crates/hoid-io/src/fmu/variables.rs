@@ -177,7 +177,7 @@ fn tracker() -> Vec<FmuVariable> {
             "restarts",
             "",
             Integer(0),
-            "how often the guard began the estimate again",
+            "how often the guard started the estimate again",
         ),
     ]);
     all

@@ -6,8 +6,8 @@
 
 use crate::IoError;
 
-/// What every file may unpack to, bytes. Readers hold values up to four times on their way (as they
-/// stand in the file, as numbers, as columns, in a survey): a file of a few bytes stays below 300 MB.
+/// What every file may unpack to, bytes. Readers hold values up to four times on their way (as they are in the file, as
+/// numbers, as columns, in a survey): a file of a few bytes stays below 300 MB.
 const AT_LEAST: u64 = 48 << 20;
 /// And so many times its own length.
 const FACTOR: u64 = 64;
@@ -15,7 +15,7 @@ const FACTOR: u64 = 64;
 const CEILING: u64 = 16 << 30;
 /// The variable of the environment that raises what a file may unpack to, MB.
 const UNPACKED: &str = "HOID_MAX_UNPACKED_MB";
-/// What a text takes beside its characters, as it is held and copied.
+/// What a text takes next to its characters, as it is held and copied.
 const TEXT: u64 = 64;
 /// Structures inside of structures, at most.
 pub(super) const MOST_NESTED: usize = 32;
@@ -54,7 +54,7 @@ impl Budget {
         }
     }
 
-    /// Takes what so many numbers take as [`f64`] beside the bytes each that they stand in.
+    /// Takes what so many numbers take as [`f64`] next to the bytes each that they are in.
     pub(super) fn take_numbers(&mut self, count: usize, bytes_each: usize, file: &str) -> Result<(), IoError> {
         let more = (size_of::<f64>() as u64).saturating_sub(bytes_each as u64);
         self.take(more.saturating_mul(count as u64), file)

@@ -19,7 +19,7 @@ use crate::time::with_time;
 pub(crate) struct Format {
     /// Its name for a person.
     pub(crate) name: &'static str,
-    /// The extensions in lower case that stand for it, the usual one first.
+    /// The extensions in lower case that stand for it, the default one first.
     pub(super) endings: &'static [&'static str],
     /// How its bytes are read.
     pub(crate) reading: Reading,
@@ -35,7 +35,7 @@ type TableReader = for<'a> fn(&'a mut Vec<u8>, &'a str) -> Result<Table<'a>, IoE
 type ResultsReader = fn(Vec<u8>, &str) -> Result<OutputTable, IoError>;
 /// All arrays with their paths.
 type ArraysReader = fn(Vec<u8>, &str) -> Result<Contents, IoError>;
-/// Begins a file of rows.
+/// Starts a file of rows.
 type RowsStart = fn(&mut dyn Write, &TableSchema) -> io::Result<Box<dyn RowWriter>>;
 /// Writes columns of one length.
 pub(crate) type ColumnsWriter = fn(&mut dyn Write, &TableSchema, &[Values<'_>]) -> io::Result<()>;

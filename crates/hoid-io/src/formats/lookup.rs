@@ -113,7 +113,7 @@ fn format_to_read(path: &Path) -> Result<&'static Format, IoError> {
     })
 }
 
-/// The format of a file to write, which is no directory. A pipe or a device takes CSV under any
+/// The format of a file to write, which is not a directory. A pipe or a device takes CSV under any
 /// other name.
 pub(crate) fn format_to_write(path: &Path) -> Result<&'static Format, IoError> {
     let known = fs::metadata(path).ok();

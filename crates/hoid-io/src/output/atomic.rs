@@ -1,4 +1,4 @@
-//! Files that are whole or not there: written beside their place, then renamed into it.
+//! Files that are whole or not there: written next to their place, then renamed into it.
 
 use std::fs;
 use std::io::{self, BufWriter, Write};
@@ -77,7 +77,7 @@ impl WholeFile {
         }
     }
 
-    /// Writes through `write`, behind what is there.
+    /// Writes through `write`, after what is there.
     pub(crate) fn write<T>(&mut self, write: impl FnOnce(&mut dyn Write) -> io::Result<T>) -> Result<T, IoError> {
         write(&mut self.buffer).map_err(|source| IoError::Unwritable {
             file: self.name.clone(),

@@ -1,4 +1,4 @@
-//! Files on their way: `.hoid-*.part` beside the place where they are to be.
+//! Files on their way: `.hoid-*.part` next to the place where they are to be.
 //!
 //! A part is locked for as long as its writer lives; the system drops the locks of a process that
 //! is gone, however it ended. A part that can be locked is therefore nobody's, and is removed by the

@@ -6,8 +6,8 @@
 //! |---|---|---|
 //! | units | `scaling` | units that the file does not say |
 //! | scale | `scaling` | a channel times a factor, or from one unit to another |
-//! | offset | `offset` | channels that were recorded late are put beside the others |
-//! | rate | `rate` | every M-th sample, or a new sampling frequency, behind a low-pass filter |
+//! | offset | `offset` | channels that were recorded late are put next to the others |
+//! | rate | `rate` | every M-th sample, or a new sampling frequency, after a low-pass filter |
 //! | run-in | `run_in` | the first seconds are dropped |
 //! | detrend | [`Record::detrended`](hoid_model::Record::detrended) | mean or straight line out of input and output |
 //!

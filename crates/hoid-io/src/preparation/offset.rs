@@ -1,7 +1,7 @@
-//! Channels that were recorded late are put beside the others.
+//! Channels that were recorded late are put next to the others.
 //!
 //! A channel with the offset d was recorded d samples later than it happened: its sample k + d goes
-//! beside sample k of the others, `x'(k) = x(k + d)`. An offset of whole samples moves rows and
+//! next to sample k of the others, `x'(k) = x(k + d)`. An offset of whole samples moves rows and
 //! changes no number. Between samples the band-limited signal is taken by the windowed sinc of
 //! [`Kernel`]: up to 0.8 of the Nyquist frequency its error is below 1e-4 of the amplitude (80 dB);
 //! above, the channel is not what it was. Rows for which a channel has no sample, or not all that

@@ -1,8 +1,8 @@
 //! Factors and units of channels: `u=12.5`, `u=12.5:deg`, `e=rad:deg`.
 //!
-//! A factor says by what the numbers of the file are multiplied; behind a colon stands the unit
-//! that they then have. Two known units of one kind give the factor themselves, exactly: `rad:deg`
-//! is 180 / pi. Parameters of the operator are ratios of u and e: with e in deg and u in V the gain
+//! A factor says by what the numbers of the file are multiplied; after a colon stands the unit that
+//! they then have. Two known units of one kind give the factor themselves, exactly: `rad:deg` is
+//! 180 / pi. Parameters of the operator are ratios of u and e: with e in deg and u in V the gain
 //! K_e is in V/deg.
 
 use std::f64::consts::PI;
@@ -64,7 +64,7 @@ pub struct Scaling {
     factor: f64,
     /// The unit that the file must not contradict.
     from: Option<&'static str>,
-    /// The unit behind it; `None` keeps none, because the old one is no longer true.
+    /// The unit after it; `None` keeps none, because the old one is no longer true.
     to: Option<String>,
 }
 
@@ -113,7 +113,7 @@ impl FromStr for Scaling {
         // A number is a number: "1:deg" names a unit and changes no value.
         if let Ok(factor) = left.parse::<f64>() {
             if right == Some("") {
-                return Err(refused(text, "a unit behind the colon, as 12.5:deg"));
+                return Err(refused(text, "a unit after the colon, as 12.5:deg"));
             }
             return Self::by(factor, right).map_err(|_| {
                 refused(
@@ -157,7 +157,7 @@ fn refused(found: &str, expected: &str) -> IoError {
 }
 
 impl RecordParts {
-    /// Units that are declared beside the file; what the file says is not overruled.
+    /// Units that are declared next to the file; what the file says is not overruled.
     pub(super) fn declare_units(&mut self, units: &std::collections::BTreeMap<String, String>) -> Result<(), IoError> {
         const STEP: &str = "unit";
         let named = units.iter().map(|(name, unit)| (name.clone(), unit.as_str()));

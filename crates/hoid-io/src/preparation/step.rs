@@ -25,7 +25,7 @@ pub enum Step {
         what: Vec<&'static str>,
         /// Time of the first sample of the part, s.
         from_s: f64,
-        /// Time behind its last sample, s.
+        /// Time after its last sample, s.
         to_s: f64,
     },
     /// Missing values were bridged by straight lines.
@@ -54,10 +54,10 @@ pub enum Step {
         channel: String,
         /// The factor.
         factor: f64,
-        /// The unit behind it, where it is known.
+        /// The unit after it, where it is known.
         unit: Option<String>,
     },
-    /// A channel that was recorded late was put beside the others.
+    /// A channel that was recorded late was put next to the others.
     Offset {
         /// The channel.
         channel: String,
@@ -82,7 +82,7 @@ pub enum Step {
         to_hz: f64,
         /// End of the pass band, Hz.
         pass_hz: f64,
-        /// Begin of the stop band, Hz; none where the frequency rises.
+        /// Start of the stop band, Hz; none where the frequency rises.
         stop_hz: Option<f64>,
         /// Attenuation in the stop band, dB.
         stop_db: f64,
@@ -92,15 +92,15 @@ pub enum Step {
         cut_s: (f64, f64),
         /// By how much the delay of a model with a hold is shorter than at the old rate, s.
         delay_s: f64,
-        /// By how much a sample of the input is taken later than that of the output beside it, so that
-        /// the delay is the same at both rates, s.
+        /// By how much a sample of the input is taken later than that of the output next to it, so that the delay is
+        /// the same at both rates, s.
         input_lead_s: f64,
     },
     /// The first seconds were dropped.
     RunIn {
         /// Length of the run-in, s.
         seconds: f64,
-        /// Samples dropped, beside those that a filter had cut.
+        /// Samples dropped, next to those that a filter had cut.
         samples: usize,
     },
     /// The mean or the straight line of input and output was taken out.
@@ -222,7 +222,7 @@ impl fmt::Display for Step {
             } if *input_lead_s > 0.0 => write!(
                 f,
                 "{} Hz, filtered and decimated by {} to {} Hz: a linear-phase filter of {taps} samples on all channels, pass band to \
-                 {} Hz, {stop_db} dB from {} Hz; each sample of the input stands in the middle of its hold, {} s later, so that \
+                 {} Hz, {stop_db} dB from {} Hz; each sample of the input is in the middle of its hold, {} s later, so that \
                  the delay is that of the old rate",
                 decimal(*from_hz),
                 decimal(*factor),

@@ -1,4 +1,4 @@
-//! Channels that were recorded late, put beside the others without losing an end of the span.
+//! Channels that were recorded late, put next to the others without losing an end of the span.
 //!
 //! A channel that is moved by d samples has no value for d rows at one end of what was read. A span
 //! of whole periods would lose its last period with them. Where the file reaches beyond the span,
@@ -62,7 +62,7 @@ pub fn read_aligned(
     }
 }
 
-/// The record as it stands in the file.
+/// The record as it is in the file.
 pub(super) fn read_as_recorded(path: &Path, options: &ReadOptions, drop_repeated: bool) -> Result<ReadRecord, IoError> {
     let file = path.display().to_string();
     let (format, mut bytes) = bytes_of(path)?;

@@ -49,7 +49,7 @@ pub fn read_prepared(path: &Path, options: &ReadOptions, preparation: &Preparati
 
 /// Writes a record: t, then `f_t` where there is one, input, output, and the other channels in
 /// their order, all with the digits that give the same numbers back. Units and sample time are kept
-/// beside them as comments; the label is not written.
+/// next to them as comments; the label is not written.
 ///
 /// # Errors
 /// [`IoError::UnknownFormat`], [`IoError::ChannelName`] for a channel that could not be read back,

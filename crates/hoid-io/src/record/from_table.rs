@@ -73,7 +73,7 @@ pub(super) fn record_of(
 }
 
 impl ReadRecord {
-    /// The record prepared, and what was done to it behind what was done in reading.
+    /// The record prepared, and what was done to it after what was done in reading.
     pub(super) fn prepared(mut self, preparation: &Preparation) -> Result<Self, IoError> {
         let (record, steps) = preparation.apply(self.record)?;
         self.steps.extend(steps);

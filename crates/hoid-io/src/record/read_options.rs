@@ -8,14 +8,14 @@ use crate::IoError;
 use crate::table::ColumnExpression;
 use crate::time::TimeChoice;
 
-/// What may be mended in a damaged record. By default nothing is.
+/// What may be repaired in a damaged record. By default nothing is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Repair {
     /// Interpolate linearly from an uneven t, also over gaps, to an even grid. The grid starts at
     /// the first t; its sample time is that of the typical step, or of
     /// [`ReadOptions::sampling_hz`].
     pub resample: bool,
-    /// Bridge missing values (empty, NaN, NA) linearly between the values before and behind.
+    /// Bridge missing values (empty, NaN, NA) linearly between the values before and after.
     pub fill: bool,
 }
 
@@ -38,7 +38,7 @@ pub struct ReadOptions {
     pub sampling_hz: Option<f64>,
     /// The samples with `from <= t < to`, s; what lies outside is not looked at. By default all.
     pub span_s: (Option<f64>, Option<f64>),
-    /// What may be mended.
+    /// What may be repaired.
     pub repair: Repair,
 }
 

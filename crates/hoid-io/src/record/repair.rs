@@ -10,7 +10,7 @@ use std::ops::Range;
 use crate::preparation::Step;
 use crate::table::{Table, kept};
 
-/// Why missing values could not be bridged: nothing stands on one side of them.
+/// Why missing values could not be bridged: nothing is on one side of them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum OpenEnd {
     Start,
@@ -140,7 +140,7 @@ mod tests {
             assert!((value - (2.0 - 0.3 * k as f64)).abs() < 1e-14, "{k}");
         }
         assert_eq!(even[0], 2.0);
-        // A last sample that rounding puts behind the data takes the last value.
+        // A last sample that rounding puts after the data takes the last value.
         assert_eq!(resample(&t, &values, 0.0, 1.0 + 1e-12, 2)[1], values[5]);
     }
 }

@@ -29,8 +29,8 @@ impl TableReader<'_> {
         }
     }
 
-    /// The part of these rows in which all signals have values on both sides, where missing ones are bridged: two topics in
-    /// one table do not begin and end in the same row.
+    /// The part of these rows in which all signals have values on both sides, where missing ones are bridged: two
+    /// topics in one table do not start and end in the same row.
     pub(super) fn between_values(&mut self, rows: Range<usize>, time: Option<usize>) -> Range<usize> {
         if !self.options.repair.fill {
             return rows;

@@ -1,11 +1,11 @@
 //! Trials in one file: a column that counts them, a time that starts again, or an array of
 //! structures in MATLAB.
 //!
-//! Each trial is a record of its own, with initial states of its own; one record over all of them
-//! would answer at each seam to what was never seen. A part begins where the value of the column
-//! changes or where t falls. Without `--trial` parts are only looked for where t falls: each must
-//! have [`SHORTEST`] rows, and t must fall by half of what it rose at least, which no clock does that
-//! is set. The column that steps with the parts, if there is one, gives them their names.
+//! Each trial is a record of its own, with initial states of its own; one record over all of them would answer at each
+//! seam to what was never seen. A part starts where the value of the column changes or where t falls. Without `--trial`
+//! parts are only looked for where t falls: each must have [`SHORTEST`] rows, and t must fall by half of what it rose
+//! at least, which no clock does that is set. The column that steps with the parts, if there is one, gives them their
+//! names.
 
 use std::ops::Range;
 
@@ -69,7 +69,7 @@ fn falls(table: &Table<'_>) -> Vec<usize> {
     time.map_or_else(Vec::new, falls)
 }
 
-/// The rows between the places at which something begins.
+/// The rows between the places at which something starts.
 fn between(begins: &[usize], rows: usize) -> Vec<Range<usize>> {
     let from = std::iter::once(0).chain(begins.iter().copied());
     let to = begins.iter().copied().chain([rows]);

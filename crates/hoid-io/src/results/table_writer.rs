@@ -88,7 +88,7 @@ pub struct TableWriter {
     file: WholeFile,
     name: String,
     columns: Vec<ColumnSchema>,
-    /// None after an error of the system: half a group may stand in the file then.
+    /// None after an error of the system: half a group may be in the file then.
     sink: Option<Sink>,
     /// Rows that do not yet make a group.
     waiting: Vec<ColumnValues>,
@@ -103,7 +103,7 @@ impl std::fmt::Debug for TableWriter {
 }
 
 impl TableWriter {
-    /// Begins a file of a format by its extension, as in [`write_table`](crate::write_table).
+    /// Starts a file of a format by its extension, as in [`write_table`](crate::write_table).
     ///
     /// # Errors
     /// [`IoError::UnknownFormat`]; [`IoError::NoColumns`], [`IoError::DuplicateColumn`] or

@@ -258,7 +258,9 @@ impl Source<'_> {
                 initial,
                 last: given.gain_last.unwrap_or(initial),
             },
-            _ => return refuse("give share (of the variance of u) or gain, and gain_last beside gain only".to_owned()),
+            _ => {
+                return refuse("give share (of the variance of u) or gain, and gain_last next to gain only".to_owned());
+            }
         };
         let mut used = Vec::new();
         let shape = match given.shape {

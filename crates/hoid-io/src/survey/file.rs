@@ -87,7 +87,7 @@ fn signal(column: &RawColumn) -> Signal<'_> {
     }
 }
 
-/// What is wrong with the columns that stand beside each other, by structure and length.
+/// What is wrong with the columns that are next to each other, by structure and length.
 fn quality_issues(columns: &[RawColumn]) -> Vec<QualityIssue> {
     let mut seen: Vec<(&str, usize)> = Vec::new();
     let mut found = Vec::new();

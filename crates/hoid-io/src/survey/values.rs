@@ -23,9 +23,9 @@ pub struct ValueSurvey {
     pub constant: bool,
     /// The step of a quantised column.
     pub quantum: Option<f64>,
-    /// Rows in which a saturated column stands at its smallest value.
+    /// Rows in which a saturated column is at its smallest value.
     pub saturated_low: usize,
-    /// Rows in which a saturated column stands at its largest value.
+    /// Rows in which a saturated column is at its largest value.
     pub saturated_high: usize,
     /// The course of the values in block characters.
     pub sketch: String,

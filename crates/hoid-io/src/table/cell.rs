@@ -2,7 +2,7 @@
 
 use std::borrow::Cow;
 
-/// What stands in a cell.
+/// What is in a cell.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Cell {
     /// A number, finite or infinite.

@@ -126,7 +126,7 @@ mod tests {
         assert_eq!(precision(&["0", "1", "120"]).unit(3.0), 1.0);
         assert!(precision(&["0.30000000000000004"]).unit(0.3) < 1e-15);
         assert_eq!(Precision::default().unit(3.0), 0.0);
-        // Nothing that can stand in a file gives anything but a number of s.
+        // Nothing that can be in a file gives anything but a number of s.
         assert!(precision(&["1e-99999999999", ".", "-", "e"]).unit(1e300) >= 0.0);
     }
 

@@ -11,7 +11,7 @@ use crate::table::{Column, Precision};
 /// ns in a s.
 const NS_PER_S: i64 = 1_000_000_000;
 
-/// A moment and the digits behind the point of its seconds.
+/// A moment and the digits after the point of its seconds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Moment {
     ns: i64,
@@ -51,7 +51,7 @@ pub(crate) enum Moments {
 }
 
 impl Moments {
-    /// Takes a cell that is text, and puts what it is worth behind the values of its column.
+    /// Takes a cell that is text, and puts what it is worth after the values of its column.
     pub(crate) fn push(&mut self, column: &mut Column, cell: &str) {
         let moment = parse(cell).filter(|_| *self != Self::No);
         let row = column.values.len();
@@ -106,7 +106,7 @@ fn days_of(date: &str) -> Option<i64> {
         _ => (c, a, b),
     };
     let (year, month, day) = (year.len() == 4).then_some((number(year)?, number(month)?, number(day)?))?;
-    // With slashes the day may stand first.
+    // With slashes the day may be first.
     let (month, day) = if mark == '/' && month > 12 {
         (day, month)
     } else {

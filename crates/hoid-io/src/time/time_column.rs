@@ -6,13 +6,12 @@
 //! 2. the only one that holds stamps: dates and times of a clock in text or as such, or numbers that
 //!    count from 1970 in a column `timestamp`, `header.stamp`;
 //! 3. whole seconds with nanoseconds in the next column: `stamp.sec`, `stamp.nanosec`;
-//! 4. a first column without a name, or the first line of a matrix, that increases from row to row
-//!    and is no row number.
+//! 4. a first column without a name, or the first line of a matrix, that increases from row to row and is not a row
+//!    number.
 //!
-//! `--time COLUMN[:unit]` wins over all of them. A unit is that of the name; else that of the size of
-//! numbers that count from 1970 (1e11 s would be the year 5138); else that of the steps: whole numbers
-//! at least 5 apart are no s but the unit in which 2 to 2000 of them are in a second. What is taken
-//! is said.
+//! `--time COLUMN[:unit]` wins over all of them. A unit is that of the name; else that of the size of numbers that
+//! count from 1970 (1e11 s would be the year 5138); else that of the steps: whole numbers at least 5 apart are not s
+//! but the unit in which 2 to 2000 of them are in a second. What is taken is said.
 
 use super::time_choice::{TimeChoice, Unit};
 use crate::IoError;
@@ -87,7 +86,7 @@ pub(crate) fn with_time<'a>(mut table: Table<'a>, choice: Option<&TimeChoice>) -
     if let Some((at, unit)) = found {
         take(&mut table, at, unit);
     }
-    // Moments that are not the time are no numbers.
+    // Moments that are not the time are not numbers.
     for column in table.columns.iter_mut().filter(|column| column.moments) {
         column.values.fill(f64::NAN);
         column.texts = (0..table.rows).collect();

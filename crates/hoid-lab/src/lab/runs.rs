@@ -1,4 +1,4 @@
-//! A run as the server has it: sent, begun, taken batch by batch, ended.
+//! A run as the server has it: sent, started, taken batch by batch, ended.
 
 use std::{collections::BTreeMap, sync::Arc, thread};
 
@@ -204,7 +204,7 @@ impl Shared {
         Ok(())
     }
 
-    /// Writes what stands behind a run: first its record, so that a run that was told as verified has one.
+    /// Writes what is after a run: first its record, so that a run that was told as verified has one.
     fn close(
         &self,
         state: &mut Current,
@@ -265,7 +265,7 @@ fn not_taken(error: LabError) -> LabError {
         _ => return error,
     };
     LabError::Order(format!(
-        "{what}. The run was ended and does not count; make room on the disk and begin it again"
+        "{what}. The run was ended and does not count; make room on the disk and start it again"
     ))
 }
 

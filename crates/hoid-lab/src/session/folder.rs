@@ -24,7 +24,7 @@ pub(super) fn check_subject(subject: &str) -> Result<(), LabError> {
     )))
 }
 
-/// What the names of all files of a run begin with.
+/// What the names of all files of a run start with.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Stem {
     folder: PathBuf,
@@ -55,7 +55,7 @@ impl Stem {
         self.folder.join("reports").join(&self.stem)
     }
 
-    /// All runs of a folder that have begun, by their number.
+    /// All runs of a folder that have started, by their number.
     ///
     /// # Errors
     /// [`LabError::Io`].

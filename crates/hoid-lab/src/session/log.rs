@@ -128,7 +128,7 @@ impl RunLog {
         })
     }
 
-    /// Whether a batch continues what is logged; the tick behind its last.
+    /// Whether a batch continues what is logged; the tick after its last.
     ///
     /// # Errors
     /// [`LabError::Message`] for one that does not continue the last one or is beyond the end.
@@ -149,7 +149,7 @@ impl RunLog {
     /// Appends a batch, all of it or nothing.
     ///
     /// # Errors
-    /// Those of [`RunLog::continued_by`]; [`LabError::File`], behind which the files hold the batches before.
+    /// Those of [`RunLog::continued_by`]; [`LabError::File`], after which the files hold the batches before.
     pub fn append(&mut self, batch: &Batch) -> Result<(), LabError> {
         let end = self.continued_by(batch)?;
         let mut texts = [String::new(), String::new(), String::new()];

@@ -11,7 +11,7 @@ use crate::{LabError, task::Signals};
 /// The log of a run.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Logged {
-    /// The number of each tick, as it stands there.
+    /// The number of each tick, as it is there.
     pub numbers: Vec<f64>,
     /// u and e of each.
     pub signals: Signals,
@@ -48,8 +48,8 @@ impl Logged {
     }
 }
 
-/// Calls `each` with the numbers of every whole line behind the header, up to one that is none; what is
-/// wrong with the file, if something is.
+/// Calls `each` with the numbers of every whole line after the header, up to one that is none; what is wrong with the
+/// file, if something is.
 fn rows<const N: usize>(path: &Path, mut each: impl FnMut([f64; N])) -> Result<Option<String>, LabError> {
     let name = || {
         path.file_name()

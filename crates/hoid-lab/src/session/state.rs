@@ -41,7 +41,7 @@ pub struct Facts {
     pub subject: String,
     /// Which session of this person, from 1.
     pub session: usize,
-    /// When it began, in UTC.
+    /// When it started, in UTC.
     pub began: String,
     /// That the consent was confirmed, and when.
     pub consent: String,
@@ -117,7 +117,7 @@ pub struct Session {
 }
 
 impl Session {
-    /// Begins a session of a person who has confirmed the consent.
+    /// Starts a session of a person who has confirmed the consent.
     ///
     /// # Errors
     /// [`LabError::Order`] for a pseudonym that is none; those of files.
@@ -292,7 +292,7 @@ impl Session {
         })
     }
 
-    /// Appends a line, whole or not at all, behind the last whole one.
+    /// Appends a line, whole or not at all, after the last whole one.
     fn write_down(&mut self, done: Done) -> Result<(), LabError> {
         let path = self.folder.join("runs.csv");
         let whole = if path.exists() {
@@ -337,7 +337,7 @@ impl Session {
     }
 }
 
-/// The directories in one whose names begin so, sorted.
+/// The directories in one whose names start so, sorted.
 fn directories(of: &Path, prefix: &str) -> Result<Vec<PathBuf>, LabError> {
     if !of.exists() {
         return Ok(Vec::new());

@@ -39,7 +39,7 @@ pub fn fill(ballast: &Path) {
     }
 }
 
-/// All that stands there, elsewhere.
+/// All that is there, elsewhere.
 pub fn copied(from: &Path, to: &Path) {
     fs::create_dir_all(to).unwrap();
     for entry in fs::read_dir(from).unwrap().map(Result::unwrap) {

@@ -58,7 +58,7 @@ const EXTREMES: [f64; 16] = [
     f64::NEG_INFINITY,
 ];
 
-/// The same, and what is no number, as JSON has them.
+/// The same, and what is not a number, as JSON has them.
 fn extreme(draw: &mut Draw) -> Value {
     match draw.below(12) {
         0 => Value::Null,
@@ -167,7 +167,7 @@ impl Hostile {
             if draw.below(8) == 0 {
                 bytes(&mut text, draw);
             }
-            // What is no message ends at the door.
+            // What is not a message ends at the door.
             if let Ok(message) = serde_json::from_slice::<FromPage>(&text) {
                 let _ = self.person.lab.hear(self.person.page, message);
             }

@@ -44,7 +44,7 @@ impl Person {
         self.lab.hear(self.page, message).map_err(|error| error.to_string())
     }
 
-    /// Begins the next run, which has this number.
+    /// Starts the next run, which has this number.
     pub fn next(&mut self, number: usize) -> Result<(), String> {
         self.say(json!({"type": "next"}))?;
         let tables = self.heard.try_iter().filter_map(|outgoing| match outgoing {

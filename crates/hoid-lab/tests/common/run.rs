@@ -1,4 +1,4 @@
-//! A run of a session as its page begins it.
+//! A run of a session as its page starts it.
 
 use hoid_lab::{
     config::Limits,

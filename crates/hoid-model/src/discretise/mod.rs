@@ -1,4 +1,4 @@
-//! Discretisation of general transfer functions (Table 5.2 of the reference text).
+//! Discretisation of general transfer functions (Table 5.2 of the thesis).
 //!
 //! | method | rule |
 //! |---|---|

@@ -17,7 +17,7 @@ use crate::{
 /// A target or a disturbance.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Excitation {
-    /// Its sinusoids; none is no signal.
+    /// Its sinusoids; none is not a signal.
     pub function: ForcingFunction,
     /// True where each run draws its phases anew, uniform over the circle.
     pub random_phases: bool,

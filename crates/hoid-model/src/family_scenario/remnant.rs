@@ -1,4 +1,4 @@
-//! What u holds beside the response to the error: the remnant, and a stick that is not at rest.
+//! What u holds next to the response to the error: the remnant, and a stick that is not at rest.
 //!
 //! The remnant is a sum of independent parts. Each part is a sequence of unit variance through a
 //! shaping filter and a gain,
@@ -13,7 +13,7 @@
 //!
 //! | part | source |
 //! |---|---|
-//! | broad band, `1/(T_n s + 1)^m` | eq. 3 of the reference text; W. H. Levison, S. Baron and D. L. Kleinman, IEEE Trans. Man-Machine Systems 10 (1969) 101-108 |
+//! | broad band, `1/(T_n s + 1)^m` | eq. 3 of the thesis; W. H. Levison, S. Baron and D. L. Kleinman, IEEE Trans. Man-Machine Systems 10 (1969) 101-108 |
 //! | peak near omega_nm | the tremor that the neuromuscular loop lets through: R. E. Magdaleno and D. T. McRuer, NASA CR-1757 (1971) |
 //! | slow drift | `1/(T_n s + 1)` with T_n of many seconds |
 //! | signal-dependent | C. M. Harris and D. M. Wolpert, Nature 394 (1998) 780-784; Levison et al. for the scaling with the signals |

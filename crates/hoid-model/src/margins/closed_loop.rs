@@ -23,7 +23,7 @@ pub fn closed_loop_is_stable(open_loop: &ContinuousTransferFunction) -> bool {
 
 /// Lowest frequency at which a closed loop is followed, over the size of the controlled element's poles and 1 rad/s.
 const LOWEST: f64 = 1e-4;
-/// Distance in rad from a whole number of half turns that is no rounding any more.
+/// Distance in rad from a whole number of half turns that is not rounding any more.
 const NO_HALF_TURN_RAD: f64 = 0.5;
 
 /// Number of closed-loop poles in the right half plane of a stable operator with the frequency response `operator`

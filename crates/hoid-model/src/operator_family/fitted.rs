@@ -1,4 +1,4 @@
-//! An operator as a fit left it: where another estimate of the same person may begin.
+//! An operator as a fit left it: where another estimate of the same person may start.
 
 use super::operator::FamilyOperator;
 use crate::{ModelError, SampleTime};

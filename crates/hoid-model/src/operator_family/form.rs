@@ -95,7 +95,7 @@ impl Coordinate {
     }
 
     /// The coordinate of a parameter by its name; `None` for K_e_dot, which is a product of two,
-    /// and for what is no parameter.
+    /// and for what is not a parameter.
     pub fn of_parameter(name: &str) -> Option<Self> {
         match name {
             "K_over_T_I" | "K_I" | "K_e" => Some(Self::Gain),
@@ -169,8 +169,8 @@ impl Form {
         all
     }
 
-    /// Number of coordinates of the numerator beside the gain: T_L, or c_1 and c_2, or T_L and
-    /// alpha. They stand behind the gain in [`Form::coordinates`], before those of the poles.
+    /// Number of coordinates of the numerator next to the gain: T_L, or c_1 and c_2, or T_L and
+    /// alpha. They are after the gain in [`Form::coordinates`], before those of the poles.
     pub fn varying_beside_gain(self) -> usize {
         match self {
             Self::Gain | Self::Lag => 0,
@@ -180,7 +180,7 @@ impl Form {
     }
 
     /// The numerator over its gain, `m_0 + m_1 s + m_2 s^2`, from the coordinates of the numerator
-    /// behind the gain, and the derivatives of its coefficients along them.
+    /// after the gain, and the derivatives of its coefficients along them.
     pub fn shape(self, x: &[f64]) -> ([f64; 3], [[f64; 3]; 2]) {
         let none = [0.0; 3];
         match self {

@@ -1,4 +1,4 @@
-//! The exact discrete model of an operator of the family behind a zero-order hold, with a delay of
+//! The exact discrete model of an operator of the family after a zero-order hold, with a delay of
 //! any fraction of a sample, and its derivatives.
 //!
 //! In controllable canonical form `x' = A x + B e(t - tau)`, `u = C x + D e(t - tau)` with
@@ -341,7 +341,7 @@ mod tests {
                 let size: f64 = powers.iter().zip(shape).map(|(p, m)| (x[0] * m * p.b[k]).abs()).sum();
                 assert!((sum - b).abs() <= 1e-12 * size, "{operator:?} {k}: {sum} {b}");
             }
-            // The numerator is no part of them.
+            // The numerator is not a part of them.
             let of_numerator = 1 + operator.form().varying_beside_gain();
             for power in &powers {
                 assert_eq!((power.nk, &power.f), (whole.nk, &whole.f));
@@ -386,7 +386,8 @@ mod tests {
         for (log_omega, log_zeta, rate) in [(5.2, -4.0, 0.0), (5.2, 3.0, 40.0), (-3.0, 0.0, 0.0), (2.0, 0.0, 1e-12)] {
             let held = with(log_omega, log_zeta, rate).zoh(ts()).unwrap();
             let roots = polynomial::roots(&[&[1.0][..], &held.f].concat()).unwrap();
-            // A pure integration lies on the circle, up to the rounding of a root beside two others.
+            // A pure integration lies on the circle, up to the rounding of a root next to two
+            // others.
             assert!(roots.iter().all(|z| z.norm() < 1.0 + 1e-9), "{roots:?}");
         }
         assert!(with(400.0, 0.0, 0.1).zoh(ts()).is_err());

@@ -98,13 +98,13 @@ pub struct Decimated {
     pub to_hz: f64,
     /// End of the pass band, Hz.
     pub pass_hz: f64,
-    /// Begin of the stop band, Hz: what lies between folds down above the pass band.
+    /// Start of the stop band, Hz: what lies between folds down above the pass band.
     pub stop_hz: f64,
     /// Attenuation in the stop band, dB.
     pub stop_db: f64,
     /// Length of the filter, samples of the old rate.
     pub taps: usize,
-    /// By how much a sample of the input is taken later than that of the output beside it, s.
+    /// By how much a sample of the input is taken later than that of the output next to it, s.
     pub lead_s: f64,
     /// By how much a stream is behind, s.
     pub lag_s: f64,

@@ -36,11 +36,11 @@ pub struct Decimator<const C: usize> {
 struct Lane {
     /// Samples from its old sample to the whole one before a new value: 0, or the middle of M.
     lead: i64,
-    /// Place of the first weight beside that sample, and the weights.
+    /// Place of the first weight next to that sample, and the weights.
     offset: i64,
     weights: Vec<f64>,
-    /// What the filter needs; the first stands at `first` old samples, which the reflection of the
-    /// beginning makes negative.
+    /// What the filter needs; the first is at `first` old samples, which the reflection of the
+    /// start makes negative.
     past: VecDeque<f64>,
     first: i64,
     /// The last good value.
@@ -96,12 +96,12 @@ impl<const C: usize> Decimator<C> {
         self.done
     }
 
-    /// The sample time behind it.
+    /// The sample time after it.
     pub fn sample_time(&self) -> SampleTime {
         self.sample_time
     }
 
-    /// How many samples the last one given lies behind the last one taken.
+    /// How many samples the last one given lies after the last one taken.
     pub fn lag_samples(&self) -> u64 {
         let at = self.given.saturating_sub(1) * self.done.factor as u64;
         self.came.saturating_sub(1).saturating_sub(at)
@@ -165,11 +165,11 @@ impl Lane {
         self.past.push_back(self.last);
     }
 
-    /// The reflection of the beginning in the first sample.
+    /// The reflection of the start in the first sample.
     fn reflect(&mut self, half: usize) {
         let begin = self.past[0];
         for k in 1..=half {
-            // What was put before it stands in front of the k-th.
+            // What was put before it is in front of the k-th.
             let value = 2.0 * begin - self.past[2 * k - 1];
             self.past.push_front(value);
         }
@@ -190,7 +190,7 @@ impl Lane {
             .sum()
     }
 
-    /// Lets go what the value at `next` and those behind it do not need.
+    /// Lets go what the value at `next` and those after it do not need.
     fn forget(&mut self, next: u64, half: usize) {
         while self.first < next as i64 - half as i64 && self.past.pop_front().is_some() {
             self.first += 1;

@@ -18,7 +18,7 @@ impl Decimation {
 }
 
 impl Record {
-    /// Every M-th sample of all channels behind the same filter of linear phase, the input taken in
+    /// Every M-th sample of all channels after the same filter of linear phase, the input taken in
     /// the middle of the M samples over which it is held.
     ///
     /// # Errors

@@ -1,8 +1,8 @@
 //! Bode pair: magnitude and phase of models with their 95 % bands, and of the true operator where
 //! it is known.
 //!
-//! The estimators see the operator behind the zero-order hold of their sampling, `B q^-nk/(A F)`;
-//! the truth is drawn behind the same hold, so that both curves lie on each other when the
+//! The estimators see the operator after the zero-order hold of their sampling, `B q^-nk/(A F)`;
+//! the truth is drawn after the same hold, so that both curves lie on each other when the
 //! parameters agree. The phase is unwrapped with the delay `nk Ts omega` taken out, which turns
 //! fastest, and put back.
 

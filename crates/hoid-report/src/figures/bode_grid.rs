@@ -17,7 +17,7 @@ use crate::numbers::Z_95;
 /// One frequency response.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BodeCurve {
-    /// Its name in the legend, where equal names of one look stand once; empty for none.
+    /// Its name in the legend, where equal names of one look are once; empty for none.
     pub name: String,
     /// How it is drawn: [`LineKind::Truth`] for the response that the others are compared with.
     pub kind: LineKind,

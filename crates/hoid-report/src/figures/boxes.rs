@@ -65,7 +65,7 @@ pub struct BoxPanel {
     /// Size up to which the ordinate is linear, and logarithmic beyond; linear throughout where it
     /// is `None`.
     pub linear_within: Option<f64>,
-    /// What stands above the panel, such as the largest of its numbers; empty for nothing.
+    /// What is above the panel, such as the largest of its numbers; empty for nothing.
     pub note: String,
 }
 
@@ -272,7 +272,7 @@ impl BoxGrid {
         if missing {
             entries.push(Entry::new("no value", INK, Sample::Cross));
         }
-        // Levels of one method stand in one row.
+        // Levels of one method are in one row.
         let levels = self.series.first().map_or(1, |s| s.shade.levels);
         add_legend_by(scene, &entries, levels);
     }

@@ -26,7 +26,7 @@ const LINE: f64 = 1.4;
 const RADIUS: f64 = 2.2;
 /// Half of the end of an error bar.
 const CAP: f64 = 2.5;
-/// Beside the first and the last stem or marker, part of the abscissa.
+/// Next to the first and the last stem or marker, part of the abscissa.
 const ROOM: f64 = 0.03;
 
 /// How a curve is drawn.
@@ -52,7 +52,7 @@ pub enum LineKind {
 /// One curve.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Curve {
-    /// Its name in the legend, where equal names of one look stand once; empty for none.
+    /// Its name in the legend, where equal names of one look are once; empty for none.
     pub name: String,
     /// How it is drawn.
     pub kind: LineKind,
@@ -287,8 +287,8 @@ impl Curve {
         runs(n, known).into_iter().filter(|r| r.len() > 1).map(line).collect()
     }
 
-    /// Stems, error bars and markers, and the values that stand alone between gaps; none outside
-    /// the axes.
+    /// Stems, error bars and markers, and the values that are alone between gaps; none outside the
+    /// axes.
     fn draw_marks(&self, scene: &mut Scene, scale: &Scale) {
         let colour = self.colour();
         let n = self.y.len().min(self.x.len());

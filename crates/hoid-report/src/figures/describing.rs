@@ -16,7 +16,7 @@ use super::{
 };
 use crate::numbers::Z_95;
 
-/// In the legend; equal names stand there once.
+/// In the legend; equal names are there once.
 const NAME: &str = "describing function, bars 95 %";
 /// The same where a bar is not drawn to its end.
 const NAME_OF_CUT: &str = "describing function, bars 95 %, cut at 180 deg";

@@ -190,7 +190,7 @@ mod tests {
         assert!(text.contains("/MediaBox [0 0 240.9"), "{text}");
         assert!(text.contains("/Font"), "letters are letters");
         let png = FigureFormat::Png.bytes(&svg).unwrap();
-        // Width and height stand in the first chunk: 85 mm at 300 dots an inch.
+        // Width and height are in the first chunk: 85 mm at 300 dots an inch.
         let dots = |at: usize| u32::from_be_bytes(png[at..at + 4].try_into().unwrap());
         assert!(
             dots(16).abs_diff(1004) <= 4 && dots(20).abs_diff(502) <= 4,

@@ -1,5 +1,5 @@
-//! The grid that figures of several panels stand in: widths, heights and margins of its cells,
-//! labels of rows, titles of columns or panels.
+//! The grid that figures of several panels are in: widths, heights and margins of its cells, labels
+//! of rows, titles of columns or panels.
 //!
 //! One column is as wide as a column of text, several as a page. Axes are equally wide in all
 //! columns. Only the lowest panel of a column has the ticks and the name of the abscissa.

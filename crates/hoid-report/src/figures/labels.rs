@@ -5,9 +5,9 @@
 //! agree on is little: they add up or replace the shifts of tags within tags, drop tags without
 //! text, trim spaces at the edges of a tag, and place each tag for itself where a text is centred.
 //! So the tags stand one after the other, each with text and with the whole step from the one
-//! before, and spaces at their edges do not break. Where a text with tags begins says `svg`.
+//! before, and spaces at their edges do not break. Where a text with tags starts says `svg`.
 
-/// Stand in the text of labels for the begin and end of a subscript and of a superscript; they
+/// Stand in the text of labels for the start and end of a subscript and of a superscript; they
 /// become tags.
 const SUB: char = '\u{e000}';
 const BACK: char = '\u{e001}';
@@ -40,7 +40,7 @@ impl Level {
     }
 }
 
-/// Size of subscripts in units of the figure, and beside that of the line.
+/// Size of subscripts in units of the figure, and next to that of the line.
 const SUBSCRIPT: &str = "12.2";
 const SMALLER: f64 = 12.2 / 13.0;
 

@@ -20,7 +20,7 @@ use super::{
 /// Height of a cell, and the least of a panel.
 const CELL: f64 = 26.0;
 const LEAST_HEIGHT: f64 = 78.0;
-/// Where the name of the ordinate stands before its axis.
+/// Where the name of the ordinate is before its axis.
 const NAME_AT: f64 = 26.0;
 /// Between the names of places.
 const APART: f64 = 5.0;
@@ -218,7 +218,7 @@ impl MapGrid {
                     scene.add(text);
                 }
                 if is_marked {
-                    // Beside the number, or in the middle where none stands.
+                    // Next to the number, or in the middle where none stands.
                     let (at, half) = match decimals {
                         Some(_) => ((corner.0 + width - 4.6, corner.1 + 4.6), 2.2),
                         None => ((corner.0 + 0.5 * width, corner.1 + 0.5 * height), 5.0),

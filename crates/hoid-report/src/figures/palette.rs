@@ -87,7 +87,7 @@ pub fn is_dark(colour: &str) -> bool {
     lightness(channels(colour)) < 50.0
 }
 
-/// The channels of `#rrggbb`; a part that is no number is zero.
+/// The channels of `#rrggbb`; a part that is not a number is zero.
 fn channels(colour: &str) -> [f64; 3] {
     let part = |i: usize| {
         let digits = colour.get(1 + 2 * i..3 + 2 * i).unwrap_or("00");

@@ -142,7 +142,7 @@ impl TracePanel {
         of(CurveKind::Estimate).any(near).then_some((low, high))
     }
 
-    /// The methods with rows beyond the axes of the panel when it stands alone.
+    /// The methods with rows beyond the axes of the panel when it is alone.
     pub fn beyond(&self) -> Vec<Beyond> {
         let (low, high) = self.range();
         let estimates = self.curves.iter().filter(|c| c.kind == CurveKind::Estimate);

@@ -1,4 +1,4 @@
-//! People by condition: each person a thin line through their estimates with their standard errors, and beside them
+//! People by condition: each person a thin line through their estimates with their standard errors, and next to them
 //! the mean over people with its interval of 95 %.
 
 use kuva::{prelude::Plot, render::render::Scene};

@@ -32,7 +32,7 @@ pub fn time_response(id: &str, record: &Record, validation: &Validation) -> Stri
     let models = validation.simulated.iter().chain(&validation.predicted);
     let (wanted_low, wanted_high) = style::padded_range(measured.iter().chain(models).copied());
     let range = (wanted_low.max(low - half), wanted_high.min(high + half));
-    // Beyond the axes the path is clipped; without bound, numbers of 1e300 would stand in the file.
+    // Beyond the axes the path is clipped; without bound, numbers of 1e300 would be in the file.
     let bounded = |v: f64| v.clamp(range.0 - half, range.1 + half);
 
     let panel = |from: usize, to: usize| -> (Vec<Plot>, (f64, f64)) {

@@ -173,7 +173,7 @@ impl TracePanel {
     fn plots(&self, (low, high): (f64, f64), levels: usize, parts: usize) -> Vec<Plot> {
         let logarithmic = self.ordinate == Ordinate::Logarithmic;
         let half = 0.5 * (high - low);
-        // Beyond the axes the path is cut; without bound, numbers of 1e300 would stand in the file.
+        // Beyond the axes the path is cut; without bound, numbers of 1e300 would be in the file.
         let bounded = |v: f64| match logarithmic {
             true => v.clamp(low / 10.0, high * 10.0),
             false => v.clamp(low - half, high + half),

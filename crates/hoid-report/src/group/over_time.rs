@@ -103,7 +103,7 @@ impl GroupReport<'_> {
             .collect()
     }
 
-    /// The columns of the averages of traces whose name begins so, without the figure at their end.
+    /// The columns of the averages of traces whose name starts so, without the figure at their end.
     fn columns(&self, prefix: &str) -> Vec<&str> {
         let names = self.tables.traces.columns.iter().map(|column| column.name.as_str());
         names

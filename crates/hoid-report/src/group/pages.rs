@@ -1,4 +1,4 @@
-//! The pages of a finished group, made of the tables in its directory and written beside them.
+//! The pages of a finished group, made of the tables in its directory and written next to them.
 
 use std::{
     collections::BTreeSet,
@@ -144,11 +144,11 @@ pub fn write_group_pages(manifest: &Manifest, path: &Path, out: &Path) -> Result
     Ok(pages)
 }
 
-/// Characters of a subject in the name of a page: with a number behind them a name that every file
+/// Characters of a subject in the name of a page: with a number after them a name that every file
 /// system takes.
 const LONGEST_NAME: usize = 80;
 
-/// The name of the page of each subject: letters and digits, a number behind it where another
+/// The name of the page of each subject: letters and digits, a number after it where another
 /// subject has the name already. File systems that do not tell S1 from s1 are counted as well.
 fn page_names(subjects: &[&str]) -> Vec<String> {
     let mut taken = BTreeSet::new();

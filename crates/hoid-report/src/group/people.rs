@@ -37,7 +37,7 @@ pub struct PeopleTable {
     pub headings: Vec<String>,
     /// Cells of its rows.
     pub rows: Vec<Vec<String>>,
-    /// Where the columns of parameters begin; the last column is the verdict.
+    /// Where the columns of parameters start; the last column is the verdict.
     pub parameters: usize,
 }
 

@@ -211,7 +211,7 @@ fn span(trace: &Evaluated<'_>, record: &Record, line: &BatchLine<'_>) -> Value {
     let end = line.to_s - 0.5 * record.sample_time().s();
     let span = format!("[{}, {}] s", plain(line.from_s), plain(line.to_s));
     let Some(row) = times.partition_point(|t| *t < end).checked_sub(1) else {
-        return context! { span, reason => "the trace begins later" };
+        return context! { span, reason => "the trace starts later" };
     };
     let at_s = times[row];
     let (now, fit) = (&trace.operators[row], line.fit.operator());

@@ -4,7 +4,7 @@
 //!
 //! `u = r(k - l) + n`, `y = C x_p + D (u + d)`, `e = f - y`,
 //!
-//! r the response of the operator behind the part of a sample of their delay `tau = l Ts + delta`,
+//! r the response of the operator after the part of a sample of their delay `tau = l Ts + delta`,
 //! x_p the state of the controlled element. Operator and element are then taken over one sample
 //! exactly, for inputs that are held ([`hoid_model::held_system`]). An operator without
 //! neuromuscular part may pass e on at once: of the held error that would be one sample or the next,
@@ -50,14 +50,14 @@ pub(super) struct Outputs {
     pub y: f64,
 }
 
-/// Where the loop stands between two samples.
+/// Where the loop is between two samples.
 pub(super) struct LoopState {
     operator: OperatorState,
     element: Vec<f64>,
     next: Vec<f64>,
 }
 
-/// Where the operator stands between two samples.
+/// Where the operator is between two samples.
 #[derive(Debug, Clone)]
 pub(super) struct OperatorState {
     state: Vec<f64>,
@@ -74,7 +74,7 @@ pub(super) struct OperatorState {
 pub(super) struct OperatorOutput {
     /// The response without the error of the sample, before the delay of whole samples.
     past: f64,
-    /// The same behind the delay: what u has of it.
+    /// The same after the delay: what u has of it.
     pub known: f64,
     /// What u has of the error of the sample besides.
     tap: f64,
@@ -226,7 +226,7 @@ impl OperatorState {
         }
     }
 
-    /// What it stands at, as numbers; the ring from the sample that is next.
+    /// What it is at, as numbers; the ring from the sample that is next.
     pub fn numbers(&mut self) -> impl Iterator<Item = &mut f64> {
         let oldest = self.k & (self.ring.len() - 1);
         self.ring.rotate_left(oldest);

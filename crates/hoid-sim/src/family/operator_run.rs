@@ -223,7 +223,7 @@ mod tests {
         }
     }
 
-    /// An operator goes on in another, behind the end of its scenario too.
+    /// An operator goes on in another, after the end of its scenario too.
     #[test]
     fn a_saved_operator_goes_on_with_the_same_digits() {
         let new = || FamilyOperatorRun::new(FamilySimulator::new(&busy()).unwrap(), SEED, 0.0).unwrap();

@@ -1,4 +1,4 @@
-//! What u holds beside the response, sample by sample: the parts of the remnant, and the walk of the stick.
+//! What u holds next to the response, sample by sample: the parts of the remnant, and the walk of the stick.
 //!
 //! `n(k) = walk(k) + sum of K_i(k) G_i(q) w_i(k)`, with K_i of [`calibration`](super::calibration) and w_i of
 //! [`noise`](super::noise), scaled by what it follows where it depends on the signal. All of it is known before the
@@ -24,7 +24,7 @@ pub(super) struct Remnants {
 }
 
 impl Remnants {
-    /// A number of the calibration at sample `k`, on its way from the initial to the last one; behind the end of the
+    /// A number of the calibration at sample `k`, on its way from the initial to the last one; after the end of the
     /// scenario it is that of the last sample.
     #[inline]
     fn calibrated(&self, scenario: &ResolvedFamilyScenario, k: usize, of: impl Fn(&Calibration) -> f64) -> f64 {
@@ -101,7 +101,7 @@ impl RemnantRun {
     /// The remnant of sample `k`, which comes after that of `k - 1`.
     #[inline]
     pub fn next(&mut self, scenario: &ResolvedFamilyScenario, of: &Remnants, k: usize) -> f64 {
-        // Behind the end of the scenario it goes on.
+        // After the end of the scenario it goes on.
         if k >= self.steps.len() {
             self.draw(scenario, 2 * k + 1);
         }
@@ -138,7 +138,7 @@ impl RemnantRun {
         self.walk += scenario.stick.walk_per_root_s * scenario.sample_time.s().sqrt() * self.steps[k];
     }
 
-    /// What it stands at, as numbers.
+    /// What it is at, as numbers.
     pub fn numbers(&mut self) -> impl Iterator<Item = &mut f64> {
         let shaped = self.shaped.iter_mut().flat_map(Shaped::numbers);
         [&mut self.walk, &mut self.before]

@@ -125,7 +125,7 @@ impl FamilySimulator {
         self.scenario.run_in_samples() + self.scenario.measurement_samples()
     }
 
-    /// The loop at sample `k`; behind the end of the scenario it is that of the last one.
+    /// The loop at sample `k`; after the end of the scenario it is that of the last one.
     #[inline]
     pub(super) fn held(&self, k: usize) -> &HeldLoop {
         let place = self.places.get(k).or(self.places.last()).copied().unwrap_or(0);

@@ -135,7 +135,7 @@ impl Person {
             scenario.remnant.clone_from(&remnant);
             scenario.measurement_s = task.measurement_s;
             scenario.run_in_s = task.run_in_s;
-            // What is stable in continuous time need not be so behind the holds.
+            // What is stable in continuous time need not be so after the holds.
             let simulator = match FamilySimulator::new(&scenario) {
                 Err(SimError::Model(ModelError::UnstableLoop { .. })) => continue,
                 other => other?,

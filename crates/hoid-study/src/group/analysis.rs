@@ -1,11 +1,10 @@
 //! What is done with the runs of a person in a condition, and with one run.
 //!
-//! All runs of a person in a condition come first. Where nothing changes within them the family of
-//! operators is fitted to all of them at once ([`hoid_ident::family`]): the operator of the person.
-//! nk, and for Box-Jenkins nd and T_n, are one choice for all of them too (`run_orders`). Beside these
-//! stands a Box-Jenkins model of all runs with initial states of each, the delay that fits best, and
-//! the greatest order of the noise model that the manifest allows. In a closed loop a noise model
-//! that is too small biases the operator, and one run is too short for a great one.
+//! All runs of a person in a condition come first. Where nothing changes within them the family of operators is fitted
+//! to all of them at once ([`hoid_ident::family`]): the operator of the person. nk, and for Box-Jenkins nd and T_n, are
+//! one choice for all of them too (`run_orders`). Next to these stands a Box-Jenkins model of all runs with initial
+//! states of each, the delay that fits best, and the greatest order of the noise model that the manifest allows. In a
+//! closed loop a noise model that is too small biases the operator, and one run is too short for a great one.
 //!
 //! With the chosen orders, ARX and Box-Jenkins models are fitted to the sub-batches of each run and
 //! to the whole of it, and the recursions start from the fit of the first sub-batch; the family is
@@ -205,7 +204,7 @@ impl<'a> RunAnalysis<'a> {
     fn track(&mut self, run: &Run, windows: &[Window; 3], method: &Method, from_cell: &FromCell) {
         let label = traces::label_of(method);
         let mut tracking = Tracking {
-            // The run is mended and at its rate.
+            // The run is repaired and at its rate.
             rate: Decimation::Off,
             every: run.samples(self.settings.trace_every as f64).round().max(1.0) as usize,
             ..Tracking::of(TrackRequest::of(method.clone()))

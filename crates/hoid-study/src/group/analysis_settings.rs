@@ -22,8 +22,7 @@ pub struct AnalysisSettings {
     /// Recursions by name, as in `hoid track`. Default: adaptive, rls, rpem.
     #[schemars(extend("items" = serde_json::json!({ "enum": method_names() })))]
     pub methods: Vec<String>,
-    /// Polynomial models that are fitted beside the operator, in tables and figures: arx, bj, both or
-    /// none.
+    /// Polynomial models that are fitted next to the operator, in tables and figures: arx, bj, both or none.
     #[schemars(extend("items" = serde_json::json!({ "enum": POLYNOMIALS.map(Structure::name) })))]
     pub polynomials: Vec<String>,
     /// Samples from one kept point of a trace to the next.
@@ -177,7 +176,7 @@ impl AnalysisSettings {
         for (from, to) in self.windows_s.iter().flatten() {
             if !(from < to && from.is_finite() && to.is_finite()) {
                 return Err(format!(
-                    "analysis.windows_s has [{from}, {to}], expected a beginning before its end"
+                    "analysis.windows_s has [{from}, {to}], expected a start before its end"
                 ));
             }
         }

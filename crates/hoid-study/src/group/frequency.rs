@@ -3,7 +3,7 @@
 //!
 //! For each subject and each condition whose excitation the manifest names: the describing function
 //! over the runs that can be read, its verdict, and crossover and margins with the controlled
-//! element, all as `hoid describe` has them ([`describe_runs`]). They stand beside the parametric
+//! element, all as `hoid describe` has them ([`describe_runs`]). They are next to the parametric
 //! fits and assume nothing of their structure.
 //!
 //! How far a fit is from it: with `H_j` the describing function at line j, `s_j` its standard error

@@ -49,7 +49,7 @@ use super::{
     preparation_settings::PreparationSettings, read_settings::ReadSettings,
 };
 
-/// Name of the copy of the manifest beside the results.
+/// Name of the copy of the manifest next to the results.
 pub const MANIFEST: &str = "group.toml";
 
 /// A group of recorded runs.
@@ -80,7 +80,7 @@ pub struct Manifest {
 pub struct RunEntry {
     /// Its file, from the directory of the manifest.
     pub file: PathBuf,
-    /// A second file that is joined behind the first, from the next sample on: what the person
+    /// A second file that is joined after the first, from the next sample on: what the person
     /// controls changes at the seam.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub then: Option<PathBuf>,

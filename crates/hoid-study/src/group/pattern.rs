@@ -65,7 +65,7 @@ impl Pattern {
                     .ok_or_else(|| bad("a brace is not closed".to_owned()))?;
                 if !NAMES.contains(&name) {
                     return Err(bad(format!(
-                        "{{{name}}} is no name, expected {{subject}}, {{condition}} or {{run}}"
+                        "{{{name}}} is not a name, expected {{subject}}, {{condition}} or {{run}}"
                     )));
                 }
                 if parts.contains(&Part::Name(name.to_owned())) {

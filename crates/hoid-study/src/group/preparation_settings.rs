@@ -13,9 +13,9 @@
 //! offset = { stick = 0 }
 //! ```
 //!
-//! Where nothing is said of the rate, what is recorded at more than 200 Hz is decimated to about 100
-//! Hz ([`hoid_model::resampling`]); `offset_samples` of a condition counts samples as they were recorded,
-//! behind a factor or a frequency of one's own those of the new rate.
+//! Where nothing is said of the rate, what is recorded at more than 200 Hz is decimated to about 100 Hz
+//! ([`hoid_model::resampling`]); `offset_samples` of a condition counts samples as they were recorded, after a factor
+//! or a frequency of one's own those of the new rate.
 
 use std::collections::BTreeMap;
 
@@ -35,8 +35,8 @@ pub struct PreparationSettings {
     /// By how much a channel was recorded late, in samples, or in s as a text such as "0.0167s".
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub offset: BTreeMap<String, NumberOrText>,
-    /// Every M-th sample behind a low-pass filter; "off" or 1 keeps the rate. Default: "auto", above 200
-    /// Hz by the M that comes nearest to 100 Hz.
+    /// Every M-th sample after a low-pass filter; "off" or 1 keeps the rate. Default: "auto", above 200 Hz by the M
+    /// that comes nearest to 100 Hz.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub decimate: Option<NumberOrText>,
     /// New sampling frequency, Hz.

@@ -21,7 +21,7 @@ pub struct ReadSettings {
     /// Sampling frequency, Hz; that of the column t where it is left out.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sampling_hz: Option<f64>,
-    /// Begin of the span that counts, s.
+    /// Start of the span that counts, s.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub from_s: Option<f64>,
     /// End of the span that counts, s.

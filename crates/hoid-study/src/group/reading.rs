@@ -15,12 +15,12 @@ use super::{
 };
 use crate::columns::Rows;
 
-/// How the output is put beside the input.
+/// How the output is put next to the input.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Pairing {
     /// As recorded, and as `[prepare]` moves channels.
     Recorded,
-    /// With `offset_samples` of the condition taken back too: u beside the e that it answers.
+    /// With `offset_samples` of the condition taken back too: u next to the e that it answers.
     InTheLoop,
 }
 
@@ -103,7 +103,7 @@ fn read_file(manifest: &Manifest, condition: &str, path: &Path, pairing: Pairing
 pub(super) struct CheckedRecord {
     read: ReadRecord,
     faults: Vec<Fault>,
-    /// By how much its rate was lowered behind what counts samples as they were recorded.
+    /// By how much its rate was lowered after what counts samples as they were recorded.
     factor: usize,
     recorded: Recorded,
 }
@@ -151,7 +151,7 @@ pub(super) fn schemas() -> [(&'static str, TableSchema); 2] {
 /// A file by its name in the manifest, and what was read of it.
 pub(super) type ReadFile<'a> = (&'a Path, Result<CheckedRecord, String>);
 
-/// The file of a run, and the one that is joined behind it.
+/// The file of a run, and the one that is joined after it.
 pub(super) fn read_files<'a>(
     manifest: &Manifest,
     base: &Path,
@@ -170,11 +170,11 @@ pub(super) fn read_files<'a>(
 /// A run, read and prepared as the manifest says.
 pub(super) struct Run {
     pub record: Record,
-    /// Where the second file begins, s, for a run that is joined of two.
+    /// Where the second file starts, s, for a run that is joined of two.
     pub seam_s: Option<f64>,
     /// By how much its rate was lowered: so many samples of the recording are one.
     pub factor: usize,
-    /// By how much a sample of the input is taken later than that of the output beside it, s.
+    /// By how much a sample of the input is taken later than that of the output next to it, s.
     pub input_lead_s: f64,
     /// What an identification takes; nothing of a run that is joined of two, whose task changes at the seam.
     pub recorded: Option<Recorded>,

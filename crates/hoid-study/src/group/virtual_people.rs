@@ -123,7 +123,7 @@ pub fn simulate_people(
         (plant.to_string(), facts)
     };
     let analysis = AnalysisSettings {
-        // Remnants like people's are no lag of first order.
+        // Remnants like people's are not a lag of first order.
         nd: (1, 6),
         ..AnalysisSettings::default()
     };

@@ -1,5 +1,5 @@
-//! A virtual experiment: subjects, conditions and runs of simulated subjects, with the truth beside
-//! the files.
+//! A virtual experiment: subjects, conditions and runs of simulated subjects, with the truth next
+//! to the files.
 //!
 //! The gain K_e, the lead T_L, omega_nm, zeta_nm and the noise level of subject s are those of the
 //! condition times `exp(a z)`, z a normal deviate of the subject, a the spread between subjects

@@ -17,8 +17,8 @@ pub(super) const TIME_VARYING: &str = "time-varying";
 /// Another word for `operator`.
 const FAMILY: &str = "family";
 
-/// Options of the registry that are no keys of a plan's own table: they have types there, or no meaning for
-/// single runs.
+/// Options of the registry that are not keys of a plan's own table: they have types there, or no meaning for single
+/// runs.
 const ELSEWHERE: [&str; 10] = [
     "noise",
     "change",
@@ -118,7 +118,7 @@ pub(crate) fn parameters(asked: &ResolvedRequest) -> Vec<String> {
         }
         ResolvedRequest::Change(how) => {
             let mut names = how.estimator.names();
-            // What is no parameter of the fit, but a product of some that change.
+            // What is not a parameter of the fit, but a product of some that change.
             let all = how.estimator.form.parameters(how.estimator.neuromuscular).into_iter();
             let products = all.filter(|name| matches!(*name, "K" | "K_e_dot"));
             names.extend(products.flat_map(|name| [1, 2].map(|end| format!("{name}{end}"))));

@@ -70,7 +70,7 @@ pub struct Cell {
     pub replications: u64,
 }
 
-/// What a scenario of a plan has beside the keys of a scenario file.
+/// What a scenario of a plan has next to the keys of a scenario file.
 #[derive(Debug, Deserialize)]
 struct OwnKeys {
     name: Option<String>,

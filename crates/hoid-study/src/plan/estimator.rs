@@ -116,10 +116,7 @@ impl EstimatorCell {
             if let Some((from, to)) = span
                 && !(from < to && from.is_finite() && to.is_finite())
             {
-                return Err(at(
-                    key,
-                    format!("is [{from}, {to}], expected a beginning before its end"),
-                ));
+                return Err(at(key, format!("is [{from}, {to}], expected a start before its end")));
             }
         }
         let (mut start, mut start_values) = (String::new(), BTreeMap::new());

@@ -1,4 +1,4 @@
-//! The table `[[estimators]]` as it stands in a plan: keys, defaults, what belongs to which method.
+//! The table `[[estimators]]` as it is in a plan: keys, defaults, what belongs to which method.
 
 use std::collections::BTreeMap;
 
@@ -198,7 +198,7 @@ impl EstimatorTable {
         let (fits, grey_box) = (self.method == FIT, self.method == GREY_BOX);
         let operator = asked.is_some_and(|asked| asked.structure().is_none());
         let tracks = method.is_some();
-        // A window is no recursion that starts from coefficients or waits.
+        // A window is not a recursion that starts from coefficients or waits.
         let moves = method.is_some_and(|method| !method.fits_anew());
         let both = "fit and grey-box";
         let recursive = "the recursive methods";
@@ -402,7 +402,7 @@ impl EstimatorTable {
     }
 }
 
-/// Words for `method` beside those of the recursive methods.
+/// Words for `method` next to those of the recursive methods.
 pub(super) const FIT: &str = "fit";
 pub(super) const GREY_BOX: &str = "grey-box";
 pub(super) const RECORD: &str = "record";
@@ -475,7 +475,7 @@ fn as_text(kind: Kind) -> &'static str {
     }
 }
 
-/// What is wrong with a value, behind its key.
+/// What is wrong with a value, after its key.
 fn in_plan(error: &IdentError) -> String {
     match error {
         IdentError::BadOption { found, expected, .. } => format!("is {found}, expected {expected}"),

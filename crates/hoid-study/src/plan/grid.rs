@@ -41,7 +41,7 @@ struct Leaf {
     /// Each entry as it was written, and as it is shown.
     entries: Vec<(String, String)>,
     is_axis: bool,
-    /// Where it stands in the plan.
+    /// Where it is in the plan.
     start: usize,
 }
 
@@ -125,7 +125,7 @@ fn combination(index: usize, count: usize, leaves: &[Leaf], source: &str, first_
         let key: Vec<String> = leaf.path.iter().map(|part| quoted(part)).collect();
         let line = format!("{} = {written}\n", key.join("."));
         let at = line_at(source, leaf.start);
-        // An entry over several lines is short of some where the list began later; the first line
+        // An entry over several lines is short of some where the list started later; the first line
         // is what a reader looks for.
         variant.lines.extend(line.lines().map(|_| at));
         variant.text.push_str(&line);

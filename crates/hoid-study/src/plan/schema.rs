@@ -105,7 +105,7 @@ fn strip(schema: &mut Value) {
     }
 }
 
-/// Lets each value that is no table be a list of such values too.
+/// Lets each value that is not a table be a list of such values too.
 fn with_lists(table: &mut Value, whole: &[&str]) {
     let Some(properties) = table.get_mut("properties").and_then(Value::as_object_mut) else {
         return;

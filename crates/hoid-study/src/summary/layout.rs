@@ -45,7 +45,7 @@ pub(super) fn schema(plan: &Plan, columns: Vec<(String, ColumnKind)>) -> TableSc
     }
 }
 
-/// Begins a row with the settings of cell and estimator.
+/// Starts a row with the settings of cell and estimator.
 pub(super) fn begin_row(rows: &mut Rows, extra: &[String], cell: &Cell, estimator: &EstimatorCell) {
     let scenario = cell.resolved.scenario();
     rows.begin();

@@ -23,7 +23,7 @@ pub(super) type Update = fn(&Model, &mut Belief, f64, f64) -> [f64; 2];
 /// Variance of n over that of the remnant: a coloured remnant tells less than a white one of the
 /// same variance.
 const OUTPUT_NOISE: f64 = 10.0;
-/// Variance of what drives v beside the error within one second, over that of the remnant seen
+/// Variance of what drives v next to the error within one second, over that of the remnant seen
 /// through K_e_dot.
 const STATE_NOISE: f64 = 10.0;
 /// Drift of K_e and K_e_dot in one second, in units of `g = sqrt(K_e^2 + omega^2 K_e_dot^2)` and

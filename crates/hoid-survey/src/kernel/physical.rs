@@ -160,7 +160,7 @@ impl<S: Shape, const N: usize, const K: usize, const L: usize, A: Adaptation<N>>
         Some(recursion)
     }
 
-    /// Lets B begin at the delay of the estimate.
+    /// Lets B start at the delay of the estimate.
     fn apply_delay(&mut self) {
         if let Some(first) = self.model.smallest_nk {
             let nk = self.polynomials.whole_samples + 1;
@@ -276,7 +276,7 @@ impl<S: Shape, const N: usize, const K: usize, const L: usize, A: Adaptation<N>>
         self.correct();
     }
 
-    /// Sensitivities with respect to eta, whose noise parameters stand behind the operator's.
+    /// Sensitivities with respect to eta, whose noise parameters are after the operator's.
     #[inline(always)]
     fn sensitivities(&self) -> (ErrorLayout, Sensitivities<N, K>) {
         if K == 0 {

@@ -1,5 +1,5 @@
-//! The bank of hypotheses of the real-time kernel ([`crate::kernel::multiple_model`]) behind the face of a
-//! recursion: what it supposes of a person, in seconds.
+//! The bank of hypotheses of the real-time kernel ([`crate::kernel::multiple_model`]) after the face of a recursion:
+//! what it supposes of a person, in seconds.
 //!
 //! Where the delay is tracked, other delays are proposed every 1.28 s.
 //!

@@ -1,7 +1,7 @@
 //! The two-sided estimate of a recorded run: what all of its samples say of the operator at each of
 //! them.
 //!
-//! Behind the whitening filter the model of [`crate::kernel::multiple_model`] has no dynamics:
+//! After the whitening filter the model of [`crate::kernel::multiple_model`] has no dynamics:
 //! `y(t) = K_e psi_1 + K_e_dot psi_2 + eps`, with signals that the record gives once for all. The
 //! bank of hypotheses may therefore be run over it from either end. At t the run from the front
 //! says `p(eta_t | y_1..y_t) = sum_f P(f) N(m_f, P_f)`, where f says when the person changed last,
@@ -43,10 +43,10 @@ use super::prior::{change_prior, first_hypothesis, outside};
 /// Room for hypotheses, and time between two births, s.
 const HYPOTHESES: usize = 64;
 const SPACING_S: f64 = 0.08;
-/// Multiple of the covariance of the start fit from which both runs begin.
+/// Multiple of the covariance of the start fit from which both runs start.
 const KNOWN_LITTLE: f64 = 100.0;
 /// Time constants of the neuromuscular system after which the filters have forgotten that they
-/// began at rest.
+/// started at rest.
 const SETTLED: f64 = 6.0;
 /// Least probability of a hypothesis that is joined, and least share of a pair in the largest.
 const LEAST: f64 = 1e-3;
@@ -89,7 +89,7 @@ pub(crate) struct Joined {
     pub variance: f64,
 }
 
-/// Output and signals behind the whitening filter; `None` where they are not known.
+/// Output and signals after the whitening filter; `None` where they are not known.
 type WhitenedSample = Option<(f64, Signals)>;
 
 /// The two-sided estimates of the rows of a causal run.
@@ -171,7 +171,7 @@ fn two_sided(
     Ok(joined)
 }
 
-/// Output and signals of every sample behind D, for filters about a point that began at rest.
+/// Output and signals of every sample behind D, for filters about a point that started at rest.
 fn whitened(record: &Record, nk: usize, largest: f64, d: &[f64], about: [f64; 2]) -> Vec<WhitenedSample> {
     let (e, u) = (record.input(), record.output());
     let sound = |v: f64| v.abs() <= largest;

@@ -23,7 +23,7 @@ fn textbook() -> Orders {
 }
 
 /// `u = (B/F) q^-2 e + (1/D) eps` with white e and eps of unit variance; B is `gain` times the
-/// usual one from the middle on.
+/// default one from the middle on.
 fn open_loop(n: usize, replication: u64, d: &[f64], gain: f64) -> (Vec<f64>, Vec<f64>) {
     let white = |cell| {
         RunSeed {

@@ -26,7 +26,7 @@ pub(super) const CLAIMS: &[Claim] = &[
         theme: Theme::BatchArx,
         statement: "For m0 >= 2 the ARX \"estimation error in b0 and b1 is still around 50 % in most cases\".",
         place: "V.A.1, Fig. 5",
-        measure: "Magnitude of the median bias of b0 and b1 over m0 = 2 to 4 and the noise levels, C1, n_k* = 29; its sign is shown beside it.",
+        measure: "Magnitude of the median bias of b0 and b1 over m0 = 2 to 4 and the noise levels, C1, n_k* = 29; its sign is shown next to it.",
         plans: PLANS,
         source: Source::Data(b_around_fifty),
     },

@@ -1,4 +1,4 @@
-//! Statements of the reference text, tested by the data of studies.
+//! Statements of the thesis, tested by the data of studies.
 //!
 //! A claim names what the text says and where, which plans measure it and how. Its verdict comes
 //! from the data by the rules of the module [`rules`], the same for all claims. A claim whose plan

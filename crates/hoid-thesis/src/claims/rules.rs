@@ -173,7 +173,7 @@ pub struct Part {
     pub label: String,
     /// Its cells.
     pub tests: Vec<CellTest>,
-    /// Numbers beside those that are tested.
+    /// Numbers next to those that are tested.
     pub shown: Vec<(String, Value)>,
 }
 

@@ -5,7 +5,7 @@
 //! Its reference value is that of the backward Euler form (eq. B.12),
 //! `sigma'^2 = (K_n (Ts/(Tn + Ts))^m)^2`. The remnant is held exactly over a sample, in the
 //! simulations of the text as here, so that the innovations of an exact model have another
-//! variance: it is shown beside.
+//! variance: it is shown alongside.
 
 use super::{
     claim::{Claim, Source, Theme},

@@ -117,7 +117,7 @@ impl Task<'_> {
     }
 }
 
-/// The response of an operator with any delay, behind a zero-order hold, at some frequencies.
+/// The response of an operator with any delay, after a zero-order hold, at some frequencies.
 pub(crate) fn response_of(
     operator: &OperatorParameters,
     sample_time: SampleTime,

@@ -110,7 +110,7 @@ mod tests {
         for (found, expected) in found.response[0].iter().zip(expected) {
             assert!((found - expected).norm() < 1e-9, "{found} {expected}");
         }
-        // What is no line has no coefficient.
+        // What is not a line has no coefficient.
         let other = Task {
             omega_rad_s: &[1.0],
             ..task

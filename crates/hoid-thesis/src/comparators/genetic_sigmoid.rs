@@ -251,7 +251,7 @@ mod tests {
             let off = [0.3, 0.5, 0.7].iter().zip(best.genes).map(|(x, y)| (x - y).abs());
             assert!(off.fold(0.0, f64::max) < 0.05, "{seed}: {best:?}");
         }
-        // A cost that is no number is never the best.
+        // A cost that is not a number is never the best.
         let best = GeneticSigmoid::default().search(&|genes| if genes[0] < 0.9 { f64::NAN } else { 1.0 });
         assert!(best.genes[0] >= 0.9);
     }
@@ -264,7 +264,7 @@ mod tests {
         let truth = [0.09, 0.07, 0.4, 1.2, 40.96, 100.0, 11.25, 0.35, 0.28];
         let (loss, d1) = GeneticSigmoid::criterion(&task, run.record.input(), run.record.output(), &truth);
         // Standard error of d1 0.006; of a mean of squares 1.6 %, around the 1.37e-4 and 4.6e-4 of
-        // the two states; the transient at the beginning is the run's own.
+        // the two states; the transient at the start is the run's own.
         assert!((d1 + 0.8465).abs() < 0.03, "{d1}");
         assert!((1.3e-4..4.6e-4).contains(&loss), "{loss}");
         let mut other = truth;

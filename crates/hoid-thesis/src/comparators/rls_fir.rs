@@ -7,12 +7,11 @@
 //!
 //! `sum_k lambda^(t-k) (u(k) - g' phi(k))^2 + p var(u) g' K^-1 g`.
 //!
-//! The forcing function has ten lines, which excite twenty directions of nb: without the second term
-//! the others are whatever noise and rounding make of them, and the covariance of the usual form of
-//! the recursion grows as lambda^-t along them until it is no covariance. K is the *tuned-correlated*
-//! kernel `K_ij = decay^max(i, j)` (T. Chen, H. Ohlsson and L. Ljung, *Automatica* 48 (2012)
-//! 1525-1535), the covariance of a response that decays and is smooth; its inverse is that of
-//! independent increments,
+//! The forcing function has ten lines, which excite twenty directions of nb: without the second term the others are
+//! whatever noise and rounding make of them, and the covariance of the usual form of the recursion grows as lambda^-t
+//! along them until it is not a covariance. K is the *tuned-correlated* kernel `K_ij = decay^max(i, j)` (T. Chen, H.
+//! Ohlsson and L. Ljung, *Automatica* 48 (2012) 1525-1535), the covariance of a response that decays and is smooth; its
+//! inverse is that of independent increments,
 //!
 //! `g' K^-1 g = sum_i (g_i - g_{i+1})^2/(decay^i - decay^(i+1)) + g_{nb-1}^2/decay^(nb-1)`.
 //!
@@ -130,7 +129,7 @@ mod tests {
     use super::{super::tests::*, *};
 
     /// Another way to the same minimum: the regularised sum of squares as a tall least-squares
-    /// problem, rows of the prior beside those of the data, by Householder reflections.
+    /// problem, rows of the prior next to those of the data, by Householder reflections.
     #[test]
     fn the_recursion_gives_the_minimum_of_its_criterion() {
         let method = RlsFir {

@@ -49,7 +49,7 @@ pub struct RunOutcome {
     pub batch: [[State; 2]; 2],
     /// RLS and RPEM.
     pub courses: [Course; 2],
-    /// What was simulated, at the beginning and at the end.
+    /// What was simulated, at the start and at the end.
     pub truth: [State; 2],
 }
 

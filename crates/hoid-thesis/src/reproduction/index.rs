@@ -54,7 +54,7 @@ impl IndexPage {
     pub fn add_claims(&mut self, findings: &[(Claim, Finding)]) {
         let mut theme = "";
         for (claim, finding) in findings {
-            // The heading stands before the first claim of its theme.
+            // The heading is before the first claim of its theme.
             let heading = (claim.theme.title() != theme).then(|| claim.theme.title());
             theme = claim.theme.title();
             let class = match finding.verdict {
@@ -106,7 +106,7 @@ impl IndexPage {
             &[("reproduction.html", include_str!("../../templates/reproduction.html"))],
             "reproduction.html",
             context! {
-                title => "Reproduction of the reference text",
+                title => "Reproduction of the thesis",
                 settings => facts,
                 notes => &self.notes,
                 entries => &self.entries,

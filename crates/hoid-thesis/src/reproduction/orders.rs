@@ -133,7 +133,7 @@ fn make(item: &Item, results: &Results, condition: &str, m0: usize, shown: Shown
         });
     }
     let grid = |panels: Vec<MapPanel>, titles: Vec<String>| MapGrid {
-        // Two beside each other have cells that hold their numbers. Biases of b, a and the noise
+        // Two next to each other have cells that hold their numbers. Biases of b, a and the noise
         // differ by an order of magnitude: a colour bar for each pair.
         columns: 2,
         panels,

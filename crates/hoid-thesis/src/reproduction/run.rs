@@ -1,7 +1,7 @@
 //! The whole reproduction in a directory: runs the plans that are needed, draws tables and figures,
 //! tests the claims, writes the index page.
 //!
-//! Studies stand in `studies/NAME`, pictures and numbers in `figures` and `tables`. A study that is
+//! Studies are in `studies/NAME`, pictures and numbers in `figures` and `tables`. A study that is
 //! there already is taken as it is, so that a reproduction that was stopped goes on.
 
 use std::{

@@ -7,7 +7,7 @@
 //!
 //! | span | from, to |
 //! |---|---|
-//! | before | 30.72 s, behind the start span, to the change (or the middle) at 40.96 s |
+//! | before | 30.72 s, after the start span, to the change (or the middle) at 40.96 s |
 //! | through | the 5.12 s after it |
 //! | after | the last 20.48 s |
 //!
@@ -132,7 +132,7 @@ mod tests {
         let share = (81.92 - 40.96) / (81.92 - 10.0);
         assert!((errors.operator[0] - 10.0 * f64::sqrt(share)).abs() < 0.1, "{errors:?}");
         assert!(errors.operator[1] < 1e-10);
-        // Nothing found is no number.
+        // Nothing found is not a number.
         let none = Followed {
             response: vec![vec![Complex64::new(f64::NAN, 0.0); 2]; at.len()],
             operator: vec![None; at.len()],

@@ -1,9 +1,8 @@
 //! All methods of the survey on the same runs.
 //!
-//! Part II of the reference text describes the methods by which others have identified operators who
-//! change (section 2.4). A survey follows the same simulated runs with all of them: the recursive
-//! methods, as estimators of a study that anything can run, and the [`comparators`](crate::comparators),
-//! tables in a file of their own:
+//! Part II of the thesis describes the methods by which others have identified operators who change (section 2.4). A
+//! survey follows the same simulated runs with all of them: the recursive methods, as estimators of a study that
+//! anything can run, and the [`comparators`](crate::comparators), tables in a file of their own:
 //!
 //! ```toml
 //! [[comparators]]

@@ -30,7 +30,7 @@ pub struct MethodErrors {
     pub cell: u64,
     /// Name of the method in the plan.
     pub name: String,
-    /// What it was told beside e and u; empty for nothing.
+    /// What it was told next to e and u; empty for nothing.
     pub told: &'static str,
     /// Errors by run; why there are none where it failed.
     pub runs: Vec<Result<Errors, String>>,

@@ -1,4 +1,4 @@
-//! The tables of a survey, as they stand on the page "The survey's methods" of the book.
+//! The tables of a survey, as they are on the page "The survey's methods" of the book.
 
 use std::collections::BTreeMap;
 

@@ -17,9 +17,9 @@
 //! | `steps-shortened` | more than 5 % of the steps made shorter by stability or a bound |
 //! | `faults` | more than 10 % of the samples were faults |
 //! | `held-back` | outliers that the guard held back (a note), in more than 1 % of the samples (a doubt) |
-//! | `hostile-span` | spans that no tracking makes, at which the estimate stood still |
-//! | `learnt-at-rest` | e and u stand still for a second, and the guard that would hold the estimate there is off |
-//! | `restarted` | the guard began the estimate again |
+//! | `hostile-span` | spans that no tracking makes, at which the estimate stayed constant |
+//! | `learnt-at-rest` | e and u stay constant for a second, and the guard that would hold the estimate there is off |
+//! | `restarted` | the guard started the estimate again |
 //! | `steps-in-signals` | jumps of e or u that stayed (a note) |
 //! | `gain-sign` | K_e is significantly positive in some rows and negative in others |
 //! | `negative-lead` | K_e and K_e_dot have significantly opposite signs in more than a tenth of the rows |
@@ -33,7 +33,7 @@
 //! | `unstable-loop`, `no-crossover` | with the controlled element, the loop of the last row could not have been held |
 //! | `undeclared-change`, `drifting`, `swaying` | the response is not the same where no change is declared |
 //! | `no-answer` | e does not answer to u |
-//! | `not-finite` | an estimate that is no number |
+//! | `not-finite` | an estimate that is not a number |
 //!
 //! `operators` judges the operators of the rows, `recording` what the guard, the head and the end of the
 //! record say, `structure` the form of the operator, `steadiness` whether it is the same throughout, `moment` one
@@ -77,7 +77,7 @@ impl Trace {
         if rows.iter().any(|row| self.theta(*row).iter().any(|v| !v.is_finite())) {
             all.push(Finding::undetermined(
                 "not-finite",
-                "the estimate is no number in some rows",
+                "the estimate is not a number in some rows",
             ));
             return Ok(Verdict::of(all));
         }
@@ -110,7 +110,7 @@ impl Trace {
         let of_start = |finding: &Finding| Finding {
             severity: match finding.kind {
                 // One that forgets is there to follow it; one that weighs the start against all that
-                // comes begins between the two.
+                // comes starts between the two.
                 "not-constant" if !self.options().method.is_model_of_change() => Severity::Note,
                 _ => finding.severity.min(Severity::Doubt),
             },
@@ -148,8 +148,8 @@ impl Trace {
             Finding::note(
                 "supposed",
                 format!(
-                    "{} at the end: not determined by the record, what stands there is what was supposed before it, or one of \
-                     several that foretell u as well",
+                    "{} at the end: not determined by the record, what is there is what was supposed before it, or one of \
+                     several that predict u as well",
                     open.join(", ")
                 ),
             )
@@ -173,7 +173,7 @@ impl Trace {
 
     /// A standard error that grew without bound, of the coefficients that have one.
     fn covariance_finding(&self, rows: &[usize]) -> Option<Finding> {
-        // The beginning may start from nothing.
+        // The start may start from nothing.
         let rows = &rows[rows.len() / 2..];
         let names = self.parameter_names();
         let estimates: Vec<Vec<Estimate>> = rows.iter().map(|row| self.parameters(*row)).collect();

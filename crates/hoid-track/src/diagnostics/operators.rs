@@ -43,7 +43,7 @@ pub(super) fn operator_findings(trace: &Trace, operators: &[Operator]) -> Vec<Fi
         let reason = operators.iter().find_map(|o| o.as_ref().err());
         let reason = reason.map_or(String::new(), |r| format!(", as {r}"));
         let words = format!("{:.0} % of the rows stand for no operator{reason}", 100.0 * lacking);
-        // A gain of zero in all rows is no model of another form: nothing was found.
+        // A gain of zero in all rows is not a model of another form: nothing was found.
         let nothing = operators.iter().all(|o| matches!(o, Err(NotConvertible::ZeroGain)));
         all.push(match nothing {
             true => Finding::undetermined("not-convertible", words),

@@ -59,7 +59,7 @@ impl Trace {
             all.push(Finding::doubt(
                 "hostile-span",
                 format!(
-                    "the estimate stands still in {} spans in which e and u are no tracking ({})",
+                    "the estimate stays constant in {} spans in which e and u are not tracking ({})",
                     spans.len(),
                     named(&spans)
                 ),
@@ -69,13 +69,13 @@ impl Trace {
         if !again.is_empty() {
             all.push(Finding::doubt(
                 "restarted",
-                format!("the estimate was begun again after {} of them", again.len()),
+                format!("the estimate was started again after {} of them", again.len()),
             ));
         }
         all
     }
 
-    /// Where e and u stand still and the estimate goes on, which was asked for: nothing arrives there, and its error
+    /// Where e and u stay constant and the estimate goes on, which was asked for: nothing arrives there, and its error
     /// bars go to zero with the innovations ([`crate::stationary`]).
     pub(super) fn learnt_at_rest(&self, record: &Record) -> Option<Finding> {
         if self.options().method.guard() != Some(GuardChoice::No) {
@@ -96,9 +96,9 @@ impl Trace {
         })
     }
 
-    /// What the last seconds of the record say against the last row: a delay that is another now, or an
-    /// estimate that has not come back. A step of [`operator_step`] that is [`UNLIKELY`] beside its own
-    /// error and that of the row; of a delay that is a whole number of samples, beyond one and a half.
+    /// What the last seconds of the record say against the last row: a delay that is another now, or an estimate that
+    /// has not come back. A step of [`operator_step`] that is [`UNLIKELY`] next to its own error and that of the row;
+    /// of a delay that is a whole number of samples, beyond one and a half.
     pub(super) fn not_followed(&self, record: &Record) -> Option<Finding> {
         let row = self.len().checked_sub(1)?;
         let operator = self.operator(row).ok()?;
@@ -135,7 +135,7 @@ impl Trace {
                 if p_value < UNLIKELY && worst.as_ref().is_none_or(|(known, _)| p_value < *known) {
                     let words = format!(
                         "the last {length:.0} s ask for another {name} than the last row, by {}: the person changed in a way \
-                         that the estimate does not follow, or it has not come back; begin it again there",
+                         that the estimate does not follow, or it has not come back; start it again there",
                         step.by
                     );
                     worst = Some((p_value, words));
@@ -186,7 +186,7 @@ impl Trace {
         } else {
             Finding::doubt(
                 "idle-head",
-                format!("{words}, which are in the start fit; begin it after them"),
+                format!("{words}, which are in the start fit; start it after them"),
             )
         })
     }

@@ -19,7 +19,7 @@ const UNLIKELY_SWAY: f64 = 0.05;
 /// Share of what older e and u leave of e that the latest u explains, below which e does not answer: in loops it is
 /// above one half, of two runs with the same forcing below .03.
 const NO_ANSWER: f64 = 0.05;
-/// A declared change is in neither of the stretches beside it for so long, s.
+/// A declared change is in neither of the stretches next to it for so long, s.
 const ABOUT_S: f64 = 5.0;
 
 impl Trace {

@@ -1,9 +1,9 @@
 //! Whether the operator of the last row has the structure that the person has.
 //!
-//! The numerator, corrections of the poles and of the delay, and a level are what the basis of people can
-//! estimate; together they span the six signals of its filter, and one behind its lag once more is the correction of the
-//! lag, where that is all that is missed. Whether the errors before, since the last
-//! change, say anything more of u is the question ([`hoid_ident::diagnostics::residual_response()`]).
+//! The numerator, corrections of the poles and of the delay, and a level are what the basis of people can estimate;
+//! together they span the six signals of its filter, and one after its lag once more is the correction of the lag,
+//! where that is all that is missed. Whether the errors before, since the last change, say anything more of u is the
+//! question ([`hoid_ident::diagnostics::residual_response()`]).
 
 use hoid_core::adaptive::basis::{Basis, Point, Signals};
 use hoid_ident::diagnostics::{ResidualResponse, residual_response};
@@ -15,7 +15,7 @@ use crate::{guard::GuardKind, trace::Trace};
 const UNLIKELY: f64 = 1e-3;
 /// Probability from which another lag explains what is left.
 const OF_LAG: f64 = 0.02;
-/// Seconds that are looked at, at most, and at the beginning not: the filter is at rest there.
+/// Seconds that are looked at, at most, and at the start not: the filter is at rest there.
 const LONGEST_S: f64 = 120.0;
 const SETTLING_S: f64 = 10.0;
 /// Lag of the basis where the method has none of its own, s.
@@ -61,7 +61,7 @@ impl Trace {
         of(&columns)
     }
 
-    /// From when the filters of the basis have settled: what was no tracking is in them until it has faded.
+    /// From when the filters of the basis have settled: what was not tracking is in them until it has faded.
     pub(super) fn settled_s(&self, record: &Record) -> f64 {
         let outliers = [GuardKind::Outlier, GuardKind::Step];
         let hostile = self.faults().iter().filter(|fault| !outliers.contains(&fault.kind));
@@ -88,7 +88,7 @@ impl Trace {
     }
 }
 
-/// What a signal is behind the lag once more: with it the lag of the basis has a correction, as poles and delay have.
+/// What a signal is after the lag once more: with it the lag of the basis has a correction, as poles and delay have.
 fn slower(signal: &[f64], lag_s: f64, sample_time_s: f64) -> Vec<f64> {
     let pole = (-sample_time_s / lag_s).exp();
     let step = |state: &mut f64, z: &f64| {
@@ -145,7 +145,7 @@ mod tests {
         let clean: Vec<f64> = (0..30).map(|i| found(&run(i)).p_value).collect();
         assert!(clean.iter().filter(|p| **p < 0.05).count() <= 6, "{clean:?}");
         assert!(clean.iter().all(|p| *p > UNLIKELY), "{clean:?}");
-        // A third of the gain once more, .85 s behind the error: far beyond the delay and its corrections.
+        // A third of the gain once more, .85 s after the error: far beyond the delay and its corrections.
         let echoes: Vec<ResidualResponse> = (0..6).map(|i| found(&with_echo(&run(i), 0.33, 85))).collect();
         let seen = echoes.iter().filter(|f| f.p_value < UNLIKELY);
         assert!(seen.count() >= 5, "{echoes:?}");

@@ -74,7 +74,7 @@ fn change() -> crate::Change {
     }
 }
 
-/// An output of zero has no gain: that is no doubtful operator, it is none.
+/// An output of zero has no gain: that is not a doubtful operator, it is none.
 #[test]
 fn an_output_that_is_zero_is_not_determined() {
     let record = simulated(Condition::C1);
@@ -205,7 +205,7 @@ fn the_output_of_another_run_is_told() {
     assert!(!kinds(&judged(&record, &typical())).contains(&"no-answer"));
 }
 
-/// u is scaled behind the person: what the loop does of it is another matter.
+/// u is scaled after the person: what the loop does of it is another matter.
 #[test]
 fn a_gain_that_drifts_and_one_that_sways_are_told() {
     let record = simulated(Condition::C1);

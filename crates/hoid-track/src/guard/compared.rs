@@ -1,6 +1,6 @@
 //! When the model of the start is compared with the estimate: in the first [`COMPARED`] of every
 //! [`EVERY`] blocks, so that it costs little, and in all blocks for [`SUSPECT_FOR`] after something
-//! unusual. Its filters begin at rest, and have [`SETTLING`] blocks to forget that.
+//! unusual. Its filters start at rest, and have [`SETTLING`] blocks to forget that.
 
 use hoid_core::{
     delay::DelayLine,
@@ -47,7 +47,7 @@ impl Reference {
         }
     }
 
-    /// A round begins, with all at rest.
+    /// A round starts, with all at rest.
     pub fn begin(&mut self) {
         self.model.reset();
         (self.over, self.compared) = (0, SUSPECT_FOR);
@@ -73,7 +73,7 @@ impl Reference {
         }
     }
 
-    /// A block is over; true where the estimate has gone astray.
+    /// A block is over; true where the estimate has gone diverged.
     pub fn end_block(&mut self, block: &Block, length: u32) -> bool {
         self.over += 1;
         // Blocks with samples that were held back say nothing.

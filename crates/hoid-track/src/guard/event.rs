@@ -5,23 +5,23 @@ use hoid_model::SampleTime;
 /// What was found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum GuardKind {
-    /// One to a few samples that the signal does not foretell and that it comes back from.
+    /// One to a few samples that the signal does not predict and that it comes back from.
     Outlier,
     /// A jump that the signal does not come back from.
     Step,
-    /// Samples that are no numbers, for longer than an outlier lasts.
+    /// Samples that are not numbers, for longer than an outlier lasts.
     Missing,
     /// A signal 30 times as large as it was.
     Level,
-    /// A signal that stands still.
+    /// A signal that stays constant.
     Frozen,
     /// Two signals that are nearly silent.
     Idle,
     /// e is as u was, and u as e was.
     Swapped,
-    /// A model that foretells u worse than the past of u does.
+    /// A model that predicts u worse than the past of u does.
     Misfit,
-    /// An estimate that foretells u worse than the start fit does.
+    /// An estimate that predicts u worse than the start fit does.
     Diverged,
 }
 
@@ -44,9 +44,9 @@ pub enum GuardAction {
     Held,
     /// Held back at first, then taken as they came, as if nothing had been.
     Accepted,
-    /// The estimate stands still from here on.
+    /// The estimate stays constant from here on.
     Paused,
-    /// The estimate, which had stood still, moves again.
+    /// The estimate, which had stayed constant, moves again.
     Resumed,
     /// The estimate moves again, from where it was before the span.
     Restarted,
@@ -80,7 +80,7 @@ hoid_model::named_choice!(GuardChannel, "channel", 3, {
     Both => "e, u",
 });
 
-/// A span that was not as it should be, and what was done, as told at one of its samples or behind it.
+/// A span that was not as it should be, and what was done, as told at one of its samples or after it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GuardEvent {
     /// What was found.
@@ -107,7 +107,7 @@ pub struct TrackFault {
     pub channel: GuardChannel,
     /// Time of its first sample, s.
     pub from_s: f64,
-    /// Time of the sample behind its last, s.
+    /// Time of the sample after its last, s.
     pub to_s: f64,
     /// As [`GuardEvent::size`].
     pub size: f64,
@@ -132,12 +132,12 @@ impl GuardEvent {
 }
 
 impl TrackFault {
-    /// True for a span in which the estimate stood still, of which the end is not known.
+    /// True for a span in which the estimate stayed constant, of which the end is not known.
     pub fn is_open(&self) -> bool {
         self.action == GuardAction::Paused
     }
 
-    /// Puts a fault behind those before it; the end of a pause takes the place of its beginning.
+    /// Puts a fault after those before it; the end of a pause takes the place of its start.
     pub(crate) fn put(self, behind: &mut Vec<Self>) {
         if behind.last().is_some_and(Self::is_open) {
             behind.pop();

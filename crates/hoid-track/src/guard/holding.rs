@@ -186,7 +186,7 @@ impl Guard {
         }
         // e jumps with its target and moves as before, while the person answers only after their delay.
         let ring = &self.ring[..self.in_ring];
-        // More is held than stands there only in numbers that were changed.
+        // More is held than is there only in numbers that were changed.
         let first = self.in_ring.saturating_sub(held as usize);
         let behind = ring[first..].iter().map(|raw| raw.values[0]);
         let is_target = c == 0 && !ring.iter().any(|raw| raw.held[1]) && self.channels_before[0].moves_as_usual(behind);

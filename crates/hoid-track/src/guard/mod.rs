@@ -8,14 +8,14 @@
 //! | no numbers for longer | the same | stays | goes on once the filters have settled |
 //! | 30 times the usual magnitude | the long-run mean of e, the prediction of u | stays | goes on from there once the filters have settled |
 //! | frozen, idle, larger or rescaled, swapped, misfit (by blocks of a second) | the samples, into the filters alone | is put back to before it | goes on from there once the span is over and the filters have settled |
-//! | an estimate that has gone astray by [`hoid_core::guard::reference`] | the samples, into the filters alone | is put back to the start | goes on from there once the filters have settled |
+//! | an estimate that has gone diverged by [`hoid_core::guard::reference`] | the samples, into the filters alone | is put back to the start | goes on from there once the filters have settled |
 //!
-//! **Steps and pulses.** `e = r - y`: a step of the target moves e by the same within one sample, and y goes
-//! on; so does u, for the person answers after their delay. A jump of e that stays, behind which e moves as it did
-//! while u goes on as foretold, is tracking and is not told. A sensor that is disturbed lets go as fast as it took hold: what comes back by a
-//! jump is an outlier. A hand that is fast goes out of a dead zone at once but comes back over several samples:
-//! an excursion of u of [`PULSE_S`] or more within [`PULSE`] times its mean magnitude, whose last step is within
-//! what u moves anyway, is a pulse, taken as it came.
+//! **Steps and pulses.** `e = r - y`: a step of the target moves e by the same within one sample, and y goes on; so
+//! does u, for the person answers after their delay. A jump of e that stays, after which e moves as it did while u goes
+//! on as predicted, is tracking and is not told. A sensor that is disturbed lets go as fast as it took hold: what comes
+//! back by a jump is an outlier. A hand that is fast goes out of a dead zone at once but comes back over several
+//! samples: an excursion of u of [`PULSE_S`] or more within [`PULSE`] times its mean magnitude, whose last step is
+//! within what u moves anyway, is a pulse, taken as it came.
 //!
 //! **Putting back.** The numbers of a recursion are few ([`hoid_core::state`]). They are kept when a
 //! sample is first held back, every [`SOUND_EVERY`] blocks in which all was well (the last two are
@@ -26,17 +26,17 @@
 //! **Filters have settled** after the delay and [`SETTLE_S`]: the slowest poles of people's
 //! neuromuscular systems (omega zeta of 2 to 4 rad/s) leave less than 2 % after that time.
 //!
-//! A misfit, swapped channels or a larger level that last for [`GIVEN_UP_S`] are taken for the new
-//! usual: the recursion begins again from its start, and what is usual is learnt anew. When after
-//! that the signals are as they were before, so is what is usual. Silence has no end.
+//! A misfit, swapped channels or a larger level that last for [`GIVEN_UP_S`] are taken for the new usual: the recursion
+//! starts again from its start, and the default is learnt anew. When after that the signals are as they were before, so
+//! is the default. Silence has no end.
 //!
 //! | file | what it holds |
 //! |---|---|
 //! | `holding` | samples that are held back, and what becomes of them |
-//! | `pausing` | pauses, from their beginning to their end |
+//! | `pausing` | pauses, from their start to their end |
 //! | `blocks` | what is judged, learnt and kept once a second |
-//! | `prime` | what is usual, from the record of the start span |
-//! | `compared` | the model of the start beside the signals |
+//! | `prime` | the default, from the record of the start span |
+//! | `compared` | the model of the start next to the signals |
 //! | `snapshot` | the numbers of a recursion, kept and put back |
 //! | `event`, `options` | what is told of it, what is chosen |
 
@@ -79,7 +79,7 @@ const LEAST_AGE: u64 = 4;
 /// Magnitude in units of the usual mean magnitude beyond which a signal is not what it was.
 const LARGEST: f64 = 30.0;
 /// Least limit of outliers in units of the mean magnitude: e passes a low-pass filter before it
-/// meets an innovation, u stands in the innovation itself.
+/// meets an innovation, u is in the innovation itself.
 const FLOOR: [f64; CHANNELS] = [0.3, 1e-3];
 /// A pulse of the hand takes no less, s, and goes no further, in units of the mean magnitude.
 const PULSE_S: f64 = 0.03;
@@ -96,7 +96,7 @@ pub(crate) struct Guarded {
     pub held: bool,
 }
 
-/// A sample as it came; NaN for what is no number.
+/// A sample as it came; NaN for what is not a number.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 struct Raw {
     values: [f64; CHANNELS],
@@ -206,7 +206,7 @@ impl State for Guard {
 impl Guard {
     /// A guard of a recursion at its start, with a delay of nk samples. What is usual is learnt from
     /// the record of the start span, or where there is none from the first seconds, in which only
-    /// what is no number is held back.
+    /// what is not a number is held back.
     pub fn new(recursion: &mut dyn Recursion, nk: usize, span: Option<&Record>, sample_time: SampleTime) -> Self {
         let ts = sample_time.s();
         let longest = (LONGEST_S / ts).round().max(1.0) as u32;
@@ -249,7 +249,7 @@ impl Guard {
         guard
     }
 
-    /// Takes a sample, whose values are NaN where they are no numbers, to the recursion or not.
+    /// Takes a sample, whose values are NaN where they are not numbers, to the recursion or not.
     #[inline]
     pub fn take(&mut self, recursion: &mut dyn Recursion, sample: Sample, moves: bool) -> Guarded {
         self.samples += 1;
@@ -311,7 +311,7 @@ impl Guard {
         self.event
     }
 
-    /// True while the estimate stands still.
+    /// True while the estimate stays constant.
     pub fn is_paused(&self) -> bool {
         self.pause.kind > 0
     }

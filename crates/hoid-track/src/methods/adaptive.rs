@@ -1,12 +1,11 @@
-//! The recursion in the basis that people share ([`hoid_core::adaptive`]) behind the face of a
-//! recursion: what is usual of people, in seconds.
+//! The recursion in the basis that people share ([`hoid_core::adaptive`]) after the face of a recursion: the defaults
+//! for people, in seconds.
 //!
-//! It needs no start fit: it begins with what is usual of people ([`hoid_core::adaptive::default`]). The delay begins at
-//! that of nk, .2 s where nothing is said, and at half a sample more, for an error that is held.
+//! It needs no start fit: it starts with the defaults for people ([`hoid_core::adaptive::default`]). The delay starts
+//! at that of nk, .2 s where nothing is said, and at half a sample more, for an error that is held.
 //!
-//! **What is known of the person** before the first sample is `prior`: what is usual, next to nothing,
-//! some parameters, or an earlier fit, whose estimate and covariance it begins with
-//! (`beginning`).
+//! **What is known of the person** before the first sample is `prior`: the default, next to nothing, some parameters,
+//! or an earlier fit, whose estimate and covariance it starts with (`beginning`).
 //!
 //! **What it reports.** The gain and lead that are nearest to the gains of the basis
 //! ([`AdaptiveFilter::operator`]). The polynomials are the hold of that, with the delay of nk.
@@ -110,7 +109,7 @@ impl RecursiveMethod for AdaptiveOptions {
             return Err(bad_option(
                 "the start of adaptive",
                 start.to_owned(),
-                "a prior in its place: it starts from what is usual of people, from next to nothing (prior = none) or from an \
+                "a prior in its place: it starts from the defaults for people, from next to nothing (prior = none) or from an \
                  earlier fit of the person; rpem, physical and rls take a start",
             ));
         }

@@ -1,5 +1,5 @@
-//! A recursive method with its options, and those that track people: the default, and the two of the
-//! reference text. Those that they are compared with are in `hoid-survey`, and so is the list of all.
+//! A recursive method with its options, and those that track people: the default, and the two of the thesis. Those that
+//! they are compared with are in `hoid-survey`, and so is the list of all.
 
 mod adaptive;
 mod rls;
@@ -96,8 +96,8 @@ impl Method {
     /// Sets an option from its text.
     ///
     /// # Errors
-    /// [`IdentError::BadOption`] for an option that the method does not have, or a text that is no
-    /// value of it.
+    /// [`IdentError::BadOption`] for an option that the method does not have, or a text that is not
+    /// a value of it.
     pub fn set(&mut self, name: &str, text: &str) -> Result<(), IdentError> {
         if self.0.set(name, text)? {
             return Ok(());
@@ -116,10 +116,10 @@ impl Method {
         Ok(self)
     }
 
-    /// Begins with an earlier fit of the person.
+    /// Starts with an earlier fit of the person.
     ///
     /// # Errors
-    /// [`IdentError::BadOption`] for a method that begins with the record.
+    /// [`IdentError::BadOption`] for a method that starts with the record.
     pub fn start_from(&mut self, fit: FittedOperator) -> Result<(), IdentError> {
         let source = fit.source.clone();
         match self.0.set_person_prior(PersonPrior::Fit(Box::new(fit))) {
@@ -127,7 +127,7 @@ impl Method {
             false => Err(bad(
                 "prior",
                 source,
-                "the method adaptive, which alone begins with a fit",
+                "the method adaptive, which alone starts with a fit",
             )),
         }
     }

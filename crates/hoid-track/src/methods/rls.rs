@@ -35,7 +35,7 @@ impl RecursiveMethod for RlsOptions {
         About {
             name: "rls",
             help: "recursive least squares",
-            source: "Ljung 1999, section 11.2; the reference text, section III",
+            source: "Ljung 1999, section 11.2; the thesis, section III",
             structures: &[Structure::Arx, Structure::Fir],
             defaults: &[
                 ("memory", "2.56s"),

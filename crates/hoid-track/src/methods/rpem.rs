@@ -44,7 +44,7 @@ impl RecursiveMethod for RpemOptions {
         About {
             name: "rpem",
             help: "recursive prediction-error method, for every structure",
-            source: "Ljung 1999, section 11.5; the reference text, section III",
+            source: "Ljung 1999, section 11.5; the thesis, section III",
             structures: &Structure::ALL,
             defaults: &[
                 ("memory", "2.56s for b, 20.48s for the others"),

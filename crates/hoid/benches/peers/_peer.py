@@ -1,7 +1,7 @@
 """What the peers share: the data, the clock and the lines of JSON that `cargo xtask bench` collects.
 
 A peer is called as `python PEER.py RECORD.csv [RUNS [TASK,...]]`; RECORD.csv has the columns e, u without their names, and the folder holds what
-the example `tasks` has written beside it. For each task it prints {"task", "peer", "seconds", "answer"} and, where its answer is another by
+the example `tasks` has written next to it. For each task it prints {"task", "peer", "seconds", "answer"} and, where its answer is another by
 design, "differs" with the reason; or {"task", "peer", "skipped"} with the reason.
 """
 

@@ -1,6 +1,5 @@
-//! The tasks by which hoid is compared with what people would use instead: our side.
-//! `cargo xtask bench` runs it beside the peers in `crates/hoid/benches/peers` and makes the table
-//! of the book.
+//! The tasks by which hoid is compared with what people would use instead: our side. `cargo xtask bench` runs it next
+//! to the peers in `crates/hoid/benches/peers` and makes the table of the book.
 //!
 //! `cargo run --release -p hoid --example tasks -- DIRECTORY [--task NAME,...] [--seconds S | --times K] [--reproduce M]`
 //!

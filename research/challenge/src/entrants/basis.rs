@@ -26,7 +26,7 @@ pub(super) type Square = [[f64; GAINS]; GAINS];
 const ORDER: usize = 16;
 /// Rate to which signals are thinned at most, Hz.
 const RATE_HZ: f64 = 50.0;
-/// Seconds at the beginning that are left out: the filters start at rest.
+/// Seconds at the start that are left out: the filters start at rest.
 const SETTLING_S: f64 = 5.0;
 /// Standard deviations beyond which a residual of the start is limited.
 const LIMIT: f64 = 3.5;
@@ -43,7 +43,7 @@ const NOMINAL: Operator = Operator {
     tau_e_s: 0.2,
 };
 
-/// A sample behind the whitening filter.
+/// A sample after the whitening filter.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct White {
     pub t_s: f64,
@@ -53,7 +53,7 @@ pub(super) struct White {
     pub is_void: bool,
 }
 
-/// The whole run behind the whitening filter, with the start.
+/// The whole run after the whitening filter, with the start.
 #[derive(Debug)]
 pub(super) struct Whitened {
     pub samples: Vec<White>,
@@ -156,7 +156,7 @@ fn regressors(task: &Task) -> Vec<Plain> {
     plain
 }
 
-/// A sample behind the filter `1 + a_1 q^-1 + ...`.
+/// A sample after the filter `1 + a_1 q^-1 + ...`.
 fn at(plain: &[Plain], i: usize, a: &[f64]) -> White {
     let own = &plain[i];
     let is_void = i < ORDER || own.is_history || plain[i - ORDER..=i].iter().any(|p| !p.u.is_finite());
@@ -300,7 +300,7 @@ fn inverse(matrix: &Square) -> Option<Square> {
     }))
 }
 
-/// What each gain is worth at a frequency, behind the hold; the constant nothing.
+/// What each gain is worth at a frequency, after the hold; the constant nothing.
 pub(super) fn worth(task: &Task, omega_rad_s: f64) -> [Complex64; GAINS] {
     let common = NOMINAL.response(omega_rad_s) * hold(omega_rad_s, task.sample_time);
     let s = Complex64::new(0.0, omega_rad_s);

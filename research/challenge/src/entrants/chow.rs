@@ -2,12 +2,12 @@
 //! them, each with a variance of its own (G. C. Chow, Econometrica 28 (1960) 591-605; without the
 //! common variance it is Wald's test).
 //!
-//! `d = H_now - H_before`, `T = d' (C_now + C_before)^-1 d`; whitened residuals are limited at 3.5
-//! standard deviations of the fit before. Where nothing changes T would be chi-square with two degrees of
-//! freedom, were the remnant white behind the filter of the start and the basis that of this person. As
-//! neither is, T is divided by the level at which it has been so far, from the mean of its logarithm
-//! (that of a chi-square is `ln 2 - gamma`), and held against [`THRESHOLD`]. After an alarm what came
-//! before it is forgotten. The response that is said is that of all seconds since, 40 at most.
+//! `d = H_now - H_before`, `T = d' (C_now + C_before)^-1 d`; whitened residuals are limited at 3.5 standard deviations
+//! of the fit before. Where nothing changes T would be chi-square with two degrees of freedom, were the remnant white
+//! after the filter of the start and the basis that of this person. As neither is, T is divided by the level at which
+//! it has been so far, from the mean of its logarithm (that of a chi-square is `ln 2 - gamma`), and held against
+//! [`THRESHOLD`]. After an alarm what came before it is forgotten. The response that is said is that of all seconds
+//! since, 40 at most.
 
 use std::collections::VecDeque;
 

@@ -1,4 +1,4 @@
-//! Three gains of a nominal person as a random walk, behind a whitening filter: recursive least
+//! Three gains of a nominal person as a random walk, after a whitening filter: recursive least
 //! squares with a population basis (R. E. Kalman, J. Basic Engineering 82 (1960) 35-45; L. Ljung,
 //! *System Identification*, 1999, section 11.6).
 //!

@@ -180,8 +180,8 @@ mod tests {
         }
     }
 
-    /// In a loop of small margin the error is nearly a sine, whose phase gains that walk follow as well as
-    /// any delay: who may walk from the beginning on ends far from the person.
+    /// In a loop of small margin the error is nearly a sine, whose phase gains that walk follow as well as any delay:
+    /// who may walk from the start on ends far from the person.
     #[test]
     fn a_loop_of_small_margin_leads_nobody_astray() {
         let case = cases().into_iter().find(|case| case.name == "change-omega-30").unwrap();

@@ -222,7 +222,7 @@ fn analyse(path: &Path, out: &Path, args: &GroupRunArgs) -> Result<(), CliError>
     Ok(())
 }
 
-/// A file for each condition: the name as it is typed for one, with the condition behind it for
+/// A file for each condition: the name as it is typed for one, with the condition after it for
 /// several.
 fn draw(figures: &[(String, String)], place: &Path, width_mm: Option<f64>) -> Result<(), CliError> {
     if figures.is_empty() {

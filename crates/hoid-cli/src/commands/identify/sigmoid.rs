@@ -96,7 +96,7 @@ struct SigmoidReport<'a> {
 }
 
 impl SigmoidReport<'_> {
-    /// The answer, and with `verbose` what is behind it.
+    /// The answer, and with `verbose` what is after it.
     fn page(&self, verbose: bool) -> String {
         let Self {
             fit,

@@ -7,7 +7,7 @@ use serde_json::Value;
 
 use crate::json;
 
-/// Counts since the beginning.
+/// Counts since the start.
 #[derive(Debug, Clone, Copy, Default, Serialize)]
 pub struct Counts {
     /// Samples, those with a fault and missing ones included.
@@ -15,9 +15,9 @@ pub struct Counts {
     pub samples: u64,
     /// Samples with a fault in e or u, missing ones included.
     pub skipped: u64,
-    /// Samples that the guard held back, or during which it let the estimate stand still.
+    /// Samples that the guard held back, or during which it let the estimate stay constant.
     pub held: u64,
-    /// How often the guard began the estimate again.
+    /// How often the guard started the estimate again.
     pub restarts: u64,
     /// Of these, samples that were missing by the column t.
     #[serde(skip)]
@@ -65,7 +65,7 @@ struct ChangeLine {
     declared: Option<Value>,
 }
 
-/// The rate at which a fast stream is tracked, and by how much the estimate is behind its line.
+/// The rate at which a fast stream is tracked, and by how much the estimate is after its line.
 #[derive(Serialize)]
 struct Rate {
     factor: usize,
@@ -120,7 +120,7 @@ impl From<&Estimate> for Number {
     }
 }
 
-/// Where the recursion stands after a line of the input.
+/// Where the recursion is after a line of the input.
 pub struct StreamStatus<'a> {
     /// Time of the last sample, s.
     pub t: Option<f64>,

@@ -297,7 +297,7 @@ impl Columns {
     }
 }
 
-/// Why a cell is no number.
+/// Why a cell is not a number.
 #[derive(Debug, Clone, PartialEq, Eq)]
 enum Fault {
     Missing,
@@ -383,7 +383,7 @@ mod tests {
             (Some(2.0), 0.5, -1.0, Some(7.0))
         );
         assert!(read.fault.is_none());
-        // Cells beside objects, in any order.
+        // Cells next to objects, in any order.
         let mut columns = Columns::new("error", "stick", true, 10.0);
         let read = sample(&mut columns, r#"{"stick": "3", "error": null}"#);
         assert!(read.t.is_none() && read.e.is_nan() && read.u == 3.0 && !columns.are_known());

@@ -1,6 +1,6 @@
-//! `hoid stream`: a recursive estimate, live. Each line of standard input that is no comment gives
-//! one line of JSON on standard output, flushed, whatever the line holds; or each datagram one
-//! datagram.
+//! `hoid stream`: a recursive estimate, live. Each line of standard input that is not a comment
+//! gives one line of JSON on standard output, flushed, whatever the line holds; or each datagram
+//! one datagram.
 //!
 //! | file | what it holds |
 //! |---|---|

@@ -150,7 +150,7 @@ impl Session {
     }
 
     /// Takes what came as a datagram, of which the samples that count for an answer are told one by
-    /// one. What is no sample is dropped: it may come from anybody.
+    /// one. What is not a sample is dropped: it may come from anybody.
     ///
     /// # Errors
     /// Those of the answers.
@@ -342,7 +342,7 @@ impl Session {
         if c.samples == 0 && c.dropped > 0 {
             return Err(CliError::NotDetermined(format!(
                 "no line of the stream was a sample, {} dropped; expected e,u or t,e,u with decimal points, or an object of JSON; \
-                 what was wrong stands in the lines of the output",
+                 what was wrong is in the lines of the output",
                 text::counted(c.dropped, "line")
             )));
         }
@@ -367,7 +367,7 @@ impl Session {
         );
         if c.held > 0 || c.restarts > 0 {
             text.push_str(&format!(
-                " {} held back by the guard; the estimate was begun again {}.",
+                " {} held back by the guard; the estimate was started again {}.",
                 text::counted(c.held, "sample"),
                 text::counted(c.restarts, "time")
             ));

@@ -13,7 +13,7 @@ const ROWS_SHOWN: usize = 8;
 /// Coefficients that are printed where there is no operator.
 const COEFFICIENTS_SHOWN: usize = 6;
 
-/// A summary for people, and with `verbose` what is behind it.
+/// A summary for people, and with `verbose` what is after it.
 ///
 /// # Errors
 /// Those of the quality of the start fit.
@@ -219,7 +219,7 @@ fn counts(tracked: &Tracked) -> String {
     );
     if c.held > 0 || c.restarts > 0 {
         text.push_str(&format!(
-            "{} held back by the guard; the estimate was begun again {}.\n",
+            "{} held back by the guard; the estimate was started again {}.\n",
             text::counted(c.held, "sample"),
             text::counted(c.restarts, "time")
         ));

@@ -4,7 +4,7 @@
 //! |---|---|
 //! | `udp` | a stream over UDP and the socket of who asks it |
 //! | `paced` | samples at a rate, and how long their answers take |
-//! | `troubles` | readers that stop, either side begun again, clocks that jump, hostile datagrams |
+//! | `troubles` | readers that stop, either side started again, clocks that jump, hostile datagrams |
 
 #[path = "../draw.rs"]
 mod draw;

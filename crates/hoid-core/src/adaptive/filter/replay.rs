@@ -1,12 +1,11 @@
-//! The replays that mend the estimate of now.
+//! The replays that repair the estimate of now.
 //!
-//! The candidate of now (`candidate`) takes each sample as it comes. Beside it another candidate
-//! reads the record again from the start of the memory, [`REPLAYED`] samples with each new one, until it
-//! has caught up. It has the basis where the estimate now points, the noise model of its residuals, and
-//! the dispersion of its innovations. When it has caught up it takes over, and the next one starts. So the
-//! estimate is, a few seconds late, that of a prediction error method of all data since the start of the
-//! memory that is repeated again and again, at a bounded cost for each sample and with the same digits
-//! whatever the machine.
+//! The candidate of now (`candidate`) takes each sample as it comes. In addition, another candidate reads the record
+//! again from the start of the memory, [`REPLAYED`] samples with each new one, until it has caught up. It has the basis
+//! where the estimate now points, the noise model of its residuals, and the dispersion of its innovations. When it has
+//! caught up it takes over, and the next one starts. So the estimate is, a few seconds late, that of a prediction error
+//! method of all data since the start of the memory that is repeated again and again, at a bounded cost for each sample
+//! and with the same digits whatever the machine.
 //!
 //! Every second replay starts elsewhere. It is repeated [`STAGES`] times from where it ended, and takes over
 //! only if its evidence is better by [`TAKEOVER_NATS`].

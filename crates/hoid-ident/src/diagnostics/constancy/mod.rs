@@ -1,11 +1,10 @@
 //! Whether the parameters of a fit are the same throughout: the scores over time.
 //!
-//! At the minimum the scores `s(t) = psi(t) eps(t)` sum to zero. Where a parameter changes within a
-//! record, or from one run to the next, they have one sign before and the other one behind (J.
-//! Nyblom, *JASA* 84 (1989) 223-230; B. E. Hansen, *J. Policy Modeling* 14 (1992) 517-533). For a
-//! direction v in the space of the parameters and a set A of samples (those of a record behind an
-//! instant, or a whole run among others) the regressor of a change is `z = psi'v` in A and 0
-//! elsewhere. What the constant parameters do not explain of it is
+//! At the minimum the scores `s(t) = psi(t) eps(t)` sum to zero. Where a parameter changes within a record, or from one
+//! run to the next, they have one sign before and the other one behind (J. Nyblom, *JASA* 84 (1989) 223-230; B. E.
+//! Hansen, *J. Policy Modeling* 14 (1992) 517-533). For a direction v in the space of the parameters and a set A of
+//! samples (those of a record after an instant, or a whole run among others) the regressor of a change is `z = psi'v`
+//! in A and 0 elsewhere. What the constant parameters do not explain of it is
 //!
 //! `r(t) = psi(t)' w(t)`, `w = v - a` in A and `-a` elsewhere, `a = G^-1 G_A v`
 //!
@@ -114,7 +113,7 @@ impl Constancy<'_> {
         let at_s = change.at as f64 * self.sample_time_s;
         let place = match (records, change.at) {
             (0 | 1, _) => format!("about {at_s:.0} s after the start"),
-            (_, 0) => format!("in record {} beside the others", change.record + 1),
+            (_, 0) => format!("in record {} next to the others", change.record + 1),
             _ => format!("about {at_s:.0} s after the start of record {}", change.record + 1),
         };
         format!(

@@ -20,7 +20,7 @@ use crate::{
 
 /// Residuals of a robust fit are held to so many of its scales, as its loss holds their slope.
 const CLIPPED: f64 = 1.345;
-/// Deviations of a sum of scores beyond which the fit is no minimum of the squares: one for
+/// Deviations of a sum of scores beyond which the fit is not a minimum of the squares: one for
 /// simulation, or with a prior that weighs more than the data.
 const MOST_OFF: f64 = 3.0;
 

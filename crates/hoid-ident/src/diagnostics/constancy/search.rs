@@ -62,7 +62,7 @@ pub(super) struct Change {
     pub name: String,
     pub unit: &'static str,
     pub record: usize,
-    /// First sample behind it; 0 where a whole record differs from the others.
+    /// First sample after it; 0 where a whole record differs from the others.
     pub at: usize,
     pub by: f64,
     pub error: f64,
@@ -166,7 +166,7 @@ pub(super) fn strongest_among(of: &Constancy<'_>, directions: &[&Direction], set
     best
 }
 
-/// Whole records among others, and the part of a record behind each boundary of blocks.
+/// Whole records among others, and the part of a record after each boundary of blocks.
 pub(super) fn sets(blocks: &[ScoreBlock]) -> Vec<Set> {
     let records = blocks.last().map_or(0, |b| b.record + 1);
     let mut all = Vec::new();

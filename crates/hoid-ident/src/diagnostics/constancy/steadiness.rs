@@ -25,7 +25,7 @@ pub struct Unsteady {
     pub course: Course,
     /// What: `gain` or `delay`, which may be a lead.
     pub name: &'static str,
-    /// First sample behind a jump.
+    /// First sample after a jump.
     pub at: usize,
     /// By how much, of a sway its amplitude: the gain as a share of it, the delay in s; and the standard error.
     pub by: [f64; 2],
@@ -34,7 +34,7 @@ pub struct Unsteady {
 }
 
 /// The most unlikely jump, drift and sway of a response over samples: `columns` span it, each the derivative of the one
-/// before. Empty where there is too little, or something is no number.
+/// before. Empty where there is too little, or something is not a number.
 pub fn unsteady(columns: &[Vec<f64>], u: &[f64], samples: Range<usize>, sample_time_s: f64) -> Vec<Unsteady> {
     found(columns, u, samples, sample_time_s).unwrap_or_default()
 }
@@ -62,7 +62,7 @@ fn found(columns: &[Vec<f64>], u: &[f64], samples: Range<usize>, sample_time_s: 
             }
         })
         .collect();
-    // The level is no response; the derivative of the last column is none of them.
+    // The level is not a response; the derivative of the last column is none of them.
     let gain = (0..p).map(|j| if j <= last { fit.b[j] } else { 0.0 }).collect();
     let delay = (0..p)
         .map(|j| if j > 0 && j <= last { -fit.b[j - 1] } else { 0.0 })

@@ -1,7 +1,7 @@
 //! A stretch of the records that carries the fit.
 //!
-//! A channel that is turned over for a second, or a pause, is no change that stays. Without block c the
-//! parameters would be elsewhere by
+//! A channel that is turned over for a second, or a pause, is not a change that stays. Without block c the parameters
+//! would be elsewhere by
 //!
 //! `delta_c = -(A - A_c)^-1 h_c`, `A = J' G J`, `h = J' g`
 //!
@@ -27,7 +27,7 @@ const FEWEST: usize = 5;
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Stretch {
     pub record: usize,
-    /// First sample; `None` for the end behind the last block of a record.
+    /// First sample; `None` for the end after the last block of a record.
     pub from: usize,
     pub to: Option<usize>,
     /// Name of each parameter that moves, and by how many of its standard errors.

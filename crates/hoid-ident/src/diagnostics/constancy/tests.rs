@@ -91,7 +91,7 @@ fn a_run_unlike_the_others_is_named_and_equal_runs_are_not() {
     assert_eq!(not_constant(&box_jenkins(&records), &records), None);
     records.push(simulated(Condition::C2, 5));
     let words = not_constant(&box_jenkins(&records), &records).unwrap().message;
-    assert!(words.contains("in record 3 beside the others"), "{words}");
+    assert!(words.contains("in record 3 next to the others"), "{words}");
 }
 
 /// Numbers between -1/2 and 1/2.
@@ -171,7 +171,7 @@ fn the_change_is_the_coefficient_of_its_regressor() {
     let regression = Regression::new(5, 4000, 0.9, 0.8);
     let found = regression.strongest();
     assert!(found.at.abs_diff(2000) <= 200 && found.p_value < 1e-4, "{found:?}");
-    // Twin: least squares with the regressor of the change beside the others.
+    // Twin: least squares with the regressor of the change next to the others.
     let behind: Vec<f64> = (0..4000)
         .map(|t| if t >= found.at { regression.x[0][t] } else { 0.0 })
         .collect();

@@ -1,4 +1,4 @@
-//! The methods of instrumental variables. A new one is a file beside these with its [`Algorithm`],
+//! The methods of instrumental variables. A new one is a file next to these with its [`Algorithm`],
 //! its `mod` line and its line in the list below.
 
 mod iv4;

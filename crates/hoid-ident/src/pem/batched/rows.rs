@@ -1,4 +1,4 @@
-//! Rows of numbers, one for each lane, that begin at the border of a line of the nearest memory.
+//! Rows of numbers, one for each lane, that start at the border of a line of the nearest memory.
 
 use std::ops::{Deref, DerefMut};
 

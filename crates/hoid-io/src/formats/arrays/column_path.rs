@@ -17,7 +17,7 @@ const MOST_LINES: usize = 256;
 #[derive(Debug, Clone)]
 pub(crate) struct ColumnPath {
     pub(crate) path: String,
-    /// The structure that it stands in; empty at top level.
+    /// The structure that it is in; empty at top level.
     pub(crate) parent: String,
     pub(crate) unit: String,
     pub(crate) holds: Holds,
@@ -59,7 +59,7 @@ impl ColumnPath {
         }
     }
 
-    /// Why it is no column of numbers.
+    /// Why it is not a column of numbers.
     pub(super) fn refused(&self, file: &str) -> IoError {
         IoError::Unsupported {
             file: file.to_owned(),

@@ -1,5 +1,5 @@
-//! Numbers as they stand in a file: bytes, a type, and where each begins. They become `f64` when
-//! they are asked for.
+//! Numbers as they are in a file: bytes, a type, and where each starts. They become `f64` when they
+//! are asked for.
 
 use std::rc::Rc;
 
@@ -85,7 +85,7 @@ impl Numbers {
         }
     }
 
-    /// One number out of each item of `item` bytes, `offset` bytes from its beginning.
+    /// One number out of each item of `item` bytes, `offset` bytes from its start.
     pub(crate) fn field(bytes: &Rc<Vec<u8>>, kind: Kind, big_endian: bool, offset: usize, item: usize) -> Self {
         let fits = item > 0 && offset + kind.size() <= item;
         Self {

@@ -39,7 +39,7 @@ pub(super) fn made_plain(bytes: &mut Vec<u8>) -> Vec<String> {
     notes
 }
 
-/// Text in UTF-16, which a mark at its beginning says.
+/// Text in UTF-16, which a mark at its start says.
 fn utf16(bytes: &[u8]) -> Option<String> {
     let unit: fn([u8; 2]) -> u16 = match bytes {
         [0xff, 0xfe, ..] => u16::from_le_bytes,
@@ -51,7 +51,7 @@ fn utf16(bytes: &[u8]) -> Option<String> {
     String::from_utf16(&units).ok().filter(|_| rest.len().is_multiple_of(2))
 }
 
-/// Whether each byte that is no ASCII is one of a name or a unit.
+/// Whether each byte that is not an ASCII is one of a name or a unit.
 fn is_latin(bytes: &[u8]) -> bool {
     bytes.iter().all(|byte| byte.is_ascii() || LATIN.contains(byte))
 }
@@ -104,7 +104,7 @@ fn without_preamble(text: &str) -> Option<(usize, String)> {
     let above: Vec<usize> = filled.into_iter().filter(|at| *at < header).collect();
     let mark = char::from(separator(lines[header]));
     let cells = |at: usize| lines[at].split(mark).count();
-    // A line of as many cells is the header, and that of the units stands below it.
+    // A line of as many cells is the header, and that of the units is below it.
     if above.is_empty() || above.iter().any(|at| cells(*at) == cells(header)) {
         return None;
     }

@@ -1,5 +1,5 @@
 //! Data elements of version 5: a tag of type and length, then the data, filled up to a multiple of
-//! 8 bytes. Data of up to 4 bytes may stand in the tag.
+//! 8 bytes. Data of up to 4 bytes may be in the tag.
 
 /// Length of the header of version 5.
 pub(super) const HEADER: usize = 128;

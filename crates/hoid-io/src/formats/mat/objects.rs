@@ -1,4 +1,4 @@
-//! Objects of MATLAB: only MATLAB reads what stands in them, and a line there takes their numbers out.
+//! Objects of MATLAB: only MATLAB reads what is in them, and a line there takes their numbers out.
 
 use crate::formats::arrays::OBJECT;
 

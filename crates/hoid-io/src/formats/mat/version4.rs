@@ -1,4 +1,4 @@
-//! Version 4 (MathWorks, "MAT-File Format", 2019, chapter 2): matrices behind a header of five
+//! Version 4 (MathWorks, "MAT-File Format", 2019, chapter 2): matrices after a header of five
 //! numbers each.
 
 use crate::IoError;

@@ -26,7 +26,7 @@ const OPAQUE: u32 = 17;
 const COMPLEX: u32 = 0x800;
 /// MATLAB takes 63 characters.
 const LONGEST_NAME: usize = 256;
-/// What an entry takes beside its path and its values, about.
+/// What an entry takes next to its path and its values, about.
 const ENTRY_BYTES: u64 = 256;
 
 /// Why a variable is not read: the format is contradicted, or something else is wrong.
@@ -107,7 +107,7 @@ impl Reader<'_> {
     }
 
     /// The data of the matrix in deflated bytes. Its tag says how long it is at most: Octave counts
-    /// the data that stand in a tag twice.
+    /// the data that are in a tag twice.
     fn inflated(&mut self, bytes: &[u8], big_endian: bool) -> Result<Vec<u8>, Stop> {
         let failed = |error: std::io::Error| Stop::Damaged(told(&error.to_string()));
         let mut decoder = ZlibDecoder::new(bytes);
@@ -131,7 +131,7 @@ impl Reader<'_> {
         Ok(inflated)
     }
 
-    /// An array of any class, its parts behind one another.
+    /// An array of any class, its parts after one another.
     fn matrix(&mut self, bytes: &[u8], big_endian: bool, place: VariablePath<'_>) -> Result<(), Stop> {
         // A field that was never set.
         if bytes.is_empty() {
@@ -165,7 +165,7 @@ impl Reader<'_> {
             return Err(format!("an array of {} dimensions", dims.len()).into());
         }
         let name = name(parts.next()?.bytes)?;
-        // What has no name is no variable: MATLAB keeps the parts of objects there.
+        // What has no name is not a variable: MATLAB keeps the parts of objects there.
         if place.depth == 0 && name.is_empty() {
             return Ok(());
         }

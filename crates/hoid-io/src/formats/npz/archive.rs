@@ -71,7 +71,7 @@ fn members(bytes: &[u8], file: &str) -> Result<Contents, IoError> {
     let mut contents = Contents::new(entries, Indexing::Python);
     if !others.is_empty() {
         contents.notes.push(format!(
-            "members that are no arrays are left out: {}",
+            "members that are not arrays are left out: {}",
             others.join(", ")
         ));
     }

@@ -12,7 +12,7 @@ use crate::wording::shown;
 const MAGIC: &[u8] = b"\x93NUMPY";
 /// A header of more bytes is damage.
 const LONGEST_HEADER: usize = 1 << 20;
-/// The numbers begin at a multiple of it.
+/// The numbers start at a multiple of it.
 const ALIGNMENT: usize = 64;
 
 /// What is wrong with an array.
@@ -117,8 +117,8 @@ impl Item {
     }
 }
 
-/// What stands in an array: one entry, or one for each field, at the top level where there is no
-/// other array.
+/// What is in an array: one entry, or one for each field, at the top level where there is no other
+/// array.
 pub(super) fn entries(
     bytes: Vec<u8>,
     name: &str,
@@ -144,7 +144,7 @@ pub(super) fn entries(
     Ok(entries)
 }
 
-/// What the items take as they are read, beside the bytes that they stand in.
+/// What the items take as they are read, next to the bytes that they are in.
 fn unpacked(header: &Header, budget: &mut Budget, file: &str) -> Result<(), IoError> {
     let count = header
         .shape

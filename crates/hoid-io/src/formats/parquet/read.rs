@@ -33,8 +33,8 @@ const TIME: &str = "a date or time";
 /// ns in a µs and in a ms.
 const MICRO: i64 = 1_000;
 const MILLI: i64 = 1_000_000;
-/// What a value takes as a number and as its place among those that are none, and a text beside its
-/// letters, bytes.
+/// What a value takes as a number and as its place among those that are none, and a text next to
+/// its letters, bytes.
 const VALUE: u64 = 16;
 const TEXT: u64 = 24;
 /// Values that are fetched together.
@@ -61,7 +61,7 @@ fn check_ends(bytes: &[u8], file: &str) -> Result<(), IoError> {
         let start = String::from_utf8_lossy(&bytes[..bytes.len().min(12)]).into_owned();
         format!("it starts with \"{}\"", start.escape_debug())
     } else if bytes.len() < 12 {
-        String::from("it ends behind its first bytes")
+        String::from("it ends after its first bytes")
     } else if !bytes.ends_with(MAGIC) {
         return Err(IoError::Damaged {
             file: file(),
@@ -278,7 +278,7 @@ impl ColumnPath<'_> {
         Ok(())
     }
 
-    /// Takes what values hold beside themselves.
+    /// Takes what values hold next to themselves.
     fn weigh<V: Weight>(&mut self, values: &[V]) -> Result<(), ParquetError> {
         let bytes = values.iter().map(Weight::bytes).sum();
         let taken = self.budget.take(bytes, self.file);
@@ -310,7 +310,7 @@ impl ColumnPath<'_> {
     }
 }
 
-/// What a value holds beside itself.
+/// What a value holds next to itself.
 trait Weight {
     /// Bytes.
     fn bytes(&self) -> u64 {

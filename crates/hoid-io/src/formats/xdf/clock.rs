@@ -9,10 +9,10 @@
 //! has a line of its own. At last, of a stream with a nominal rate, the time stamps between two
 //! breaks are replaced by their least-squares line over the number of the sample.
 //!
-//! Beyond pyxdf, lost samples are a break as well: a step of more than [`LOST_SAMPLES`] nominal
-//! sample times `T` behind which the time stamps stay late, even after as many samples as are late,
-//! by the medians of `t_k - k T` on both sides. Samples that are late and then catch up are jitter. Without this a second that is lost
-//! would be spread over the recording, as a lower rate without a gap.
+//! Beyond pyxdf, lost samples are a break as well: a step of more than [`LOST_SAMPLES`] nominal sample times `T` after
+//! which the time stamps stay late, even after as many samples as are late, by the medians of `t_k - k T` on both
+//! sides. Samples that are late and then catch up are jitter. Without this a second that is lost would be spread over
+//! the recording, as a lower rate without a gap.
 
 use super::chunks::Stream;
 use crate::wording::shown;
@@ -134,7 +134,7 @@ fn median(values: &[f64]) -> f64 {
     }
 }
 
-/// First and last of `count` where there are breaks behind some.
+/// First and last of `count` where there are breaks after some.
 fn parts(breaks: impl Iterator<Item = usize>, count: usize) -> Vec<(usize, usize)> {
     let mut parts = Vec::new();
     let mut first = 0;
@@ -304,7 +304,7 @@ mod tests {
                 "{lost}"
             );
         }
-        // Half a second that arrives at once, stamped on arrival, is no loss.
+        // Half a second that arrives at once, stamped on arrival, is not a loss.
         let mut times: Vec<f64> = (0..1200)
             .map(|k| {
                 if (500..550).contains(&k) {

@@ -80,7 +80,7 @@ fn chunk(file: &mut Vec<u8>, tag: u16, content: &[u8]) {
     file.extend(content);
 }
 
-/// Samples of stream 1 behind their number.
+/// Samples of stream 1 after their number.
 fn samples(count: &[u8; 8], bytes: &[u8]) -> Vec<u8> {
     [&1_u32.to_le_bytes()[..], &[8], count, bytes].concat()
 }

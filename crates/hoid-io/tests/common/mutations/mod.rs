@@ -3,7 +3,7 @@
 //!
 //! Case `k` of a seed is the same bytes on every machine: a good file is drawn, then some mutations
 //! of it. Formats that keep checksums over what is compressed are taken apart first and packed
-//! again, for damage behind a wrong checksum would only try the checksum.
+//! again, for damage after a wrong checksum would only try the checksum.
 //!
 //! | file | what it holds |
 //! |---|---|

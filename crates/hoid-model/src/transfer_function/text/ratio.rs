@@ -1,4 +1,4 @@
-//! Quotients of polynomials behind a delay, while a text is read.
+//! Quotients of polynomials after a delay, while a text is read.
 
 use crate::polynomial;
 

@@ -30,7 +30,7 @@ impl Reader {
         }
     }
 
-    /// The next sign that is no blank, which is not taken.
+    /// The next sign that is not a blank, which is not taken.
     fn next(&mut self) -> Option<char> {
         while self.signs.get(self.at).is_some_and(|sign| sign.is_whitespace()) {
             self.at += 1;

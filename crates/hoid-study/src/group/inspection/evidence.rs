@@ -1,6 +1,6 @@
 //! What was found in the files of a group, for the line of the manifest that it belongs to.
 
-/// What was found, for the line of the manifest that begins with `key`: below the table `table`.
+/// What was found, for the line of the manifest that starts with `key`: below the table `table`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Evidence {
     /// Table of the manifest, as `[read]`; empty for its head.

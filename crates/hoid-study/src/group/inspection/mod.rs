@@ -1,6 +1,5 @@
-//! A look at the files of a group before they are analysed ([`Look`]): what is found in them stands in the
-//! manifest with the evidence beside it, to be looked through by a person; what was asked for is not looked
-//! for.
+//! A look at the files of a group before they are analysed ([`Look`]): what is found in them is in the manifest with
+//! the evidence next to it, to be looked through by a person; what was asked for is not looked for.
 //!
 //! | file | what it holds |
 //! |---|---|

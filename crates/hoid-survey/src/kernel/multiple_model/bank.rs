@@ -1,4 +1,4 @@
-//! The hypotheses with their probabilities, for output and signals behind the whitening filter.
+//! The hypotheses with their probabilities, for output and signals after the whitening filter.
 //!
 //! At each sample the probability of a hypothesis is multiplied by the density that it gave to the
 //! innovation, and all are normalised. At every birth the likeliest is the parent of new ones:
@@ -7,7 +7,7 @@
 //!   prior probability of such a change since the last birth;
 //! - **a neighbouring delay**, as what may have held all the time: as old as its parent, each
 //!   parameter opened by the error that the difference of the delays makes in it; the first of them
-//!   when the bank begins;
+//!   when the bank starts;
 //! - **a change of the delay**: delays spread over all candidates, with gains that are opened as in
 //!   any change, and probabilities in proportion to the normal density of the step. The proposed
 //!   delays move on by one each time, so that each candidate has its turn, and the number of
@@ -106,8 +106,8 @@ impl<const M: usize> Bank<M> {
         Some(bank)
     }
 
-    /// The update by a sample: output and signals behind the whitening filter, `None` where they
-    /// are not known. Returns the innovation.
+    /// The update by a sample: output and signals after the whitening filter, `None` where they are
+    /// not known. Returns the innovation.
     pub fn update(&mut self, sample: Option<(f64, DelayedSignals<'_>)>, point: [f64; 2]) -> f64 {
         let innovation = self.update_hypotheses(sample, point);
         if self.detector.update(&self.hypotheses, self.samples, &self.prior) {

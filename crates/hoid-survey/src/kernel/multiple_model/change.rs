@@ -89,7 +89,7 @@ const REGULARISATION: f64 = 1e-12;
 
 impl ChangeDetector {
     /// The update by the hypotheses after a sample. True where Lambda rises above zero: a change
-    /// begins.
+    /// starts.
     pub fn update(&mut self, hypotheses: &[Option<Hypothesis>], now: u64, prior: &ChangePrior) -> bool {
         let sums = Sums::over(hypotheses, now, prior);
         let before = self.log_odds;
@@ -114,7 +114,7 @@ impl ChangeDetector {
             h.neuromuscular_changed && log_odds(sums.neuromuscular, others.max(0.0)) > prior.log_odds_threshold;
         let new_neuromuscular = neuromuscular_changed && !self.declared_neuromuscular;
         let delay_may_be_new = prior.delay.count > 1 && !self.declared_delay;
-        // Most samples behind a change have nothing more to declare and end here.
+        // Most samples after a change have nothing more to declare and end here.
         if self.declared && !new_neuromuscular && !delay_may_be_new {
             return;
         }

@@ -1,9 +1,9 @@
 //! An operator who may change at any time: a bank of hypotheses about when they changed, weighted
 //! by how well each predicts the output.
 //!
-//! The operator's gains stand in its output, `w = K_e x1 + K_e_dot x2`, where x1 and x2 are the
-//! responses of the neuromuscular system to the delayed error and to its rate ([`response`]).
-//! Behind the whitening filter `D(q^-1)` of the noise the model is
+//! The operator's gains are in its output, `w = K_e x1 + K_e_dot x2`, where x1 and x2 are the
+//! responses of the neuromuscular system to the delayed error and to its rate ([`response`]). After
+//! the whitening filter `D(q^-1)` of the noise the model is
 //!
 //! `D u = K_e D x1 + K_e_dot D x2 + eps`,
 //!

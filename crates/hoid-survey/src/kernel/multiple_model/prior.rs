@@ -82,7 +82,7 @@ pub struct DelayPrior {
     pub change_odds: f64,
     /// Standard deviation of a change of the delay, samples.
     pub jump: f64,
-    /// Prior probability of a delay one sample beside the likeliest.
+    /// Prior probability of a delay one sample next to the likeliest.
     pub neighbour_probability: f64,
     /// Errors of the parameters that an error of one sample in the delay brings about (standard
     /// deviations): K_e and K_e_dot relative to g, omega_nm and zeta_nm relative to their values.

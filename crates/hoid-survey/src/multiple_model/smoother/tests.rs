@@ -55,7 +55,7 @@ fn a_past_and_a_future_that_contradict_each_other_are_not_joined() {
     for i in 0..OPERATOR {
         assert!((joined.eta[i] - mirrored.eta[i]).abs() < 1e-12);
     }
-    // Covariances that are no numbers leave the past alone.
+    // Covariances that are not numbers leave the past alone.
     let broken = Side {
         covariance: [[f64::NAN; OPERATOR]; OPERATOR],
         ..old

@@ -1,4 +1,4 @@
-//! Where the recursion begins: the basis, how well it is known, and the estimate of an earlier fit.
+//! Where the recursion starts: the basis, how well it is known, and the estimate of an earlier fit.
 //!
 //! **A fit** has coordinates x of an operator Y(x) with covariance C. The recursion has gains theta of
 //! the responses x_i of a basis made at the fit's delay, neuromuscular system and lag, and corrections
@@ -41,7 +41,7 @@ const LEFT: f64 = 1e-6;
 /// The level of u that is not known before the first second, in standard deviations of the remnant.
 const LEVEL: f64 = 3.0;
 
-/// The basis at the beginning, and how far a person is from it.
+/// The basis at the start, and how far a person is from it.
 pub(super) struct StartingPoint {
     pub point: Point,
     /// Shares of omega and zeta, and s for the delay.
@@ -107,7 +107,7 @@ impl StartingPoint {
 
 fn no_place(fit: &FittedOperator, why: &str) -> IdentError {
     IdentError::BadStart {
-        reason: format!("{}: {why}, or begin with --prior population", fit.source),
+        reason: format!("{}: {why}, or start with --prior population", fit.source),
     }
 }
 
@@ -374,7 +374,7 @@ mod tests {
                 ] {
                     let ratio = found.standard_error.unwrap() / expected;
                     // A lag that is not known is a phase that is not known, which the gains cannot say at low
-                    // frequencies, where it is small beside the gain's; elsewhere they say a little more.
+                    // frequencies, where it is small compared with the gain's; elsewhere they say a little more.
                     assert!((ratio > 0.9 || omega < 1.0) && ratio < 1.5, "{form} {omega}: {ratio}");
                 }
             }

@@ -41,7 +41,7 @@ fn a_change_of_the_person_is_followed() {
     assert!((last.k_e_dot.value - 0.084).abs() < 0.02, "{last:?}");
 }
 
-/// T_L after a change over the truth, rows from 9 s behind it on, the mean of four runs. With the covariance of all
+/// T_L after a change over the truth, rows from 9 s after it on, the mean of four runs. With the covariance of all
 /// hypotheses in one quotient it was .76.
 #[test]
 fn the_lead_after_a_change_is_not_too_short() {

@@ -11,11 +11,10 @@ use super::{
 #[derive(Debug, Clone)]
 pub struct Injected {
     pub table: Table,
-    /// Where the fault shows, s from the first sample; of what stays, the moment it begins.
+    /// Where the fault shows, s from the first sample; of what stays, the moment it starts.
     pub from_s: f64,
     pub to_s: f64,
-    /// The first row that is another and the first behind the last such, by the rows of the recording
-    /// without the fault.
+    /// The first row that is another and the first after the last such, by the rows of the recording without the fault.
     pub rows: (usize, usize),
 }
 
@@ -90,7 +89,7 @@ pub fn inject(fault: &Fault, clean: &Table, second: &Table, seed: u64, case: u64
             each(&mut table, on, rows, |_, _, is_e| if is_e { e } else { u });
         }
         What::Idle | What::IdleNoisy => {
-            // Before the run, inside it, behind it.
+            // Before the run, inside it, after it.
             let at = match fault.place {
                 FaultPosition::Start => 0,
                 FaultPosition::End => n,

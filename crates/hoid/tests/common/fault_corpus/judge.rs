@@ -4,10 +4,9 @@
 //! is found on the grid of samples alone has one sample for an error. A parameter that is reported as
 //! not determined, or has no error at all, claims nothing.
 //!
-//! A trace is wrong where it is at its last row or [`LATER_S`] behind the fault. Its recovery is the
-//! time from the end of the fault to the last row at which a parameter is off by more than
-//! [`NEAR_ERRORS`] of its errors and by more than [`NEAR_SHARE`] of its truth. Its lasting error is
-//! the largest that it had for [`LASTING_S`] on end.
+//! A trace is wrong where it is at its last row or [`LATER_S`] after the fault. Its recovery is the time from the end
+//! of the fault to the last row at which a parameter is off by more than [`NEAR_ERRORS`] of its errors and by more than
+//! [`NEAR_SHARE`] of its truth. Its lasting error is the largest that it had for [`LASTING_S`] on end.
 
 use serde_json::Value;
 
@@ -17,7 +16,7 @@ use super::bases::Truth;
 pub const WRONG: f64 = 4.0;
 /// How near a report must be to its fault, s.
 pub const NEAR_S: f64 = 1.0;
-/// When a trace is looked at once more, s behind the fault.
+/// When a trace is looked at once more, s after the fault.
 pub const LATER_S: f64 = 20.0;
 const NEAR_ERRORS: f64 = 2.5;
 const NEAR_SHARE: f64 = 0.1;
@@ -29,7 +28,7 @@ const OF_FAULTS: [&str; 4] = ["faults", "held-back", "hostile-span", "restarted"
 #[derive(Debug, Clone)]
 pub struct CaseTruth {
     pub truth: Truth,
-    /// The truth behind the fault, where that is another person.
+    /// The truth after the fault, where that is another person.
     pub then: Option<Truth>,
     /// Where the fault shows, s; `None` in a clean run.
     pub span_s: Option<(f64, f64)>,

@@ -39,7 +39,7 @@ pub enum What {
     Drift,
     /// A value that is held for some seconds.
     Frozen,
-    /// Some seconds of zeros put in before, inside or behind the run.
+    /// Some seconds of zeros put in before, inside or after the run.
     Idle,
     /// The same with a trace of noise: 0.001 standard deviations.
     IdleNoisy,
@@ -220,7 +220,7 @@ pub fn faults() -> Vec<Fault> {
     for (what, _, _, channels, sizes, places) in LINES {
         for &on in channels {
             for &size in sizes {
-                // What has the whole record has no place in it; a wrap begins somewhere.
+                // What has the whole record has no place in it; a wrap starts somewhere.
                 let places = if size == WHOLE && what != What::Wrap {
                     ALL
                 } else {

@@ -35,7 +35,7 @@ impl Table {
         self.t.len()
     }
 
-    /// Seconds from the first sample to behind the last.
+    /// Seconds from the first sample to after the last.
     pub fn seconds(&self) -> f64 {
         self.len() as f64 * self.h
     }

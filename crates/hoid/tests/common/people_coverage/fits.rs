@@ -45,7 +45,7 @@ impl Variant {
     }
 }
 
-/// A quantity beside its truth.
+/// A quantity next to its truth.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Quantity {
     pub name: String,

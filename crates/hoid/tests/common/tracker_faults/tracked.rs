@@ -1,4 +1,4 @@
-//! A tracker over a run with a fault, beside the same over the run without.
+//! A tracker over a run with a fault, next to the same over the run without.
 
 use hoid::{
     model::{remnant_gain::NoiseDefinition, scenario::RemnantStrength},
