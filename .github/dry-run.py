@@ -8,7 +8,7 @@
 A job runs for the entry of its matrix that is this platform, in a clone of the committed state. Commands run as
 they stand; `cargo publish` and other steps that publish are made dry. Of the actions, maturin's runs maturin from
 PyPI, artifacts are folders, check-out and tools are what is here already; what is left (deployments, tokens) is
-told by name. Jobs that need artifacts need the jobs that make them. It ends with a count, and with an error where a step has failed.
+given by name. Jobs that need artifacts need the jobs that make them. It ends with a count, and with an error where a step has failed.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Every code block of README and book runs, as it stands, and prints what the page says.
+"""Every code block of README and book runs, as it stands, and prints what the page states.
 
 How blocks are marked: `book/pages.py`. What `sh` and `cargo` are: `book/reader.py`.
 """

@@ -27,7 +27,7 @@ import tomllib
 pytestmark = [
     # The inputs are made once.
     pytest.mark.xdist_group("golden"),
-    # What is wrong with an input is told as a warning when it is read.
+    # What is wrong with an input is reported as a warning when it is read.
     pytest.mark.filterwarnings("ignore::UserWarning"),
 ]
 

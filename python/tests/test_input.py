@@ -1,4 +1,4 @@
-"""What people hand over: each works, or the message says what is wrong."""
+"""What people hand over: each works, or the message reports what is wrong."""
 
 from __future__ import annotations
 

@@ -111,7 +111,7 @@ def test_boxes(tmp_path: Path) -> None:
     samples[1, :3] = np.nan
     ax = plots.box_plots({"ARX": samples[0], "BJ": samples[1]}, truth=0.09, label="K_e")
     assert [text.get_text() for text in ax.get_xticklabels()] == ["ARX", "BJ\n(3 without value)"]
-    assert ax.get_ylabel() == "$K_e$", "a gain has a unit only where its record says so"
+    assert ax.get_ylabel() == "$K_e$", "a gain has a unit only where its record reports it"
     drawn(ax, tmp_path)
 
 

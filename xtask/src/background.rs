@@ -9,8 +9,8 @@ use std::{
 
 use crate::process::target_directory;
 
-/// A chore of this program in a process of its own. What it says is kept until it is waited for, so that it does not be
-/// between the lines of another.
+/// A chore of this program in a process of its own. What it reports is kept until it is waited for, so that it does not
+/// be between the lines of another.
 pub struct Background {
     name: &'static str,
     child: Child,
@@ -34,7 +34,7 @@ impl Background {
         Ok(Self { name, child, said })
     }
 
-    /// Waits for its end and tells what it has said.
+    /// Waits for its end and shows what it has reported.
     pub fn end(mut self) -> Result<(), String> {
         let name = self.name;
         let status = self.child.wait().map_err(|e| format!("cargo xtask {name}: {e}"))?;

@@ -258,7 +258,7 @@ fn several(packages: &[Package]) -> Vec<String> {
         .map(|(name, found)| {
             let found: Vec<&str> = found.iter().copied().collect();
             format!(
-                "{name} is here in {} versions ({}), expected {}: cargo tree --duplicates says who asks for them",
+                "{name} is here in {} versions ({}), expected {}: cargo tree --duplicates reports who asks for them",
                 found.len(),
                 found.join(", "),
                 stated(name)

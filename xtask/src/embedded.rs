@@ -1,7 +1,7 @@
 //! The kernel on bare processors: built for Cortex-M4F and RISC-V, run under QEMU, and its digits next to those of the
 //! host and of `hoid track`.
 //!
-//! What is not installed is said and left out, with what installs it.
+//! What is not installed is reported and left out, with what installs it.
 
 use std::{
     env, fs,
@@ -135,7 +135,7 @@ fn columns(table: &str, names: &[&str]) -> Result<Vec<Vec<String>>, String> {
     Ok(lines.map(row).collect())
 }
 
-/// Each line that was told must be one of the trace, to the last digit.
+/// Each line that was reported must be one of the trace, to the last digit.
 fn compared(place: &str, told: &str, track: &str) -> Result<(), String> {
     let table: Vec<&str> = told.lines().filter(|line| !line.starts_with('#')).collect();
     let names: Vec<&str> = table.first().copied().unwrap_or_default().split(',').collect();

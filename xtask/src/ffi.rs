@@ -234,7 +234,7 @@ fn tried(program: &Path, libraries: &Path) -> Result<(), String> {
     }
 }
 
-/// The example in C by what pkg-config says, with the shared and with the static library.
+/// The example in C by what pkg-config reports, with the shared and with the static library.
 fn found_by_pkg_config(out: &Path) -> Result<(), String> {
     if !(is_here("pkg-config") && is_here("cc")) {
         return Ok(());

@@ -2,7 +2,7 @@
 //! program after it, and the studies that need a browser: a long session (`hour.mjs`), operators in real time
 //! (`real.mjs`).
 //!
-//! All need npm, what looks at a page a browser; what is not there is said and left out.
+//! All need npm, what looks at a page a browser; what is not there is reported and left out.
 
 use std::{
     env, fs,
@@ -89,7 +89,7 @@ pub fn study(script: &str, arguments: &[String]) -> Result<(), String> {
     Ok(())
 }
 
-/// Installs what the page is built and driven with; false where there is no npm, which is said.
+/// Installs what the page is built and driven with; false where there is no npm, which is reported.
 fn npm_is_there() -> Result<bool, String> {
     let there = npm(&["--version"]).stdout(Stdio::null()).stderr(Stdio::null()).status();
     if !there.is_ok_and(|status| status.success()) {

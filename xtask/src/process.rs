@@ -1,4 +1,4 @@
-//! Commands that the chores run: their output, and what they say when they fail.
+//! Commands that the chores run: their output, and what they report when they fail.
 
 use std::{
     env,

@@ -2,7 +2,7 @@
 //!
 //! What speaks against the data or against the fit speaks against all answers. In addition, an answer can be open by
 //! itself: a parameter that the data do not determine, a crossover whose interval holds zero. The level of the whole is
-//! that of the answers that were asked for: a result whose delay is open is trustworthy in what it says of the
+//! that of the answers that were asked for: a result whose delay is open is trustworthy in what it reports about the
 //! crossover, and not determined for who asks for the delay. By default it is that of the response, and a loop that is
 //! open is a doubt.
 
@@ -29,7 +29,7 @@ pub struct Answered {
     pub open: Option<Finding>,
 }
 
-/// A fit that tells what is known of each of its answers.
+/// A fit that shows what is known of each of its answers.
 pub trait Answers {
     /// All of them, with this controlled element.
     fn answers(&self, element: Option<&ContinuousTransferFunction>) -> Vec<Answered>;
@@ -60,7 +60,7 @@ pub fn asked_for(names: &[String]) -> Result<Vec<String>, AnalysisError> {
     names.iter().map(one).collect()
 }
 
-/// The verdict on what was asked for, from what is known of the fit and what its answers say; by default of the
+/// The verdict on what was asked for, from what is known of the fit and what its answers show; by default of the
 /// response, with doubts of the loop.
 pub fn judged(verdict: Verdict, answers: &[Answered], asked: &[String]) -> Verdict {
     let of = |name: &str| answers.iter().find(|answer| answer.name == name);
@@ -161,7 +161,7 @@ pub(crate) fn of_operator(fit: &Fit) -> Vec<Answered> {
     let mut all = vec![answered(RESPONSE, None)];
     if let Ok(operator) = fit.operator() {
         all.extend(operator.rows().iter().map(|(name, _, estimate)| {
-            let why = is_open(estimate).then(|| format!("{name} ({estimate}) is not told from zero"));
+            let why = is_open(estimate).then(|| format!("{name} ({estimate}) is not distinguished from zero"));
             answered(name, why)
         }));
     }

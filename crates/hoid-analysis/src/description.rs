@@ -17,17 +17,17 @@ use crate::{
 /// Which channel holds the recorded disturbance or target.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub enum Excitation {
-    /// The first of the usual names whose power is in lines.
+    /// The first of the common names whose power is in lines.
     #[default]
     Found,
     /// None: no fit at lines.
     Nothing,
-    /// This channel: where it has no lines the result says so.
+    /// This channel: where it has no lines the result reports it.
     Named(String),
 }
 
 impl Excitation {
-    /// As users write it: a channel or `none`; found by itself where nothing is said.
+    /// As users write it: a channel or `none`; found by itself where nothing is specified.
     pub fn of_text(text: Option<&str>) -> Self {
         match text {
             None => Self::Found,
@@ -93,8 +93,8 @@ impl Recordings {
     }
 }
 
-/// What a fit next to the lines is told of them: what was looked for by name is missed, what was looked for by itself
-/// is not.
+/// What a fit next to the lines is reported of them: what was looked for by name is missed, what was looked for by
+/// itself is not.
 pub(crate) fn of_lines(
     described: &Result<Option<Description>, AnalysisError>,
     excitation: &Excitation,

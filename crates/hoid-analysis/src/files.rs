@@ -12,7 +12,7 @@ use crate::{
 };
 
 impl Reading {
-    /// Reads the files; each file that was read is told, with what a user should know of it.
+    /// Reads the files; each file that was read is reported, with what a user should know of it.
     ///
     /// # Errors
     /// Those of reading; [`AnalysisError::OtherColumns`] for a file in which error and control have other names.

@@ -79,7 +79,7 @@ impl Level {
         Ok(())
     }
 
-    /// Writes it into the accounts, and says so.
+    /// Writes it into the accounts, and reports it.
     pub(crate) fn told(
         &self,
         data: &mut Recordings,
@@ -105,7 +105,7 @@ impl Recordings {
 }
 
 impl Setting {
-    /// What the settings say of an estimated level.
+    /// What the settings state about an estimated level.
     pub(crate) fn level() -> Self {
         Self::new("level", "one constant of u a record, estimated")
     }

@@ -2,7 +2,7 @@
 //!
 //! An estimator takes each sample at its word, and its error bars are those of its model. What a result is worth
 //! follows from more: what was wrong with the recording and what was done about it, what a second fit without
-//! suspicious samples says, whether anybody could have held the loop. These rules are here and nowhere else; command
+//! suspicious samples shows, whether anybody could have held the loop. These rules are here and nowhere else; command
 //! line, groups and Python parse options and show results.
 //!
 //! ```text
@@ -18,7 +18,7 @@
 //! | a high rate is lowered | `rate` |
 //! | the describing function, where the excitation is recorded | `description`, `offset` |
 //! | the fit, a second opinion, the loop, the settings of the estimator | `estimators`: a file each |
-//! | what the recordings say | `identified`, `recordings` |
+//! | what the recordings show | `identified`, `recordings` |
 //! | what each answer is worth, and the verdict on those that were asked for | `answers` |
 //! | a describing function, from recordings to its verdict | `describing` |
 //! | a recursion over a recording, from it to the verdict | `tracking` |

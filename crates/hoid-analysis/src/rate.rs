@@ -45,7 +45,7 @@ impl Recordings {
         lead.unwrap_or(0.0)
     }
 
-    /// What to say where a high rate was kept because samples are counted.
+    /// What to report where a high rate was kept because samples are counted.
     pub fn kept_rate(&self, decimation: Decimation, counts_samples: bool) -> Option<String> {
         let settled = self.settles_the_rate();
         let record = self.records.first().filter(|_| !settled)?;
@@ -53,7 +53,7 @@ impl Recordings {
     }
 }
 
-/// What to say where a high rate is kept because samples are counted.
+/// What to report where a high rate is kept because samples are counted.
 pub fn kept_rate(sample_time: SampleTime, decimation: Decimation, counts_samples: bool) -> Option<String> {
     let factor = decimation.factor(sample_time);
     let kept = counts_samples && decimation == Decimation::Auto && factor > 1;

@@ -17,7 +17,7 @@ pub struct Account {
     pub quality_issues: Vec<QualityIssue>,
     /// Faults that were looked for, and what was done about them.
     pub faults: Vec<Fault>,
-    /// What they say of any result.
+    /// The report about any result.
     pub findings: Vec<Finding>,
     /// The constant of u that was estimated with the fit.
     pub level: Option<Estimate>,
@@ -82,7 +82,7 @@ impl Recordings {
     }
 
     /// What was found in all of them, for the verdict of a result of them. One person has one stick: that it rests is
-    /// said once.
+    /// reported once.
     pub fn findings(&self) -> Vec<Finding> {
         let several = self.names.len() > 1;
         let own = |account: &Account| account.findings.iter().filter(|f| f.kind == RESTING).count();
@@ -109,7 +109,7 @@ impl Recordings {
         all
     }
 
-    /// A verdict with what the recordings say: first, since a wrong recording is why a result is wrong.
+    /// A verdict with what the recordings show: first, since a wrong recording is why a result is wrong.
     pub fn judged(&self, verdict: Verdict) -> Verdict {
         let more = self.findings();
         if more.is_empty() {

@@ -14,7 +14,7 @@ use crate::{
 const MOST_LEVELS: usize = 16;
 
 impl Recordings {
-    /// The recordings without their faults; one that is cut gives several. What was found and what it says of any
+    /// The recordings without their faults; one that is cut gives several. What was found and what it reports about any
     /// result is in the account of the first of them.
     ///
     /// # Errors
@@ -29,7 +29,7 @@ impl Recordings {
         for (((name, record), account), origin) in one.zip(self.origins) {
             let steps = of == Of::System && steps_from_level_to_level(&record);
             let handling = match handling {
-                // A system that settles after a step is not a fault of its sensor: told, and nothing is cut.
+                // A system that settles after a step is not a fault of its sensor: reported, and nothing is cut.
                 FaultHandling::Bridge | FaultHandling::Cut if steps => FaultHandling::Report,
                 as_asked => as_asked,
             };
@@ -55,7 +55,7 @@ impl Recordings {
                 } else {
                     (format!("{name}{span}"), segment.labelled(label))
                 };
-                // What was found is told once.
+                // What was found is reported once.
                 all.push_part(origin, name, segment, std::mem::take(&mut account));
             }
         }

@@ -101,7 +101,7 @@ fn runs_that_are_no_two_runs_are_refused() {
     assert!(words.starts_with("run 1 and again hold the same samples"), "{words}");
     let nothing = quick().run(Recordings::default()).unwrap_err();
     assert!(matches!(nothing, AnalysisError::NoRecordings));
-    // Nothing moves: the estimator says so.
+    // Nothing moves: the estimator reports it.
     let resting = quick().run(Recordings::of_records([recorded(1, |e, _| (e, 0.0))]));
     assert!(matches!(resting.unwrap_err(), AnalysisError::Ident(_)));
     let short = record.span(0.0, 0.5).unwrap();

@@ -1,4 +1,4 @@
-//! One look at a file, and what a reader is told by it.
+//! One look at a file, and what a reader is reported by it.
 #![allow(clippy::unwrap_used)]
 
 use std::{f64::consts::TAU, fs, path::PathBuf};

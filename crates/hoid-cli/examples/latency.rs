@@ -1,8 +1,8 @@
 //! How long `hoid stream` takes to answer a sample, and what happens when readers stop, either side starts again,
 //! clocks jump and datagrams are hostile. The numbers of the page "In your simulator".
 //!
-//! `cargo xtask slow latency [--seconds N] [--seed N] [--program FILE] [--python FILE]`: each way and rate for 600 s, unless
-//! told otherwise. Over LabStreamingLayer where the interpreter has pyhoid and pylsl, as that of `cargo xtask places`. It
+//! `cargo xtask slow latency [--seconds N] [--seed N] [--program FILE] [--python FILE]`: each way and rate for 600 s,
+//! by default. Over LabStreamingLayer where the interpreter has pyhoid and pylsl, as that of `cargo xtask places`. It
 //! fails when a sample is lost that is not counted, or one is lost though nobody stopped; never for a time.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 

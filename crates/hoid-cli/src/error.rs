@@ -31,7 +31,7 @@ pub enum CliError {
     /// A result that was made and could not be printed.
     #[error("standard output cannot be written: {0}; what was asked is not there, or is cut: make room for it")]
     Output(std::io::Error),
-    /// A result that was printed, and says that the data do not determine what was asked.
+    /// A result that was printed, and reports that the data do not determine what was asked.
     #[error("the data do not determine what was asked: {0}")]
     NotDetermined(String),
     /// Work that was interrupted and can be resumed.

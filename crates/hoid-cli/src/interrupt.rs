@@ -2,7 +2,7 @@
 //! its files whole. SIGXFSZ (a limit of the size of files) is an error of writing instead of an end.
 //!
 //! By default what is on its way is removed and the program ends with 128 and the number of the
-//! signal. A command that can stop, or has something to say at its end, sets its own answer.
+//! signal. A command that can stop, or has something to report at its end, sets its own answer.
 
 use std::sync::{
     Mutex, MutexGuard, PoisonError,
@@ -56,7 +56,7 @@ fn listen(heard: impl Fn(i32) + Send + 'static) -> std::io::Result<()> {
         flag,
         iterator::Signals,
     };
-    // A signal with a handler does not end the program: the write says EFBIG.
+    // A signal with a handler does not end the program: the write reports EFBIG.
     flag::register(SIGXFSZ, std::sync::Arc::default())?;
     let mut signals = Signals::new([SIGINT, SIGTERM])?;
     // As `nohup` wants it.
@@ -74,8 +74,8 @@ fn listen(heard: impl Fn(i32) + Send + 'static) -> Result<(), ctrlc::Error> {
     ctrlc::set_handler(move || heard(SIGINT))
 }
 
-/// Whether the program was started with a signal ignored, where Linux says it; elsewhere a signal is
-/// taken for one that is not.
+/// Whether the program was started with a signal ignored, where Linux reports it; elsewhere a signal
+/// is taken for one that is not.
 #[cfg(unix)]
 fn is_ignored(signal: i32) -> bool {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();

@@ -1,6 +1,6 @@
 //! Standard output and standard error. A reader that closes the pipe early (`hoid ... | head`) has
-//! what it wanted: the command goes on with its files, and nothing is said. Any other output that
-//! cannot be written, such as a full disk, is an error.
+//! what it wanted: the command goes on with its files, and nothing is reported. Any other output
+//! that cannot be written, such as a full disk, is an error.
 
 use std::{
     io::{self, ErrorKind, IsTerminal, Write},
@@ -22,7 +22,8 @@ use crate::error::CliError;
 /// Writes a result to standard output.
 ///
 /// # Errors
-/// [`CliError::Output`] for what the system says, but not for a pipe that its reader has closed.
+/// [`CliError::Output`] for errors that the operating system reports, but not for a pipe that its
+/// reader has closed.
 pub fn print(text: &str) -> Result<(), CliError> {
     printed(io::stdout().lock().write_all(text.as_bytes()))
 }
@@ -104,7 +105,7 @@ fn wrapped(page: &str, width: usize) -> String {
     text
 }
 
-/// What is said after the answer: words, and what they are said of.
+/// What is reported after the answer: words, and what they are reported about.
 static NOTICES: Mutex<Vec<(String, Vec<String>)>> = Mutex::new(Vec::new());
 
 /// What is before a remark that speaks of trouble.
@@ -115,7 +116,8 @@ pub fn warning(of: &str, words: &str) {
     notice(of, format!("{WARNING}{words}"));
 }
 
-/// Keeps a remark until the answer is printed; what is said of several files is said once.
+/// Keeps a remark until the answer is printed; what is reported about several files is reported
+/// once.
 pub fn notice(of: &str, words: String) {
     let mut all = NOTICES.lock().unwrap_or_else(PoisonError::into_inner);
     match all.iter_mut().find(|(known, _)| *known == words) {
@@ -183,7 +185,7 @@ pub fn progress(total: usize, what: &str) -> ProgressBar {
 }
 
 /// Does work that may last, with the time since its start on standard error, and a bar with the
-/// time left as soon as it says how far it is; nothing where standard error is not a terminal.
+/// time left as soon as it reports how far it is; nothing where standard error is not a terminal.
 pub fn watched<T>(what: &'static str, work: impl FnOnce() -> T) -> T {
     let bar = ProgressBar::new_spinner().with_message(what);
     if let Ok(style) = ProgressStyle::with_template("{spinner} {msg}, {elapsed}") {

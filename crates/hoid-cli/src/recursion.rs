@@ -78,7 +78,7 @@ pub fn searching<T>(plan: &TrackPlan, work: impl FnOnce(&(dyn Fn() + Sync)) -> T
     done
 }
 
-/// The method of a name as typed; of an earlier name it is said what it is called now.
+/// The method of a name as typed; of an earlier name it is shown what it is called now.
 ///
 /// # Errors
 /// A name that no method has.

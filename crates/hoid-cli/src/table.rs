@@ -158,7 +158,7 @@ mod tests {
     use super::*;
 
     fn rows() -> Rows {
-        let mut rows = Rows::under(&["person", "phase margin (deg)", "what is to be said"]);
+        let mut rows = Rows::under(&["person", "phase margin (deg)", "what is to be reported"]);
         rows.add_row(["anna", "13.5 ± 1.9", "at the end of its range"]);
         rows.add_row(["bert", "7 ± 19", ""]);
         rows
@@ -204,7 +204,7 @@ mod tests {
         assert!(
             whole
                 .lines()
-                .any(|l| l.contains("phase margin (deg)") && l.contains("what is to be said"))
+                .any(|l| l.contains("phase margin (deg)") && l.contains("what is to be reported"))
         );
         assert_eq!(rows().on(Some(110)), whole);
         let narrow = rows().on(Some(38));

@@ -76,7 +76,7 @@ pub fn records(files: &[String], records: &[Record], accounts: &[Account], verbo
     };
     let mut text = String::new();
     for (k, one) in all.enumerate() {
-        // What was done to a record is always said, of records alike once.
+        // What was done to a record is always reported, of records alike once.
         if verbose || k < shown || !quiet(one.1) {
             text.push_str(&line(one));
         }
@@ -339,9 +339,9 @@ pub fn crossings(all: &Crossings) -> String {
     line
 }
 
-/// What there is to say of the loop of an estimate next to its lowest crossover: the others, the smallest phase margin,
-/// the gain margin, and that it is not stable. Nothing is said of one that crosses once and is stable, unless it is
-/// asked for.
+/// What there is to report about the loop of an estimate next to its lowest crossover: the others, the smallest phase
+/// margin, the gain margin, and that it is not stable. Nothing is reported about one that crosses once and is stable,
+/// unless it is asked for.
 pub fn loop_shape(shape: &LoopShape, always: bool) -> String {
     if !always && shape.crossovers.len() < 2 && shape.is_stable() != Some(false) {
         return String::new();
@@ -416,7 +416,7 @@ pub fn roots(fit: &Fit) -> String {
     format!("{rows}\n")
 }
 
-/// What the residuals say, record by record.
+/// What the residuals show, record by record.
 pub fn residual_tests(files: &[String], validations: &[Validation]) -> String {
     let mut rows = table(&["residuals of", "Ljung-Box Q", "degrees", "p", "signs"]);
     let (mut coloured, mut missed, mut feedback) = (false, false, false);
@@ -490,7 +490,7 @@ pub fn candidates(choice: &Choice) -> String {
         let value = |f: &hoid::ident::order_selection::CandidateFigures| f.value(choice.criterion);
         value(a.1).total_cmp(&value(b.1))
     });
-    // The usual columns, and the one that decided where it is another.
+    // The default columns, and the one that decided where it is another.
     let decides = !matches!(choice.criterion, Criterion::Loss | Criterion::Aic | Criterion::Bic);
     let mut header = vec!["candidate", "loss", "AIC", "BIC", ""];
     if decides {

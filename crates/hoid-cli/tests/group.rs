@@ -282,7 +282,7 @@ fn a_manifest_is_made_from_names_and_mistakes_are_named() {
     }
     let joined = text.replace("subject = \"anna\"", "then = \"nothing.csv\"\nsubject = \"anna\"");
     fs::write(at.join("joined.toml"), joined).unwrap();
-    // All runs failed: no result, and what there is to say is written.
+    // All runs failed: no result, and what there is to report is written.
     let output = hoid(at, &["group", "joined.toml", "--out", "joined", "--csv"]);
     let message = String::from_utf8_lossy(&output.stdout).into_owned();
     assert!(

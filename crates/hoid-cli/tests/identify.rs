@@ -66,7 +66,7 @@ fn identify_prints_the_json_of_the_contract() {
     assert_eq!(found["candidates"], serde_json::json!([]));
 }
 
-/// The bytes with which a file starts say what it is, and it has the width that was asked for.
+/// The bytes with which a file starts report what it is, and it has the width that was asked for.
 #[test]
 #[cfg(feature = "pdf-png")]
 fn a_figure_is_a_page_or_a_picture_as_its_name_says() {
@@ -446,7 +446,7 @@ fn a_loop_that_is_not_stable_is_a_doubt() {
     );
 }
 
-/// What anybody tries first: a simulation without noise gives its operator back, and says that there is no noise.
+/// What anybody tries first: a simulation without noise gives its operator back, and reports that there is no noise.
 #[test]
 fn a_simulation_without_noise_gives_its_operator_back() {
     let directory = TempDir::new().unwrap();

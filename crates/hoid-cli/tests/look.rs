@@ -1,5 +1,5 @@
-//! One look at a file: `hoid info`, `hoid group init`, `identify`, `describe` and `track` see the same columns
-//! and the same span, and say what to type.
+//! One look at a file: `hoid info`, `hoid group init`, `identify`, `describe` and `track` see the same columns and the
+//! same span, and report what to type.
 #![allow(clippy::unwrap_used)]
 
 mod common;
@@ -81,7 +81,7 @@ fn one_file_has_one_reading() {
     );
     assert_eq!(manifest["conditions"]["so"]["excitation"].as_str(), Some("r"));
 
-    // Without the columns each says which they are, and what it says can be typed.
+    // Without the columns each reports which they are, and what it reports can be typed.
     for (verb, more) in [
         ("identify", &[][..]),
         ("describe", &[]),

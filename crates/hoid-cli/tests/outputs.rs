@@ -335,7 +335,7 @@ fn signals_end_with_their_code_and_leave_nothing() {
     }
 }
 
-/// Estimates with errors and intervals, for a paper: what the JSON says.
+/// Estimates with errors and intervals, for a paper: what the JSON states.
 #[test]
 fn a_result_is_a_table_for_a_paper() {
     let directory = simulated();

@@ -20,8 +20,8 @@ const FIT: [&str; 8] = [
     "run.csv",
 ];
 
-/// A simulated run, e in rad, u recorded two samples late, t from 100 s on; some rows are told by
-/// `row`.
+/// A simulated run, e in rad, u recorded two samples late, t from 100 s on; some rows are reported
+/// by `row`.
 fn recorded(row: impl Fn(usize, [f64; 3]) -> Vec<[f64; 3]>) -> TempDir {
     let directory = TempDir::new().unwrap();
     let at = directory.path();

@@ -209,7 +209,7 @@ fn files_of_a_newcomer_are_read_or_answered_with_what_to_do() {
     };
     let default = page("mine.csv", &[]);
     assert_eq!(page("comma.csv", &[]), default);
-    assert!(!default.contains("deg"), "no file says a unit: {default}");
+    assert!(!default.contains("deg"), "no file states a unit: {default}");
     assert_eq!(
         page("mine.csv", &["--unit", "e=degrees,u=radians"]),
         page("mine.csv", &["--unit", "e=deg,u=rad"])

@@ -85,7 +85,7 @@ impl Stream {
         assert!(Command::new("kill").args(["-INT", &id]).status().unwrap().success());
     }
 
-    /// Waits for the end: how it ended, the lines that were left, what it said.
+    /// Waits for the end: how it ended, the lines that were left, what it reported.
     fn end(mut self) -> (ExitStatus, Vec<String>, String) {
         drop(self.input.take());
         let begun = Instant::now();
@@ -453,7 +453,7 @@ fn a_warm_up_that_fails_goes_on_until_there_is_something_to_fit() {
     let last = lines.last().unwrap();
     assert_eq!(last["operator"]["convertible"], true, "{last}");
     assert!(said.contains("started after"), "{said}");
-    // A stream that ends before says so.
+    // A stream that ends before reports it.
     let (lines, said) = answers(&arguments, "0.1,0.2\n0.2,0.1\n");
     assert_eq!(lines.len(), 2);
     assert!(said.contains("The warm-up did not end: 2 of 600"), "{said}");

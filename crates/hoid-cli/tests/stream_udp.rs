@@ -38,7 +38,7 @@ fn told(stream: &Stream) -> Value {
     serde_json::from_slice(&stream.answer()).unwrap()
 }
 
-/// Lost, doubled and late samples are told by their sequence, as by a column t.
+/// Lost, doubled and late samples are reported by their sequence, as by a column t.
 #[cfg(unix)]
 #[test]
 fn lost_samples_are_bridged_and_counted() {
@@ -108,7 +108,7 @@ fn hostile_datagrams_are_counted() {
     for bytes in hostile {
         udp.send(bytes);
     }
-    // Nothing at all, and what says nothing, is not even counted.
+    // Nothing at all, and what carries no information, is not even counted.
     udp.send(b"");
     udp.send(b"# a comment\n\n");
     udp.socket.set_read_timeout(Some(SHORT)).unwrap();

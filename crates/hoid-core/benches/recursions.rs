@@ -173,7 +173,7 @@ fn plain(data: &[(f64, f64)], history: &mut Vec<[f64; 4]>) {
     }
 }
 
-/// A person in the basis that people share, at its usual settings.
+/// A person in the basis that people share, at its default settings.
 fn person() -> AdaptiveFilter<Vec<f64>> {
     let (default_operator, ts) = (DefaultOperator::with_delay(0.285), 0.01);
     let memory = vec![0.0; memory_needed(ts, REPLAYED_S)];

@@ -36,7 +36,7 @@ pub enum Forgetting<const N: usize> {
     },
     /// A scalar factor that falls where the innovations are larger than their variance explains.
     Variable {
-        /// Memory N_0 in samples while the innovations are as large as their variance says.
+        /// Memory N_0 in samples while the innovations are as large as their variance reports.
         memory: f64,
         /// Smallest factor.
         smallest: f64,

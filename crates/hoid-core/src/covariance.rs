@@ -138,8 +138,8 @@ impl<const N: usize> Covariance<N> {
         self.factors.matrix()
     }
 
-    /// The step by every rule and at every time; [`Adaptation::update`] has the usual case next to
-    /// it.
+    /// The step by every rule and at every time; [`Adaptation::update`] has the typical case next
+    /// to it.
     #[inline(never)]
     fn update_by_rule(&mut self, psi: &[f64; N], eps: f64, variance: f64) -> ParameterStep<N> {
         if self.early > NO_EARLY_FORGETTING {
@@ -251,7 +251,7 @@ impl<const N: usize> Adaptation<N> for Covariance<N> {
     fn update(&mut self, psi: &[f64; N], eps: f64, _theta: &[f64; N], variance: f64) -> ParameterStep<N> {
         let exponential = matches!(self.forgetting, Forgetting::Exponential { .. });
         if !exponential || self.early > NO_EARLY_FORGETTING {
-            // A copy, so that psi can stay in registers in the usual case.
+            // A copy, so that psi can stay in registers in the typical case.
             let psi = *psi;
             return self.update_by_rule(&psi, eps, variance);
         }

@@ -17,7 +17,7 @@ use crate::{
 };
 
 /// The recursion. N is the capacity for parameters, K that for the errors of its filters
-/// ([`ErrorLayout::filter_errors`]): 0 for the usual error bars and for none, B =
+/// ([`ErrorLayout::filter_errors`]): 0 for the default error bars and for none, B =
 /// [`NoErrorBars`](crate::error_bars::NoErrorBars).
 #[derive(Debug, Clone, PartialEq)]
 #[repr(align(64))]

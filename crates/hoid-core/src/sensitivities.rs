@@ -41,7 +41,7 @@ impl ErrorLayout {
         }
     }
 
-    /// No errors of filters: the usual error bars, with `h = psi`.
+    /// No errors of filters: the default error bars, with `h = psi`.
     pub const NONE: Self = Self {
         na: 0,
         noise: (0, 0),

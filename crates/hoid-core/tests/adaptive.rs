@@ -230,8 +230,8 @@ fn neuromuscular_system_and_delay_are_found() {
 
 #[test]
 fn one_who_is_far_from_what_is_usual_is_found() {
-    // A delay 100 ms later than what is supposed, and a system of 16 rad/s that acts 60 ms earlier: from
-    // the usual person the corrections end elsewhere.
+    // A delay 100 ms later than what is supposed, and a system of 16 rad/s that acts 60 ms earlier: from the default
+    // person the corrections end elsewhere.
     for (point, seed) in [
         (
             Point {
@@ -588,7 +588,7 @@ fn a_stick_that_ends_does_not_make_the_person_answer_less() {
             let [e, u] = person.sample(GAINS_OF_A_PERSON, 0.05);
             let stick = u.clamp(-end, end);
             knows.step(e, stick);
-            // No two samples alike: nothing tells that the stick stands.
+            // No two samples alike: nothing shows that the stick stands.
             does_not.step(e, stick * (1.0 + 1e-9 * f64::from(k % 2)));
         }
         let (of, _) = estimate(&free, 2.0);

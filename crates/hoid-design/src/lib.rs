@@ -1,4 +1,5 @@
-//! Before and after an experiment: what its data will say, and whether conditions and people differ.
+//! Before and after an experiment: what its data will report, and whether conditions and people
+//! differ.
 //!
 //! | module | what it holds |
 //! |---|---|

@@ -1,6 +1,6 @@
 //! Pointers of the caller: all that this crate believes.
 //!
-//! A pointer that is null or not aligned is refused. That it points to what the header says, and
+//! A pointer that is null or not aligned is refused. That it points to what the header states, and
 //! that the caller does not use it at the same time from another thread, cannot be checked: it is
 //! the contract of every function here.
 
@@ -79,7 +79,7 @@ pub(crate) unsafe fn put<T>(pointer: *mut T, value: T, what: &str) -> Result<(),
 }
 
 /// Writes a list where the caller wants it, and its length. Without room (`list` null and `room`
-/// zero) only the length is told.
+/// zero) only the length is reported.
 ///
 /// # Safety
 /// `list` is null or points to room for `room` values, `count` is null or to room for a number.

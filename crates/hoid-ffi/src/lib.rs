@@ -1,6 +1,6 @@
 //! The tracker of `hoid track` and `hoid stream` after a C ABI.
 //!
-//! The one crate of the workspace with unsafe code. What is unsafe about a C boundary is that pointers are believed, so
+//! The one crate of the workspace with unsafe code. What is unsafe about a C boundary is that pointers are trusted, so
 //! that is all the unsafe code does: `boundary` reads texts and writes results through pointers of the caller, and
 //! nothing else dereferences one. After it stands the safe `session`, which knows nothing of C.
 //!

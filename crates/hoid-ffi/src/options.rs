@@ -68,7 +68,7 @@ impl TrackerRequest {
         set(&mut method, options, self.fit.as_deref())?;
         if method.smooths() {
             return Err(Failure::option(
-                "smooth: what is still to come cannot say anything of a stream; drop it",
+                "smooth: what is still to come cannot carry any information about a stream; drop it",
             ));
         }
 
@@ -220,7 +220,7 @@ fn range(value: &Value, name: &str) -> Result<RangeInclusive<usize>, String> {
     }
 }
 
-/// A value as the command line writes it; none where it says nothing.
+/// A value as the command line writes it; none where it carries no information.
 fn text(value: &Value) -> Option<String> {
     Some(match value {
         Value::Null | Value::Bool(false) => return None,

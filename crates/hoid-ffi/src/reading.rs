@@ -1,7 +1,7 @@
-//! What a tracker says.
+//! What a tracker reports.
 //!
 //! A list is asked for with its room and the place for its count; with NULL and no room only the
-//! count is told.
+//! count is reported.
 
 use std::ffi::c_char;
 
@@ -40,7 +40,7 @@ unsafe fn list<T: Copy>(
     unsafe { with_tracker(tracker, hand) }
 }
 
-/// HOID_OK once there is an estimate, HOID_NOTHING before; hoid_last_error then says how far the
+/// HOID_OK once there is an estimate, HOID_NOTHING before; hoid_last_error then reports how far the
 /// warm-up is.
 ///
 /// # Safety

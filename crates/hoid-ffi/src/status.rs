@@ -18,7 +18,7 @@ pub type HoidStatus = i32;
 
 /// Done.
 pub const HOID_OK: HoidStatus = 0;
-/// There is no such value now; hoid_last_error says why.
+/// There is no such value now; hoid_last_error gives the reason.
 pub const HOID_NOTHING: HoidStatus = 1;
 /// A pointer is null or not aligned.
 pub const HOID_BAD_POINTER: HoidStatus = -1;
@@ -92,7 +92,7 @@ pub(crate) fn guarded(call: impl FnOnce() -> Result<(), Failure>) -> HoidStatus 
     failure.status
 }
 
-/// What a panic says.
+/// What a panic reports.
 pub(crate) fn panic_message(panic: &(dyn Any + Send)) -> String {
     let words = (panic.downcast_ref::<&str>().copied())
         .or_else(|| panic.downcast_ref::<String>().map(String::as_str))

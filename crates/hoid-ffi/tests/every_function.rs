@@ -42,7 +42,7 @@ fn listed<T: Copy>(tracker: *const HoidTracker, of: Lists<T>) -> Vec<T> {
     let mut list = Vec::<T>::with_capacity(count);
     if count > 0 {
         let mut small = Vec::<T>::with_capacity(count - 1);
-        // SAFETY: a tracker, and room as told, which is too little.
+        // SAFETY: a tracker, and room as reported, which is too little.
         let status = unsafe { of(tracker, small.as_mut_ptr(), count - 1, &mut count) };
         assert_eq!(status, HOID_TOO_SMALL);
     }
@@ -350,7 +350,8 @@ struct Callbacks {
     environment: *mut c_void,
 }
 
-/// Notes what it is told. Rust has such functions under Miri's compiler alone; elsewhere C has them.
+/// Notes what it is reported. Rust has such functions under Miri's compiler alone; elsewhere C has
+/// them.
 #[cfg(miri)]
 unsafe extern "C" fn logger_2(
     environment: *mut c_void,

@@ -64,7 +64,7 @@ const ANY: HoidEstimate = HoidEstimate {
     determined: 0,
 };
 
-/// Everything that a tracker says, each with an answer that is not a fault.
+/// Everything that a tracker reports, each with an answer that is not a fault.
 fn asked(tracker: &Owned) -> Vec<HoidStatus> {
     let t = tracker.0;
     let mut list = [ANY; 64];
@@ -118,7 +118,7 @@ fn null_pointers_are_refused_everywhere() {
     // SAFETY: null is allowed.
     let status = unsafe { hoid_tracker_step(ptr::null_mut(), 0.0, 0.0, ptr::null_mut()) };
     assert_eq!(status, HOID_BAD_POINTER);
-    // The usual method, or under Miri the one that is made in no time.
+    // The default method, or under Miri the one that is made in no time.
     let (method, options) = if cfg!(miri) {
         (c"rpem".as_ptr(), c"{\"nk\": 9}".as_ptr())
     } else {
@@ -267,7 +267,7 @@ proptest! {
         prop_assert_eq!(saved(&again), saved(&tracker));
     }
 
-    /// Options of any kind make a tracker or say why not.
+    /// Options of any kind make a tracker or give the reason why not.
     #[test]
     #[cfg_attr(miri, ignore = "the filters of the method adaptive take minutes there; tests/every_function.rs has few samples")]
     fn any_options_have_an_answer(

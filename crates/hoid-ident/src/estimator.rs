@@ -144,7 +144,7 @@ impl Estimator {
                 return Err(IdentError::BadOption {
                     option: "the focus".to_owned(),
                     found: format!("simulation with {}", self.orders),
-                    expected: "na = 0 or nf = 0: the simulation error does not tell A from F".to_owned(),
+                    expected: "na = 0 or nf = 0: the simulation error does not distinguish A from F".to_owned(),
                 });
             }
         }

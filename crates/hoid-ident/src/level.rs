@@ -194,7 +194,7 @@ mod tests {
                 ..Estimator::new(structure, orders)
             };
             let Ok(fit) = estimator.fit(&without) else {
-                // With one pole too many exact data say nothing of the second.
+                // With one pole too many exact data carry no information about the second.
                 assert_eq!(orders.na, 2);
                 continue;
             };

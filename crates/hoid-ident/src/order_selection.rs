@@ -456,9 +456,9 @@ pub fn fit_or_choose(
 }
 
 impl Choice {
-    /// Delays nk that the data do not tell from the best one, the other orders being those of the
-    /// chosen model: the smallest and the largest with `n ln(V/V_min) <= 3.84`, the 95 % point of
-    /// chi-square with one degree of freedom (a profile likelihood interval; nk moves in whole
+    /// Delays nk that the data do not determine from the best one, the other orders being those of
+    /// the chosen model: the smallest and the largest with `n ln(V/V_min) <= 3.84`, the 95 % point
+    /// of chi-square with one degree of freedom (a profile likelihood interval; nk moves in whole
     /// samples, so that it is coarse where one sample changes the loss much). `None` when fewer
     /// than two delays were fitted.
     pub fn delay_interval(&self) -> Option<(usize, usize)> {

@@ -1,6 +1,6 @@
 //! How far a fit is, told to whoever waits on the thread that fits.
 //!
-//! A fit of forms or orders, one after the other, lasts seconds on many or long records. It says
+//! A fit of forms or orders, one after the other, lasts seconds on many or long records. It reports
 //! before each which one of how many it is; without anybody who watches that costs nothing.
 
 use std::{

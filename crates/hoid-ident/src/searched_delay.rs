@@ -75,7 +75,7 @@ impl Fit {
             }
         }
         let a = gram.cholesky()?.solve(&along);
-        // What the range of delays says without the data.
+        // What the range of delays reports without the data.
         let most = (delays as f64 * ts).powi(2) / 12.0;
         let known = own - along.dot(&a);
         let from_data = if known > 0.0 {
@@ -239,7 +239,7 @@ mod tests {
 
     #[test]
     fn no_delay_is_less_certain_than_its_range() {
-        // e alone, far from u: the delay says nothing.
+        // e alone, far from u: the delay carries no information.
         let record = run(2);
         let delays = 3;
         let fit = Estimator::new(Structure::BoxJenkins, Structure::BoxJenkins.operator_orders(29))

@@ -4,9 +4,9 @@
 //! `cargo xtask slow mutations [--inputs N] [--first N] [--jobs N] [--seed N] [--memory MB] [--keep DIRECTORY]`.
 //!
 //! The cases are shared among processes, each with a limit of its address space (`ulimit -v`; where there is no such
-//! limit, nothing is said of memory). A case that ends its process, or keeps it for [`PATIENCE`], is told and the
-//! process goes on after it. `--keep` writes the files of the cases that failed. It is built with overflow checks on,
-//! as the tests are.
+//! limit, nothing is reported about memory). A case that ends its process, or keeps it for [`PATIENCE`], is reported
+//! and the process goes on after it. `--keep` writes the files of the cases that failed. It is built with overflow
+//! checks on, as the tests are.
 #![allow(clippy::unwrap_used, clippy::print_stdout, clippy::print_stderr)]
 
 #[path = "../tests/common/mutations/mod.rs"]
@@ -110,7 +110,7 @@ fn main() -> ExitCode {
     }
 }
 
-/// What all processes say.
+/// What all processes report.
 #[derive(Debug, Default)]
 struct Sum {
     read: u64,
@@ -228,8 +228,8 @@ fn part(task: &Task, place: &Path, first: u64) {
         let path = place.join("damaged").with_extension(case.extension);
         fs::write(&path, &case.bytes).unwrap();
         let mut took = Duration::MAX;
-        // Where the system does not say what this process had, another may have had the processor: the
-        // least of three counts.
+        // Where the system does not report what this process had, another may have had the processor: the least of
+        // three counts.
         for _ in 0..3 {
             let begun = Spent::now();
             let outcome = panic::catch_unwind(AssertUnwindSafe(|| readers::all(&path, case.bytes.len(), case.choice)));
@@ -258,7 +258,7 @@ fn failed(task: &Task, number: u64, case: &Case, what: &str) {
     keep(task, number);
 }
 
-/// Most of the address space that this process had, where the system says so.
+/// Most of the address space that this process had, where the system reports it.
 fn largest_mb() -> u64 {
     let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
     let line = status.lines().find_map(|line| line.strip_prefix("VmPeak:"));

@@ -16,7 +16,7 @@ pub enum IoError {
     Unreadable {
         /// The file.
         file: String,
-        /// What the system says.
+        /// Error reported by the operating system.
         source: std::io::Error,
     },
     /// A file that the system does not take.
@@ -24,7 +24,7 @@ pub enum IoError {
     Unwritable {
         /// The file.
         file: String,
-        /// What the system says.
+        /// Error reported by the operating system.
         source: std::io::Error,
     },
     /// A result in the place of what it is made of.
@@ -521,7 +521,7 @@ pub enum IoError {
         /// What is there instead.
         found: String,
     },
-    /// Bytes of another format than the extension says.
+    /// Bytes of another format than the extension states.
     #[error(
         "{file} is no {format} file: {found}, expected {expected}; copy or write it again if it was cut short, or give it the extension of what it is"
     )]

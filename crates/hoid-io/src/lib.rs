@@ -3,7 +3,7 @@
 //! Recordings come as CSV, Parquet, NPZ, MATLAB or XDF, with columns of any name, clocks that jitter and rows that are
 //! missing. Reading takes the columns that are asked for, finds the sampling, checks every value in use, and gives an
 //! evenly sampled [`Record`](hoid_model::Record) or an error that names the place in the file. Nothing is repaired
-//! unasked; what is wrong with the data is said next to the record.
+//! unasked; what is wrong with the data is reported next to the record.
 //!
 //! ```
 //! use hoid_io::{ReadOptions, read_record};

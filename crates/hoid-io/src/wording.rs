@@ -52,7 +52,7 @@ pub fn printable(message: &str) -> String {
     text
 }
 
-/// What a crate says, short, and without anything that a terminal obeys.
+/// What a crate reports, short, and without anything that a terminal obeys.
 pub(crate) fn told(what: &str) -> String {
     let line = what.lines().next().unwrap_or_default();
     line.chars().take(200).collect::<String>().escape_debug().to_string()

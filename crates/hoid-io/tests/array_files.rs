@@ -450,7 +450,7 @@ fn damaged_files_never_panic() {
             bytes.truncate(draw.below(bytes.len()));
         }
         for _ in 0..=draw.below(4) {
-            // The heads of files say most, and the end of an archive.
+            // The heads of files state most, and the end of an archive.
             let length = bytes.len().max(1);
             let at = match draw.below(3) {
                 0 => draw.below(length),

@@ -1,4 +1,4 @@
-//! Whole files in and out: what comes back is what went in, and what is damaged is said.
+//! Whole files in and out: what comes back is what went in, and what is damaged is reported.
 
 #![allow(clippy::unwrap_used, reason = "a test may fail at any line, its helpers as well")]
 
@@ -215,7 +215,7 @@ fn errors_name_line_column_and_remedy() {
     );
     says(
         "t,e,u\ns,deg,deg\n0,1,2\n1,1,2\n",
-        &["line 2, column t: found \"s\"", "remove it and say them with --unit"],
+        &["line 2, column t: found \"s\"", "remove it and report them with --unit"],
     );
     says(
         "t,e,u\n2024-03-01 10:00:00.00,1,2\n0.02,1,2\n",

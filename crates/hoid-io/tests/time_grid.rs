@@ -254,7 +254,7 @@ fn two_topics_in_one_table_are_read_where_both_have_values() {
             (read.record.input()[k] - 10.0 * t).abs() < 1e-12 && (read.record.output()[k] - (1.0 - t)).abs() < 1e-12
         );
     }
-    // Nothing in common at all: the error says so.
+    // Nothing in common at all: the error reports it.
     assert!(
         desk.error("t,e,u\n0,1,\n1,2,\n2,,1\n3,,2\n", &ask(FILL))
             .contains("missing up to")

@@ -1,4 +1,4 @@
-//! Trials in one file are records of their own, whatever tells them apart.
+//! Trials in one file are records of their own, whatever distinguishes them.
 
 #![allow(clippy::unwrap_used, reason = "a test may fail at any line, its helpers as well")]
 

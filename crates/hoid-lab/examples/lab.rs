@@ -206,7 +206,7 @@ fn main() -> ExitCode {
         let truth = truth.map(|place| 1.0 / person.coordinates[place]);
         let holds = |(value, error): &&(f64, f64)| truth.is_some_and(|t| (value - t).abs() <= 1.96 * error);
         println!(
-            "{}\ta lag is told in {} of {seeds} runs, {} of them within 1.96 standard errors of the truth",
+            "{}\ta lag is reported in {} of {seeds} runs, {} of them within 1.96 standard errors of the truth",
             person.name,
             lags.len(),
             lags.iter().filter(holds).count()

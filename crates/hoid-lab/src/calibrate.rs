@@ -126,7 +126,7 @@ pub fn operator(task: &Task, seed: u64) -> Result<(SimulatedOperator, Vec<f64>),
     Ok((SimulatedOperator { plant, delay: DELAY }, noise.collect()))
 }
 
-/// What the run of a calibration says; kept in the experiment.
+/// What the run of a calibration reports; kept in the experiment.
 ///
 /// # Errors
 /// [`LabError::Ident`] for a run that cannot be identified, those of files.

@@ -214,7 +214,7 @@ impl Default for Condition {
 /// from the first seconds on.
 const DEFAULT_METHOD: &str = "adaptive";
 
-/// What a person confirms where the file says nothing else.
+/// What a person confirms where the file carries no information else.
 const CONSENT: &str = "You will follow a moving target by hand for a few short runs. The program stores where your \
 hand was, what was on the screen and when, under a made-up name, on this computer only. It stores no name, no picture \
 and no sound. You may stop at any time by the key Escape or by closing the window; what was stored can be deleted with \

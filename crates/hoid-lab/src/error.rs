@@ -31,7 +31,7 @@ pub enum LabError {
     File {
         /// The file.
         file: String,
-        /// What the system says.
+        /// Error reported by the operating system.
         source: std::io::Error,
     },
     /// A file of a session that is not as it was written.
@@ -66,7 +66,7 @@ pub enum LabError {
 }
 
 impl LabError {
-    /// What the system says of a file.
+    /// Error reported by the operating system of a file.
     pub(crate) fn file(path: &Path, source: std::io::Error) -> Self {
         Self::File {
             file: path.display().to_string(),

@@ -23,7 +23,7 @@ sub-P01/ses-01/             one session of one person, who has a made-up name
   ..._forcing.parquet       target and disturbance at each tick of 1 ms
   ..._ticks.csv             u (hand) and e (error) at each tick
   ..._events.csv            input events: the tick that took them, their own time stamp, when the page
-                            had them (ms from tick 0), what the device said
+                            had them (ms from tick 0), what the device reported
   ..._frames.csv            frames: their time, when they were drawn (ms from tick 0), the tick and the
                             error that they show
   ..._live.csv              the estimate while the run went on

@@ -1,14 +1,13 @@
 //! The experiment as its pages see it: one session at a time, one page that tracks, any number that
 //! look on.
 //!
-//! What pages say comes from the threads of their sockets, one message at a time under one lock; what
-//! is said to them goes into the queue of each. The estimate has a thread of its own, the pages of
-//! results too.
+//! What pages state comes from the threads of their sockets, one message at a time under one lock; what is reported to
+//! them goes into the queue of each. The estimate has a thread of its own, the pages of results too.
 //!
 //! | file | what it holds |
 //! |---|---|
 //! | `runs` | a run: sent, started, taken batch by batch, ended |
-//! | `told` | what the pages are told |
+//! | `told` | what the pages are reported |
 
 mod runs;
 mod told;
@@ -187,7 +186,7 @@ impl Lab {
         if state.person == Some(id) {
             state.person = None;
             state.ready = None;
-            // Its files cannot be closed: the session says so when it is opened next.
+            // Its files cannot be closed: the session reports it when it is opened next.
             let _ = self.shared.end_run(&mut state, How::Interrupted, BTreeMap::new());
             let left = self.shared.newest_person();
             if let Some(newest) = left {
@@ -204,8 +203,8 @@ impl Lab {
     /// Hears a page.
     ///
     /// # Errors
-    /// [`LabError::Message`] for what no page of this program says, [`LabError::Order`] for what comes
-    /// at the wrong time, those of files.
+    /// [`LabError::Message`] for what no page of this program reports, [`LabError::Order`] for what comes at the wrong
+    /// time, those of files.
     pub fn hear(&self, id: u64, message: FromPage) -> Result<(), LabError> {
         let shared = &self.shared;
         if let FromPage::Hello { role, browser } = message {
@@ -286,7 +285,7 @@ impl Shared {
     fn hello(&self, id: u64, role: Role, browser: BTreeMap<String, String>) -> Result<(), LabError> {
         let long = |(name, value): (&String, &String)| name.len() > 64 || value.len() > 512;
         if browser.len() > 32 || browser.iter().any(long) {
-            return Err(LabError::Message("the page says too much of its browser".to_owned()));
+            return Err(LabError::Message("the page states too much of its browser".to_owned()));
         }
         if let Some(page) = self.pages().get_mut(&id) {
             page.role = Some(role);
@@ -294,7 +293,7 @@ impl Shared {
         }
         let mut state = self.state();
         if role == Role::Person && state.run.is_none() {
-            // The newest window has the session; an older one is told that it has not.
+            // The newest window has the session; an older one is informed that it has not.
             let before = state.person.filter(|before| *before != id);
             self.give(&mut state, id)?;
             if let Some(before) = before {
@@ -338,7 +337,7 @@ impl Shared {
         }
     }
 
-    /// Does what the page of the person says.
+    /// Does what the page of the person reports.
     fn obey(self: &Arc<Self>, state: &mut Current, id: u64, message: FromPage) -> Result<(), LabError> {
         match message {
             FromPage::Hello { .. } => Ok(()),

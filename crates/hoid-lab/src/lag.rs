@@ -1,10 +1,10 @@
 //! The lag of the person while the run goes on.
 //!
-//! The tracker acts in a basis whose lag stays where it started: nothing of it says what T_I is. So the samples of the
-//! measurement since the last declared change are fitted as `hoid identify` does, each 10 s, on a thread of its own:
-//! all forms of the operator, the one that held-out data choose, and its T_I where the data determine it
+//! The tracker acts in a basis whose lag stays where it started: nothing of it reports what T_I is. So the samples of
+//! the measurement since the last declared change are fitted as `hoid identify` does, each 10 s, on a thread of its
+//! own: all forms of the operator, the one that held-out data choose, and its T_I where the data determine it
 //! ([`hoid_analysis::identify`]). Of a form without a lag, or one whose interval reaches a pure integration, T_I is not
-//! determined, and no number is told.
+//! determined, and no number is reported.
 //!
 //! A form with a lag is chosen now and then for who has none, a short lag next to a longer lead: for 13 of 60 runs of
 //! C1 and 2 of 20 of C2, 30 and 80 s long, with T_I up to 6.3 standard errors from zero. A lag of 1 s that is there is
@@ -21,7 +21,7 @@ use hoid_track::Sample;
 /// Shortest span of a fit, and the time between two, s.
 const SHORTEST_S: f64 = 40.0;
 const EVERY_S: f64 = 10.0;
-/// A lag is told that is so many standard errors from none.
+/// A lag is reported that is so many standard errors from none.
 const CLEAR: f64 = 10.0;
 
 /// The lag as far as it is known.
@@ -202,7 +202,7 @@ mod tests {
     #[test]
     fn a_lag_that_the_data_show_is_found() {
         let Lag::Known(found) = Lag::of(record(&with_lag(60.0, 1))) else {
-            panic!("60 s of a lag of {LAG_S} s say nothing of it");
+            panic!("60 s of a lag of {LAG_S} s carry no information about it");
         };
         let error = found.standard_error.unwrap();
         assert!((found.value - LAG_S).abs() < 3.0 * error && error < 0.3, "{found}");

@@ -15,7 +15,7 @@
 //! | [`verify`] | [`check`](verify::check): verified, or unverified and why |
 //! | [`record`] | a run as a record for all commands of hoid |
 //! | [`live`], [`lag`] | the estimate while the run goes on, the lag of the person besides |
-//! | [`wire`] | what page and server say to each other |
+//! | [`wire`] | what page and server report to each other |
 //! | [`lab`] | [`Lab`]: the experiment as its pages see it |
 //! | [`server`] | [`Server`]: HTTP and sockets on 127.0.0.1 |
 //! | `experiment`, `export`, `replay`, `reports` | what is next to the sessions; archives; runs shown again; pages |

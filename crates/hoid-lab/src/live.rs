@@ -53,7 +53,7 @@ pub struct LiveLine {
     pub lead_s: ReportedValue,
     /// Lag T_I, s, where the data determine it.
     pub lag_s: ReportedValue,
-    /// Why no lag is told.
+    /// Why no lag is reported.
     pub lag_waiting: Option<&'static str>,
     /// Natural frequency of the neuromuscular system, rad/s.
     pub omega_nm_rad_s: ReportedValue,
@@ -103,7 +103,7 @@ impl LiveRun {
         })
     }
 
-    /// Takes samples, and says how it is after the last of them.
+    /// Takes samples, and reports how it is after the last of them.
     pub fn take(&mut self, samples: &[Sample]) -> LiveLine {
         let mut changed_s = None;
         for sample in samples {

@@ -63,14 +63,14 @@ impl Plant {
 /// Most states of a controlled element.
 pub const MOST_STATES: usize = 16;
 
-/// From what a device says to u.
+/// From what a device reports to u.
 ///
 /// `w = (raw - centre)/span`, within -1 to 1; `|w| <= dead` gives 0, what is beyond is stretched so
 /// that the ends stay; `u = gain w`. The gain holds sensitivity, direction and the full deflection.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct InputMap {
-    /// What the device says at rest: pixels from the left edge, or 0 of a gamepad.
+    /// What the device reports at rest: pixels from the left edge, or 0 of a gamepad.
     pub centre: f64,
     /// From there to the full deflection.
     pub span: f64,
@@ -81,7 +81,7 @@ pub struct InputMap {
 }
 
 impl InputMap {
-    /// u of what the device says.
+    /// u of what the device reports.
     pub fn u(&self, raw: f64) -> f64 {
         let w = ((raw - self.centre) / self.span).clamp(-1.0, 1.0);
         let size = if w < 0.0 { -w } else { w };

@@ -100,7 +100,7 @@ fn one(program: &Path, config: &Config, stem: &Stem, name: &str) {
     said(&mut command, &place, name);
 }
 
-/// Runs a command; where it makes no page of its own, what it says becomes one.
+/// Runs a command; where it makes no page of its own, what it reports becomes one.
 fn said(command: &mut Command, place: &Path, name: &str) {
     let made = hoid_io::make_directory(place).map_err(LabError::from).and_then(|()| {
         command
@@ -131,7 +131,7 @@ fn said(command: &mut Command, place: &Path, name: &str) {
         escaped(&out),
         escaped(&wrong)
     );
-    // Without the page its link is not there, which says it.
+    // Without the page its link is not there, which reports it.
     let _ = hoid_io::write_atomically(&page, |file| file.write_all(html.as_bytes()));
 }
 

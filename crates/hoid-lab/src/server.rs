@@ -1,9 +1,8 @@
 //! The server of the page: HTTP on 127.0.0.1, and the sockets of its pages.
 //!
-//! It serves one page, its data and the pages of results, and nothing to anybody else: the address
-//! holds a random token, and a request is refused unless its `Host` is the address of the server, its
-//! `Origin`, where it has one, is that too, and it is a GET of bounded length. A socket must have an
-//! origin. Nothing that a page says names a file.
+//! It serves one page, its data and the pages of results, and nothing to anybody else: the address holds a random
+//! token, and a request is refused unless its `Host` is the address of the server, its `Origin`, where it has one, is
+//! that too, and it is a GET of bounded length. A socket must have an origin. Nothing that a page states names a file.
 //!
 //! | refused | status |
 //! |---|---|
@@ -134,7 +133,7 @@ impl Server {
             let Some(known) = AuthorisedConnection::enter(&server) else {
                 return Err((busy("too many connections"), stream));
             };
-            // A thread that is not made takes its connection along: one to say so on.
+            // A thread that is not made takes its connection along: one to report it on.
             let other = stream.try_clone();
             let made = thread::Builder::new().spawn(move || known.0.answer(stream, &request));
             match (made, other) {
@@ -220,7 +219,7 @@ fn random_token() -> Result<String, LabError> {
     Ok(HEXLOWER.encode(&random))
 }
 
-/// Equal, in a time that does not tell where they differ.
+/// Equal, in a time that does not determine where they differ.
 fn same(a: &str, b: &str) -> bool {
     a.len() == b.len() && a.bytes().zip(b.bytes()).fold(0, |differ, (a, b)| differ | (a ^ b)) == 0
 }

@@ -148,7 +148,7 @@ fn drawn(excitation: &Excitation, turns: &mut impl Iterator<Item = f64>) -> Resu
     Ok(ForcingFunction::new(drawn.collect())?)
 }
 
-/// A controlled element over one tick; its leading gain is where the realisation says.
+/// A controlled element over one tick; its leading gain is where the realisation states.
 fn held(num: &[f64], den: &[f64], realisation: Realisation, tick: SampleTime) -> Result<Plant, LabError> {
     let gain = num.first().copied().unwrap_or(0.0);
     let shape: Vec<f64> = num.iter().map(|c| if gain == 0.0 { *c } else { c / gain }).collect();

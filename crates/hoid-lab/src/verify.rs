@@ -14,10 +14,10 @@
 //! | `lab-frame` | a frame was too late, or did not show the tick that it names |
 //! | `lab-changed` | a file was changed after the end |
 //!
-//! u and e are compared bit for bit, but for the sign of zero, which text does not keep. e is
-//! recomputed from the u of the log, so that a false event and a false tick are told apart; the tables
-//! are those that the page was given, which are compared with those made anew from the seed to
-//! rounding (sines may differ between computers in the last bit).
+//! u and e are compared bit for bit, but for the sign of zero, which text does not keep. e is recomputed from the u of
+//! the log, so that a false event and a false tick are distinguished; the tables are those that the page was given,
+//! which are compared with those made anew from the seed to rounding (sines may differ between computers in the last
+//! bit).
 
 use hoid_model::{Finding, Verdict, VerdictLevel};
 use hoid_numerics::statistics::upper_median;
@@ -31,7 +31,7 @@ use crate::{
 
 /// Relative difference that sines of two computers may leave in a table.
 const TABLE: f64 = 1e-9;
-/// A frame is missed when it comes this many times the usual interval after the last.
+/// A frame is missed when it comes this many times the typical interval after the last.
 const MISSED: f64 = 1.5;
 
 /// What was found of a run.
@@ -282,7 +282,7 @@ fn files_of(stem: &Stem, ended: &Ended) -> Result<Option<Finding>, LabError> {
     }))
 }
 
-/// Runs that no hand made are said to be such; they can be as exact as others.
+/// Runs that no hand made are reported to be such; they can be as exact as others.
 fn hands_of(begun: &RunStart, ended: &Ended) -> Vec<Finding> {
     let made = ended.counted.get("synthetic_events").copied().unwrap_or(0.0);
     let mut notes = Vec::new();

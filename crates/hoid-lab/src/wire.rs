@@ -27,7 +27,7 @@ pub enum Role {
     Experimenter,
 }
 
-/// What a page says. Variants without fields have braces, so that they take no unknown ones.
+/// What a page states. Variants without fields have braces, so that they take no unknown ones.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(tag = "type", rename_all = "kebab-case", deny_unknown_fields)]
 #[allow(missing_docs)]
@@ -67,7 +67,7 @@ pub enum FromPage {
     Reports {},
 }
 
-/// What the server says.
+/// What the server reports.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(tag = "type", rename_all = "kebab-case")]
 #[allow(missing_docs)]

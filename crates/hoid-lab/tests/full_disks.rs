@@ -1,7 +1,7 @@
-//! Disks of 64 kB to 4 MB that fill at any instant of a session: what was told as logged is there, runs that were
+//! Disks of 64 kB to 4 MB that fill at any instant of a session: what was reported as logged is there, runs that were
 //! verified still are, and the session opens.
 //!
-//! A disk is a `tmpfs` of that size, which Linux lets an administrator mount; elsewhere the test says that it skips.
+//! A disk is a `tmpfs` of that size, which Linux lets an administrator mount; elsewhere the test shows that it skips.
 #![cfg(target_os = "linux")]
 #![allow(clippy::unwrap_used)]
 
@@ -83,7 +83,7 @@ fn batches(task: &Task) -> Vec<Batch> {
         .collect()
 }
 
-/// What was told before the disk was full.
+/// What was reported before the disk was full.
 #[derive(Default)]
 struct LoggedBefore {
     /// Ticks that were logged, of each run.
@@ -203,7 +203,8 @@ fn a_disk_that_fills_loses_nothing_that_was_told() {
     );
 }
 
-/// The disk is full while a person tracks: the page is told at once, the run does not count, and the session goes on.
+/// The disk is full while a person tracks: the page is reported at once, the run does not count, and the session goes
+/// on.
 #[test]
 fn a_run_that_meets_a_full_disk_is_ended_and_the_page_is_told() {
     let at = tempfile::tempdir().unwrap();

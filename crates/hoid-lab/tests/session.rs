@@ -341,7 +341,7 @@ fn numbers_of_files_are_no_places() {
     let other = facts.replacen("condition = 0", "condition = 9", 1);
     assert_ne!(facts, other);
     fs::write(&toml, &other).unwrap();
-    // As long as the copy says what was to be the session opens.
+    // As long as the copy shows what was to be the session opens.
     assert_eq!(Session::open(&session.folder).unwrap().facts, session.facts);
     fs::write(session.folder.join("lab.copy.toml"), other).unwrap();
     let said = Session::open(&session.folder).unwrap_err().to_string();

@@ -1,9 +1,9 @@
 //! A fault of recorded data: what it is, where, how large, and what was done about it.
 //!
 //! A [`Fault`] is a place in one channel of a record (or in all of them) where the numbers cannot be what the channel
-//! did. How faults are found is told where that is done; here stands what is said of one, so that a file, a fit and a
-//! stream say it alike. [`fault_findings`] turns faults into what a [`Verdict`](crate::Verdict) is made of: a fault
-//! that was repaired is worth a note, one that is still in the data a doubt.
+//! did. How faults are found is reported where that is done; here stands what is reported about one, so that a file, a
+//! fit and a stream report it alike. [`fault_findings`] turns faults into what a [`Verdict`](crate::Verdict) is made
+//! of: a fault that was repaired is worth a note, one that is still in the data a doubt.
 
 use std::fmt;
 
@@ -51,7 +51,7 @@ crate::named_choice!(FaultKind, "kind of fault", 10, {
 /// What is to be done about faults.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 pub enum FaultHandling {
-    /// They are told, and the data stay as they are.
+    /// They are reported, and the data stay as they are.
     Report,
     /// Short ones are bridged, the record is cut at long ones.
     #[default]
@@ -72,9 +72,9 @@ crate::named_choice!(FaultHandling, "handling of faults", 4, {
 /// What was done about a fault.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum FaultAction {
-    /// It is told; the data are as they were.
+    /// It is reported; the data are as they were.
     Reported,
-    /// Its samples were replaced by what those around them say; a wrap was unwrapped.
+    /// Its samples were replaced by what those around them report; a wrap was unwrapped.
     Bridged,
     /// The record ends before it and another starts after it.
     Cut,
@@ -181,13 +181,13 @@ fn short(value: f64, digits: usize) -> String {
     }
 }
 
-/// Faults of one kind that are told one by one; more are counted.
+/// Faults of one kind that are reported one by one; more are counted.
 const TOLD: usize = 3;
 /// Share of the samples that may be repaired before the rest is doubted.
 pub const MOST_MENDED: f64 = 0.2;
 
-/// What faults say of a result: a note where all of a kind were repaired, a doubt where they were
-/// not, and a doubt where more than [`MOST_MENDED`] of the samples are gone.
+/// What faults show about a result: a note where all of a kind were repaired, a doubt where they
+/// were not, and a doubt where more than [`MOST_MENDED`] of the samples are gone.
 pub fn fault_findings(faults: &[Fault], samples: usize) -> Vec<Finding> {
     let mut all = Vec::new();
     for kind in FaultKind::ALL {
@@ -206,7 +206,7 @@ pub fn fault_findings(faults: &[Fault], samples: usize) -> Vec<Finding> {
             let words = words.join("; ");
             all.push(match (left, kind) {
                 (false, _) => Finding::note("faults", words),
-                // In wrong seconds no parameter means what it says.
+                // In wrong seconds no parameter means what its name states.
                 (true, FaultKind::TimeUnit) => Finding::undetermined("faults", words),
                 (true, _) => Finding::doubt("faults", words),
             });

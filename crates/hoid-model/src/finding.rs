@@ -22,7 +22,7 @@ pub enum Severity {
     Note,
     /// The result may be wrong.
     Doubt,
-    /// The data do not say what was asked.
+    /// The data do not determine what was asked.
     Undetermined,
 }
 
@@ -75,7 +75,7 @@ impl Finding {
 pub enum VerdictLevel {
     /// Nothing speaks against it.
     Trustworthy,
-    /// Something does; the reasons say what.
+    /// Something does; the reasons report what.
     Doubtful,
     /// The data do not determine it.
     NotDetermined,

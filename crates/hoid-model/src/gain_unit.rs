@@ -1,9 +1,9 @@
 //! Units of an operator's gains.
 //!
 //! A gain is a ratio of the output u to the input e, so that its unit is that of u by that of e. It
-//! is told only where both channels say theirs; a recording without units has gains without units.
-//! An operator `K (1 + T_L s) / (1 + T_I s)` has the gain `K` in u/e, the gain of the rate of the
-//! error `K_e_dot = K T_L` in u s/e, and the ratio `K / T_I` in u/(e s).
+//! is reported only where both channels show theirs; a recording without units has gains without
+//! units. An operator `K (1 + T_L s) / (1 + T_I s)` has the gain `K` in u/e, the gain of the rate
+//! of the error `K_e_dot = K T_L` in u s/e, and the ratio `K / T_I` in u/(e s).
 
 use crate::Record;
 

@@ -53,7 +53,7 @@ impl OperatorParameters {
     ///
     /// # Errors
     /// [`ModelError::Operator`] for a name that is not there, is lacking, or is next to one that
-    /// says the same.
+    /// states the same.
     pub fn of_names(pairs: &[(String, f64)]) -> Result<Self, ModelError> {
         const NAMES: [&str; 6] = ["K_e", "T_L", "K_e_dot", "omega_nm", "zeta_nm", "tau_e"];
         let wrong = |reason: String| ModelError::Operator { reason };
@@ -359,7 +359,7 @@ mod tests {
             NotConvertible::ZeroGain
         ));
         assert!(matches!(reason([1.0, 0.0], [-1.9, 0.92], 0), NotConvertible::NoDelay));
-        // An unstable complex pair converts; the result says that it is not stable.
+        // An unstable complex pair converts; the result reports that it is not stable.
         let unstable = model([0.044, -0.043], [-1.95, 1.01], 29).parameters().unwrap();
         assert!(!unstable.is_stable());
     }

@@ -1,9 +1,9 @@
 //! Polynomials and their roots.
 //!
 //! Coefficients are stored in one order, `p[0] + p[1] x + ... + p[n] x^n` with `x = q^-1` for
-//! discrete time; transfer functions in s store descending powers and say so. Roots come from the
-//! eigenvalues of the balanced companion matrix (Edelman and Murakami, 1995) and one Newton step
-//! each.
+//! discrete time; transfer functions in s store descending powers and report it. Roots come from
+//! the eigenvalues of the balanced companion matrix (Edelman and Murakami, 1995) and one Newton
+//! step each.
 
 use hoid_core::stability::roots_inside;
 use nalgebra::DMatrix;

@@ -1,7 +1,7 @@
 //! Model structures and their orders (Table 5.1).
 //!
 //! The general family is `A(q^-1) u(t) = B(q^-1)/F(q^-1) e(t-nk) + C(q^-1)/D(q^-1) eps(t)` (eq. 5.1
-//! times A). A structure says which polynomials are there. Orders follow the field's software: nb
+//! times A). A structure shows which polynomials are there. Orders follow the field's software: nb
 //! counts the coefficients `b0 ... b_{nb-1}` of B, the others count the coefficients after the
 //! leading one, nk is the delay of b0 in samples.
 //!
@@ -83,7 +83,7 @@ impl Structure {
 
     /// The orders with which the structure comes nearest to the human operator (two poles, b0 and
     /// b1) with a remnant of first order: `ARX(na=2, nb=2)`, `BJ(nb=2, nc=0, nd=1, nf=2)`. A
-    /// structure without poles or input takes orders that are usual for it.
+    /// structure without poles or input takes orders that are typical for it.
     pub fn operator_orders(self, nk: usize) -> Orders {
         let base = Orders {
             nb: 2,

@@ -115,7 +115,7 @@ impl PyFit {
     fn margins_with(&self, element: &ControlledElement) -> Outcome<MarginEstimates> {
         let element = element.transfer_function()?;
         let (low, high) = MANUAL_CONTROL_RANGE_RAD_S;
-        // The sampled model says nothing above half the sampling frequency.
+        // The sampled model carries no information above half the sampling frequency.
         let high = high.min(self.fit.model().sample_time().nyquist_rad_s());
         Ok(self.fit.margins(|omega| element.response(omega), (low, high)))
     }

@@ -45,7 +45,7 @@ impl RunStatus {
     }
 }
 
-/// Does work that says how far it is, and tells the waiting thread.
+/// Does work that reports how far it is, and tells the waiting thread.
 pub fn told<T>(status: &Arc<RunStatus>, work: impl FnOnce() -> T) -> T {
     let status = Arc::clone(status);
     progress::watched(move |step| status.set(step.done as u64, step.total as u64), work)

@@ -1,19 +1,19 @@
-//! The head of a page: what the result is worth, what it says in a sentence, and the parameters with
-//! their errors. Everything else on a page explains it.
+//! The head of a page: what the result is worth, what it reports in a sentence, and the parameters
+//! with their errors. Everything else on a page explains it.
 
 use hoid_model::{Verdict, VerdictLevel, numbers::significant, uncertainty::Estimate};
 use minijinja::{Value, context};
 
 use crate::cells;
 
-/// What a fit says.
+/// What a fit shows.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FitSummary {
     /// What it is worth.
     pub verdict: Verdict,
     /// The answer in words, as [`sentence`] makes it.
     pub sentence: Option<String>,
-    /// The parameters; none where the models of the page say them.
+    /// The parameters; none where the models of the page state them.
     pub parameters: Vec<ParameterRow>,
 }
 
@@ -85,7 +85,7 @@ pub fn sentence<'a>(
     phase_margin_deg: Option<Estimate>,
 ) -> Option<String> {
     let known: Vec<(&str, f64)> = parameters.into_iter().filter(|(_, value)| value.is_finite()).collect();
-    // K/T_I is what is left to say where the gain itself is not known.
+    // K/T_I is what is left to report where the gain itself is not known.
     let has_gain = known.iter().any(|(name, _)| *name == "K");
     let of = |(word, name, unit): &(&str, &str, &str)| {
         let found = known.iter().find(|(known, _)| known == name);

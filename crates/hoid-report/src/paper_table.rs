@@ -1,8 +1,8 @@
 //! A result as a table for a paper: estimates with errors and intervals, in LaTeX (`.tex`, booktabs), Markdown
 //! (`.md`), or as data (CSV and the other formats of tables).
 //!
-//! The table is read from the object of the result ([`hoid_analysis::json`]), so that it says what the JSON says. In
-//! LaTeX and Markdown a value has the digits that two digits of its error need; as data every number has all of its
+//! The table is read from the object of the result ([`hoid_analysis::json`]), so that it reports what the JSON states.
+//! In LaTeX and Markdown a value has the digits that two digits of its error need; as data every number has all of its
 //! own, an error in a column after its value.
 
 use std::path::Path;

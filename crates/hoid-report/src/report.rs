@@ -28,7 +28,7 @@ pub struct Report<'a> {
     pub models: Vec<ModelSection<'a>>,
     /// Remarks for the reader, such as warnings of the command.
     pub notes: Vec<String>,
-    /// What the fit says, on top of the page.
+    /// What the fit shows, on top of the page.
     pub answer: Option<FitSummary>,
     /// Figures that answer what was asked, before all others.
     pub pictures: Vec<Picture>,

@@ -265,7 +265,7 @@ fn an_exact_fit_says_why_it_has_no_standard_errors() {
     assert!(fit.covariance().is_none());
     let html = page(vec![section("exact", &fit, &records)]);
     check_page(&html);
-    assert!(html.contains("residuals are zero up to rounding and say nothing about the noise"));
+    assert!(html.contains("residuals are zero up to rounding and carry no information about the noise"));
 }
 
 #[test]

@@ -288,7 +288,7 @@ fn a_batch_fit_beside_a_delay_that_changed_has_the_delay_of_its_span() {
     let trace = track(&record, &with_delay, 8).unwrap();
     let (_, fit) = batch_fit(&trace, &record, SPANS[1]).unwrap();
     assert!((34..=36).contains(&fit.orders().nk), "{}", fit.orders());
-    // The trace has no row there that says otherwise: the start's.
+    // The trace has no row there that specifies otherwise: the start's.
     assert_eq!(batch_fit(&trace, &record, SPANS[0]).unwrap().1.orders().nk, 29);
 }
 

@@ -77,7 +77,7 @@ pub enum StudyError {
         /// The directory.
         directory: String,
     },
-    /// A table that is not what the plan next to it says.
+    /// A table that is not what the plan next to it reports.
     #[error("{file}: {reason}; expected the table that hoid wrote: run the study again")]
     Table {
         /// The file.
@@ -118,7 +118,7 @@ pub enum StudyError {
     /// Threads that the system does not give.
     #[error("no threads: {reason}; try --jobs 1")]
     Threads {
-        /// What the system says.
+        /// Error reported by the operating system.
         reason: String,
     },
     /// A pattern of file names that is none.

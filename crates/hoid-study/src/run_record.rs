@@ -1,8 +1,8 @@
 //! What is next to the results: `study.json`.
 //!
-//! It says which plan and which program made the parts of a directory, and which shard of the study
-//! they are. Two directories belong together when plan, replications, seed and version are the
-//! same.
+//! It reports which plan and which program made the parts of a directory, and which shard of the
+//! study they are. Two directories belong together when plan, replications, seed and version are
+//! the same.
 
 use std::path::Path;
 
@@ -46,7 +46,7 @@ impl RunRecord {
         }
     }
 
-    /// What is said of a directory whose blocks have no seals.
+    /// Report about a directory whose blocks have no seals.
     pub fn note_on_seals(&self) -> Option<String> {
         let unsealed = !self.sealed && !self.complete;
         unsealed
@@ -77,7 +77,7 @@ impl RunRecord {
     /// What keeps two parts from belonging to one study; none when they do.
     pub fn differs(&self, other: &Self) -> Option<String> {
         // What a user may have changed on purpose first: each of these also changes the hash of the
-        // plan, which says less.
+        // plan, which reports less.
         let pairs = [
             ("hoid version", self.hoid.clone(), other.hoid.clone()),
             ("study", self.study.clone(), other.study.clone()),

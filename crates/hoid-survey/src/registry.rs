@@ -80,7 +80,7 @@ fn plain(text: &str) -> String {
 }
 
 /// The method of a name, with its defaults. An earlier name is in plans and in saved trackers, and is read as well; who
-/// can tell the user says it ([`renamed`]).
+/// can tell the user reports it ([`renamed`]).
 ///
 /// # Errors
 /// [`IdentError::BadOption`] for a name that no method has.
@@ -93,7 +93,7 @@ pub fn method(text: &str) -> Result<Method, IdentError> {
     found.ok_or_else(|| bad("the method", text.to_owned(), &format!("one of {}", names.join(", "))))
 }
 
-/// Of an earlier name of a method that of now, and the sentence that says so.
+/// Of an earlier name of a method that of now, and the sentence that reports it.
 pub fn renamed(text: &str) -> Option<(&'static str, String)> {
     let earlier = plain(text);
     let found = methods()

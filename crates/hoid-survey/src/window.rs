@@ -349,8 +349,8 @@ impl WindowRecursion {
     }
 }
 
-/// A fit whose search came to rest; one that did not says more about the limit of iterations than
-/// about the window.
+/// A fit whose search came to rest; one that did not carries more information about the limit of
+/// iterations than about the window.
 fn settled(fit: Fit) -> Result<Fit, IdentError> {
     if fit.termination().converged() {
         Ok(fit)

@@ -71,7 +71,7 @@ fn the_best_of_the_grid_is_taken() {
         assert_eq!(chosen.method.covariance(), Some(choice.covariance));
         let most = choice.candidates.iter().map(|(_, vaf)| *vaf).fold(0.0, f64::max);
         assert_eq!(choice.vaf(), most, "{method}");
-        // What it says is what the trace with it has.
+        // What it reports is what the trace with it has.
         let trace = track(&record, &chosen, 1).unwrap();
         assert_eq!(trace.vaf_of(&other).unwrap(), (most, choice.span_s));
         assert!(most > 80.0, "{method}: {choice:?}");
@@ -183,7 +183,7 @@ fn the_covariance_shrinks_where_less_is_explained() {
     assert!(says(&record, options(hoid_survey::window())).contains("rls or rpem"));
     let tracked = options(Method::rpem()).with(&[("track_delay", "0.2..0.4")]).unwrap();
     assert!(says(&record, tracked).contains("without track_delay"));
-    // A second run in which nothing happens says nothing.
+    // A second run in which nothing happens carries no information.
     let n = record.len();
     let silent = Record::new(
         record.sample_time(),

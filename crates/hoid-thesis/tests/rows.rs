@@ -1,5 +1,5 @@
-//! The page of the book that says where each row of the thesis is: what it names is made, what is
-//! made is named, and its numbers are those of its rows.
+//! The page of the book that reports where each row of the thesis is: what it names is made, what
+//! is made is named, and its numbers are those of its rows.
 #![allow(clippy::unwrap_used)]
 
 use std::{collections::BTreeSet, path::Path};

@@ -1,4 +1,4 @@
-//! When a person changed, as a method says it, and the published baseline.
+//! When a person changed, as a method reports it, and the published baseline.
 //!
 //! The baseline looks at the loop from outside: an adaptation is taken to be needed while the
 //! tracking error or its rate is larger than k of its standard deviations before the change (R. A.
@@ -37,7 +37,7 @@ pub struct Change {
     pub of_operator: bool,
 }
 
-/// Change over its standard error from which a quantity is said to have changed.
+/// Change over its standard error from which a quantity is reported to have changed.
 const CHANGED: f64 = 2.0;
 /// What [`Change::z`] is of.
 const QUANTITIES: [&str; 6] = ["K_e", "K_e_dot", "omega_nm", "zeta_nm", REMNANT, "tau_e"];

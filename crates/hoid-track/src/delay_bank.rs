@@ -10,8 +10,8 @@
 //!
 //! with T = 10 s: evidence of a delay from before a change fades as the change recedes. Another delay is reported once
 //! it leads by 2. Its recursion has run all the time, so that the estimate does not start anew. The weights `p_k` are
-//! those of `exp(L_k/3)`, for neighbouring innovations of a model that is not right say the same thing more than once
-//! (without the 3 bands of 95 % hold 82 % where the delay stays, with it 95); tau_e is told as their mean, and its
+//! those of `exp(L_k/3)`, for neighbouring innovations of a model that is not right state the same thing more than once
+//! (without the 3 bands of 95 % hold 82 % where the delay stays, with it 95); tau_e is reported as their mean, and its
 //! standard error as the root of their variance and of that of a delay that lies evenly between two samples, `Ts^2/12`.
 //!
 //! Before there is evidence the delay lies about that of the start, `L_k = -(tau_k - tau_start)^2/(2 s^2)` with s =
@@ -34,7 +34,7 @@ use crate::{
 const MEMORY_S: f64 = 10.0;
 /// Lead of the logarithm of the evidence with which another delay is taken.
 const LEAD: f64 = 2.0;
-/// What the evidence is divided by where it tells how sure the delay is.
+/// What the evidence is divided by where it shows how sure the delay is.
 const TEMPER: f64 = 3.0;
 /// Standard deviations up to which an innovation counts.
 const LARGEST: f64 = 5.0;

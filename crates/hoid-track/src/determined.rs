@@ -48,8 +48,8 @@ impl Trace {
         determined(&self.options().method, operator)
     }
 
-    /// Columns that say where a parameter is determined, 1 or 0, for methods that suppose something
-    /// before the first sample: `K_e_determined` and so on.
+    /// Columns that report where a parameter is determined, 1 or 0, for methods that suppose
+    /// something before the first sample: `K_e_determined` and so on.
     pub fn determined_columns(
         &self,
         operators: &[Result<OperatorEstimate, hoid_model::NotConvertible>],

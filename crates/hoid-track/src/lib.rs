@@ -26,7 +26,7 @@
 //!
 //! | module | what it holds |
 //! |---|---|
-//! | `methods`, `method` | [`Method`]: the recursive methods, a file or folder each; what each says of itself |
+//! | `methods`, `method` | [`Method`]: the recursive methods, a file or folder each; the self-description of each |
 //! | [`building`] | what a method is made of, for those in other crates |
 //! | `options`, `shared_options`, `memory`, `forgetting` | [`TrackOptions`]: what is to be tracked, and how |
 //! | `person_prior` | [`PersonPrior`]: what is known of a person before the first sample |

@@ -1,4 +1,4 @@
-//! What a recursive method says of itself.
+//! Self-description of a recursive method.
 //!
 //! A method is a file or folder: its options (a struct made by `settings!`), [`RecursiveMethod`] for
 //! them, and the [`Recursion`] that it builds. That makes it a [`Method`](crate::Method), in this crate or
@@ -184,8 +184,8 @@ pub trait RecursiveMethod: Settings + Boxed + 'static {
         self.gain().and_then(|gain| gain.windup_guard)
     }
 
-    /// Whether a guard is in front of it, or that was refused; none where nothing was said and its own default is to
-    /// have none.
+    /// Whether a guard is in front of it, or that was refused; none where nothing was specified and its own default is
+    /// to have none.
     fn guard(&self) -> Option<GuardChoice> {
         None
     }
@@ -239,7 +239,7 @@ pub trait RecursiveMethod: Settings + Boxed + 'static {
     /// Takes from a record what has a default there.
     fn prepare(&mut self, _record: &Record) {}
 
-    /// Leaves out what was said of parameters that are not known.
+    /// Leaves out what was reported about parameters that are not known.
     fn retain(&mut self, _known: &dyn Fn(&str) -> bool) {}
 }
 

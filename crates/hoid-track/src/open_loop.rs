@@ -5,8 +5,8 @@
 //! and how it moves with `dL/L` is that of batch fits ([`Crossover`]); `dL/L = dY/Y`, whose covariance is
 //! that of the real and imaginary part of the response at the crossover.
 //!
-//! Nothing is said where |L| does not fall through one, and where the standard error of the crossover
-//! is more than half of it: to first order it says nothing then.
+//! Nothing is reported where |L| does not fall through one, and where the standard error of the crossover is more than
+//! half of it: to first order it carries no information then.
 
 use hoid_ident::family::Crossover;
 use hoid_model::{Complex64, ContinuousTransferFunction, SampleTime, uncertainty::Estimate};

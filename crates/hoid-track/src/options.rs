@@ -56,7 +56,7 @@ impl TrackOptions {
         }
     }
 
-    /// The usual ones of a method that starts itself and is told nothing of the person.
+    /// The usual ones of a method that starts itself and gets no information about the person.
     pub fn without_prior(method: Method, sample_time: SampleTime) -> Self {
         Self::default_for(method, sample_time.nk(DEFAULT_DELAY_S))
     }

@@ -100,8 +100,8 @@ impl TrackPlan {
         Ok((self.with_orders(choice.fit.orders()), Some(choice)))
     }
 
-    /// The options for orders within the ranges; what was said of coefficients that these orders do
-    /// not have is left out.
+    /// The options for orders within the ranges; what was reported about coefficients that these
+    /// orders do not have is left out.
     pub fn with_orders(&self, orders: Orders) -> TrackOptions {
         let mut options = TrackOptions {
             orders,
@@ -121,7 +121,7 @@ pub fn of_one_model() -> IdentError {
     }
 }
 
-/// Ranges of a method that searches none: the orders that are usual, as near as the ranges allow.
+/// Ranges of a method that searches none: the orders that are typical, as near as the ranges allow.
 fn default_ranges(method: &Method, ranges: &OrderRanges, sample_time: SampleTime) -> OrderRanges {
     let known = method.person_prior().and_then(PersonPrior::delay_s);
     let nk = sample_time.nk(known.unwrap_or(DEFAULT_DELAY_S));
@@ -140,7 +140,7 @@ fn default_ranges(method: &Method, ranges: &OrderRanges, sample_time: SampleTime
     }
 }
 
-/// What is searched: the ranges that are usual for structure and method, with the orders that are
+/// What is searched: the ranges that are typical for structure and method, with the orders that are
 /// named in their place. Where nk is not named, the delay lies within the range that is tracked;
 /// where no other order is, orders that are still open are those of the coefficients of a start,
 /// named as f1 or b0.

@@ -16,7 +16,7 @@ pub struct Sample {
     pub reference: Option<f64>,
 }
 
-/// What a recursion says of a sample that it has taken.
+/// What a recursion reports about a sample that it has taken.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StepOutcome {
     /// A-priori innovation.

@@ -42,7 +42,7 @@ pub struct TrackRequest {
     pub criterion: Criterion,
     /// Magnitude of e or u beyond which a sample is a fault.
     pub largest: f64,
-    /// Frequencies at which the response is told, rad/s.
+    /// Frequencies at which the response is reported, rad/s.
     pub at_rad_s: Vec<f64>,
     /// What the person controls.
     pub controlled_element: Option<ContinuousTransferFunction>,

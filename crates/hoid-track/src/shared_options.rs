@@ -88,7 +88,7 @@ impl GainOptions {
         self.windup_guard.or(of_the_text.then_some(WindupGuard::Off))
     }
 
-    /// Leaves out what was said of parameters that are not known.
+    /// Leaves out what was reported about parameters that are not known.
     pub fn retain(&mut self, known: &dyn Fn(&str) -> bool) {
         self.memories.memory_of.retain(|key, _| known(key));
         if let ForgettingRule::RandomWalk(drift) = &mut self.forgetting {

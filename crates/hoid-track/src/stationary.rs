@@ -4,15 +4,15 @@
 //! `eps^2/(1 + h' Sigma h)` with an exponential memory ([`hoid_core::innovation_variance`]), is forgotten to zero: it
 //! falls as `lambda^t`, while the covariance over it grows by `1/lambda` a sample at most, in unexcited directions
 //! alone, and no further than its bound. The error bars, the root of their product, go to zero while nothing is learnt.
-//! Such samples say nothing of parameters or noise, for neither is excited (G. C. Goodwin and K. S. Sin, *Adaptive
-//! Filtering Prediction and Control*, 1984, section 3.4; K. J. Åström and B. Wittenmark, *Adaptive Control*, 2nd ed.
-//! 1995, section 11.5, conditional updating). So they go into the filters alone:
+//! Such samples carry no information about parameters or noise, for neither is excited (G. C. Goodwin and K. S. Sin,
+//! *Adaptive Filtering Prediction and Control*, 1984, section 3.4; K. J. Åström and B. Wittenmark, *Adaptive Control*,
+//! 2nd ed. 1995, section 11.5, conditional updating). So they go into the filters alone:
 //!
 //! - A signal **stands** while it stays within [`SHARE`] of its usual size of the value at which the stand started. The
 //!   size is the geometric mean over blocks of a second of the largest distance from the value at the start of the
 //!   block; before ten blocks are known, a stand is of one value.
-//! - **Nothing arrives** where e and u stand for [`BOTH_S`], or one of them for [`ONE_S`]: a channel that
-//!   is frozen, or a hand that rests while no answer can be told from none.
+//! - **Nothing arrives** where e and u stand for [`BOTH_S`], or one of them for [`ONE_S`]: a channel that is frozen, or
+//!   a hand that rests while no answer can be distinguished from none.
 //! - The recursion is then put back to the first sample of the stand, bit for bit (a jump to where it stands
 //!   is part of it): to the numbers that were kept before it, from which it takes the samples again. Value,
 //!   covariance and innovation variance stay as they are there, however long it lasts.

@@ -62,7 +62,7 @@ impl std::fmt::Debug for Tracker {
 
 impl Tracker {
     /// A tracker with filters at rest. `span` is the record of the start fit; without it the
-    /// tracker starts from theta or from nothing, as the options say.
+    /// tracker starts from theta or from nothing, as the options state.
     ///
     /// # Errors
     /// [`IdentError`] when options contradict each other, or the start fit fails.
@@ -304,8 +304,8 @@ impl Tracker {
         LoopShape::of(known, element, self.sample_time)
     }
 
-    /// What the response of now says against who is said to have held the loop: with a controlled element the loop that
-    /// they would make ([`LoopShape::doubt`]), without one the sign of the response at low frequencies.
+    /// What the response of now reports against who is reported to have held the loop: with a controlled element the
+    /// loop that they would make ([`LoopShape::doubt`]), without one the sign of the response at low frequencies.
     pub(crate) fn response_doubt(&self) -> Option<Finding> {
         if let Some(element) = &self.options.controlled_element {
             let reach = match self.open_loop()? {

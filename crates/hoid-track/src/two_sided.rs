@@ -17,7 +17,7 @@ pub struct Causal {
     pub last: Option<OperatorEstimate>,
 }
 
-/// What all of a run says of the operator at one sample.
+/// What all of a run shows about the operator at one sample.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TwoSided {
     /// The coefficients.

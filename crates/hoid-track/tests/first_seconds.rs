@@ -78,7 +78,7 @@ fn bands_hold_from_the_second_second_on() {
     for (share, at) in shares(&counts).into_iter().zip(AT_S) {
         assert!((0.85..=1.0).contains(&share), "{at} s: {share}");
     }
-    // Before 8 s few say what their crossover is.
+    // Before 8 s few report what their crossover is.
     for (count, at) in loops.iter().zip(AT_S).skip(3) {
         assert!(count.all >= 30.0, "{at} s: {}", count.all);
         let share = count.inside / count.all;

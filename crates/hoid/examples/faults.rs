@@ -1,5 +1,5 @@
-//! What does a fault of a recording do to a result, and does the result say so? The numbers of the
-//! page "Faults: what a result says of them".
+//! What does a fault of a recording do to a result, and does the result report it? The numbers of the page "Faults:
+//! what a result reports about them".
 //!
 //! `cargo xtask slow faults [--part N] [--clean N] [--only METHOD] [--rows FILE] [--program FILE] [--seed N]`: all
 //! faults in runs of C1, of C2 and of a virtual person, then clean runs (1000 in all by default, evaluated in batch and

@@ -60,7 +60,7 @@ fn median(values: &[f64]) -> f64 {
     (sorted[(n - 1) / 2] + sorted[n / 2]) / 2.0
 }
 
-/// Fits of known m in both conditions: medians within 5 %, spread as the information says,
+/// Fits of known m in both conditions: medians within 5 %, spread as the information shows,
 /// intervals that cover.
 fn unbiased_and_efficient(m0: usize) {
     let n = 100;

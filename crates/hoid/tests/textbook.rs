@@ -1,5 +1,5 @@
 //! Every structure on records of textbook systems, against independent implementations:
-//! fixtures/textbook, made by make.py there, which says what each library assumes.
+//! fixtures/textbook, made by make.py there, which reports what each library assumes.
 #![allow(clippy::unwrap_used)]
 
 use std::{fs, path::PathBuf};

@@ -1,5 +1,5 @@
 //! The fit of an operator who changes once: recovery without noise, bias, spread and coverage over
-//! simulated runs, and what is said when nothing changes.
+//! simulated runs, and what is reported when nothing changes.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 use std::collections::BTreeMap;
@@ -96,7 +96,7 @@ fn a_change_without_noise_is_recovered() {
         assert_eq!(fit.termination().reason, Reason::ExactFit);
         // Residuals of 1e-15 of the output, information matrix of condition 1e4 at most.
         assert!(worst < 1e-10 && fit.change_found());
-        // Nothing can be said about the noise: no standard errors, no intervals.
+        // Nothing can be reported about the noise: no standard errors, no intervals.
         assert!(fit.covariance().is_none() && fit.midpoint_interval().is_none());
         let here = fit.gains_at(30.0);
         let gain = |name: &str| here.get(name).unwrap().value;
@@ -404,7 +404,7 @@ fn what_cannot_be_fitted_is_refused() {
     )
     .unwrap();
     assert!(matches!(error(quick(), one(&silent)), IdentError::NoExcitation { .. }));
-    // A few seconds only: whatever comes out, it is said.
+    // A few seconds only: whatever comes out, it is reported.
     let brief = record.span(39.0, 44.0).unwrap();
     if let Ok(fit) = SigmoidChange::default().fit(one(&brief)) {
         assert!(fit.parameters().iter().all(|p| p.estimate.value.is_finite()));

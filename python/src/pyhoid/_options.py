@@ -122,7 +122,7 @@ def delay(value: Any) -> tuple[float, float] | None:
 
 
 def text(name: str, value: Any) -> str | None:
-    """A value as the command line writes it; None where it says nothing.
+    """A value as the command line writes it; None where it carries no information.
 
     >>> text("memory_of", {"b": 256, "f": "inf"})
     'b=256,f=inf'

@@ -1,7 +1,7 @@
 """Pickles of results, for joblib, multiprocessing and dask.
 
 A result has a native side that is computed and cannot be stored. Its pickle holds what the native
-side says of itself, and the call that made it. So a result comes back at once and with the same
+side reports about itself, and the call that made it. So a result comes back at once and with the same
 digits; what is asked of it that was not said before (a prediction on another record, a page) makes
 the native side again, once, by the same call on the same data, and compares.
 """
@@ -125,7 +125,7 @@ def same(one: Any, other: Any) -> bool:
 
 
 def state_of(result: Any, names: Sequence[str]) -> dict[str, Any]:
-    """The state of a result for its pickle: its own attributes, and what its native side says."""
+    """The state of a result for its pickle: its own attributes, and what its native side reports."""
     own = dict(result.__dict__)
     native, call = own.pop("_native"), own.pop("_call", None)
     answers = {name: _answer(native, name) for name in names}

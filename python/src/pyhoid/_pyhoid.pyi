@@ -390,7 +390,7 @@ class Tracker:
     def operator(self) -> dict[str, Any] | None: ...
     @property
     def at(self) -> list[float]:
-        """Frequencies in rad/s at which gain and phase are told."""
+        """Frequencies in rad/s at which gain and phase are reported."""
 
     @property
     def controlled_element(self) -> str | None:

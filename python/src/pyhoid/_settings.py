@@ -133,8 +133,8 @@ class MethodSettings(TypedDict, total=False):
     # Logarithm of the odds from which a change is declared. For multiple-model.
     alarm: float | None
 
-    # At each sample what all of a recorded run says of it, by hypotheses run from both ends, in
-    # place of what the past alone says. For multiple-model.
+    # At each sample what all of a recorded run shows about it, by hypotheses run from both ends, in
+    # place of what the past alone shows. For multiple-model.
     smooth: bool | None
 
     # False alarms in an hour that are accepted: a lower number finds fewer changes, later. For
@@ -302,7 +302,7 @@ METHODS = """``"rls"``: recursive least squares;
         ``"window"``: a batch fit of the last seconds, again and again;
         ``"rriv"``: recursive refined instrumental variable;
         ``"multiple-model"``: a bank of hypotheses of when the person changed, which sets its
-        memory itself and tells of changes;
+        memory itself and reports changes;
         ``"adaptive"``: gains in a basis that people share, with a noise model of its own;
         starts without a fit;
         ``"fused"``: least squares for B with the poles of rpem, for comparison;
@@ -366,8 +366,8 @@ SETTINGS = """covariance : float
         alarm : float
             Logarithm of the odds from which a change is declared. For multiple-model.
         smooth : bool
-            At each sample what all of a recorded run says of it, by hypotheses run from both
-            ends, in place of what the past alone says. For multiple-model.
+            At each sample what all of a recorded run shows about it, by hypotheses run from both
+            ends, in place of what the past alone shows. For multiple-model.
         false_alarms : float
             False alarms in an hour that are accepted: a lower number finds fewer changes,
             later. For adaptive.

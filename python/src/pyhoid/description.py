@@ -332,7 +332,7 @@ def describe(
     records : Record or sequence of Record
         Runs of one person in one task, each over whole periods of the excitation.
     excitation : str, optional
-        Channel of the recorded disturbance or target; by default the first of the usual names that
+        Channel of the recorded disturbance or target; by default the first of the common names that
         there is with lines.
     lines : sequence of float, optional
         Its lines in rad/s, which need `period`; by default those found.

@@ -36,7 +36,7 @@ class EstimationError(Error, ArithmeticError):
 
 
 class NotConvertibleError(Error, ValueError):
-    """A model that does not represent an operator; the message says why."""
+    """A model that does not represent an operator; the message gives the reason."""
 
 
 class FileError(Error, OSError):

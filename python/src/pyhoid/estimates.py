@@ -58,7 +58,7 @@ def unit_of(name: str, units: tuple[str, str] = ("", ""), own: str | None = None
 
 
 def channel_units(records: Sequence[Record]) -> tuple[str, str]:
-    """The units of input and output, whatever their columns are called; empty where none is said."""
+    """The units of input and output, whatever their columns are called; empty where none is given."""
     if not records:
         return ("", "")
     record, units = records[0], records[0].units
@@ -184,7 +184,7 @@ class Operator(_Converted):
 
     A mapping from names to `Estimate`; the entries are also attributes (``operator.K_e.value``).
     Where the coefficients do not represent a continuous operator, `convertible` is False, `reason`
-    says why, and reading a parameter raises `NotConvertibleError`.
+    gives the reason, and reading a parameter raises `NotConvertibleError`.
 
     Attributes
     ----------

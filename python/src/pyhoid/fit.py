@@ -220,7 +220,7 @@ class Fit(Model, Result):
 
     @property
     def delay_interval(self) -> tuple[int, int] | None:
-        """Range of nk among the candidates that the data cannot tell apart, if nk was searched."""
+        """Range of nk among the candidates that the data cannot distinguish, if nk was searched."""
         return self._native.delay_interval
 
     @property

@@ -232,7 +232,7 @@ def identify_operator(
 
 
 def _texts(settings: Mapping[str, Any]) -> dict[str, str]:
-    """Options as texts, as the library reads them; those that say nothing are left out.
+    """Options as texts, as the library reads them; those that carry no information are left out.
 
     >>> _texts({"nk": (20, 40), "individual": ("K", "T_L"), "stable": False, "neuromuscular": False})
     {'nk': '20..40', 'individual': 'K,T_L', 'neuromuscular': 'no'}

@@ -70,7 +70,7 @@ class OperatorFit(Model, Result):
         The whole of that loop: ``crossovers`` (every frequency in rad/s at which its gain is one, with
         its phase margin in deg, a pair of Estimates each), ``smallest_phase_margin_deg``,
         ``gain_margin_db``, ``phase_crossover_rad_s`` (None where there is none), and ``stable``: True,
-        False, or None where that cannot be told. None without a controlled element.
+        False, or None where that cannot be determined. None without a controlled element.
     open_loop_intervals : dict or None
         Their intervals of 95 %, (low, high) each, Student's: the errors rest on few runs or blocks.
     open_loop_person : dict or None

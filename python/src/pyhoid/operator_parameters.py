@@ -1,4 +1,4 @@
-"""Parameters of an operator, and how much of each the data say."""
+"""Parameters of an operator, and how much of each the data show."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ __all__ = ["OperatorParameter", "OperatorParameters"]
 
 
 class OperatorParameter(NamedTuple):
-    """A parameter of an operator, and how much of it the data say.
+    """A parameter of an operator, and how much of it the data show.
 
     Attributes
     ----------
@@ -58,7 +58,7 @@ class OperatorParameter(NamedTuple):
         return "(the prior alone)" if self.prior_share > 0.5 else "(not determined)"
 
     def _shown(self) -> str:
-        """Value and error; nothing where the data say nothing, and no prior either."""
+        """Value and error; nothing where the data carry no information, and no prior either."""
         if not self.determined and self.prior_share <= 0.5:
             return ""
         if self.standard_error is not None and self.standard_error > abs(self.value):

@@ -73,7 +73,7 @@ def read(
         output.
     time : str, optional
         Column of the time, with its unit where that is not found: ``"clock:ms"`` (s, ms, us, ns,
-        min, h, iso, sec+nanosec). Without it ``t``, or the column with a usual name of a time.
+        min, h, iso, sec+nanosec). Without it ``t``, or the column with a common name of a time.
     trial : str, optional
         The trial to read of a file with several: ``"trial=3"``. `read_trials` reads all.
     sampling_frequency : float, optional
@@ -87,7 +87,7 @@ def read(
     drop_repeated : bool
         Drop rows that occur twice, with the same time.
     unit : mapping, optional
-        Units that the file does not say, by channel: ``{"e": "deg", "u": "V"}``. No number changes.
+        Units that the file does not report, by channel: ``{"e": "deg", "u": "V"}``. No number changes.
     scale : mapping, optional
         Factors by channel (``e`` and ``u`` are input and output): ``{"u": 12.5}``, into a unit
         ``{"u": "12.5:deg"}``, or from unit to unit ``{"e": "rad:deg"}``.
@@ -167,7 +167,7 @@ def read_segments(
     path : path
     mask : sequence of str
         What is left out: any of ``"missing"``, ``"gap"``, ``"stalled"`` and ``"saturated"``
-        (`info` tells what a file has).
+        (`info` shows what a file has).
     shortest : float
         Length in s of the shortest segment to use.
     **options

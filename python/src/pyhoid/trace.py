@@ -86,7 +86,7 @@ class Trace:
         self._verdict: Verdict | None = None
 
     def __getstate__(self) -> dict[str, Any]:
-        # What a table and a summary show is said before it is stored.
+        # What a table and a summary show is reported before it is stored.
         _ = self.columns, self.verdict
         return state_of(self, _ANSWERS)
 

@@ -39,7 +39,7 @@ class Tracker(_pyhoid.Tracker):
     at : sequence of float
         Frequencies in rad/s that `responses` tells.
     controlled_element : str or (sequence of float, sequence of float), optional
-        What the person controls, as in `track`: then `crossover` and `phase_margin` are told.
+        What the person controls, as in `track`: then `crossover` and `phase_margin` are reported.
     decimate : "auto", "off" or int
         As in `track`: above 200 Hz every n-th sample is tracked by default, .15 s after the last one
         taken; between them the estimate stays, and `step` returns NaN. `decimation` says what is
@@ -141,7 +141,7 @@ class Tracker(_pyhoid.Tracker):
     def crossover(self) -> Estimate | None:
         """Crossover frequency in rad/s.
 
-        None without a controlled element, and where there is none; then `no_crossover` says why.
+        None without a controlled element, and where there is none; then `no_crossover` gives the reason.
         """
         found = self.open_loop
         return None if found is None or found[0] is None else Estimate(*found[0][0])

@@ -10,7 +10,7 @@ __all__ = ["Verdict"]
 class Verdict(NamedTuple):
     """What a result is worth, and why.
 
-    `level` is ``"trustworthy"``, ``"doubtful"`` or ``"not determined"``; `reasons` say what speaks
+    `level` is ``"trustworthy"``, ``"doubtful"`` or ``"not determined"``; `reasons` report what speaks
     against the result, `notes` what is worth knowing besides.
 
     Examples

@@ -47,12 +47,12 @@ class Block:
         return next((value for kind, value in self.marks if kind == name), None)
 
     def as_run(self) -> str:
-        """The text, smaller where a mark says so."""
+        """The text, smaller where a mark reports it."""
         text = self.text
         for kind, value in self.marks:
             if kind == "smaller":
                 old, new = (side.strip() for side in value.split("=>"))
-                assert old in text, f"line {self.line}: nothing says {old!r}, to be made smaller"
+                assert old in text, f"line {self.line}: nothing states {old!r}, to be made smaller"
                 text = text.replace(old, new)
         return text
 

@@ -82,7 +82,7 @@ def program(*names: str) -> str:
 
 
 def output(command: list[Any], **options: Any) -> str:
-    """What a program prints; what it says where it fails."""
+    """What a program prints; what it reports where it fails."""
     words = [str(word) for word in command]
     done = subprocess.run(words, capture_output=True, text=True, check=False, **options)
     assert done.returncode == 0, f"{words}: {done.stderr}"

@@ -113,7 +113,7 @@ pub struct Shift {
     pub factor: f64,
 }
 
-/// What a method is told of the delay.
+/// What a method is reported of the delay.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum DelayKnown {
     /// Its value, which is a whole number of samples.
@@ -184,7 +184,7 @@ pub struct Case {
     pub blemish: Blemish,
     /// Changes in order of time.
     pub shifts: Vec<Shift>,
-    /// What is told of the delay.
+    /// What is reported of the delay.
     pub delay: DelayKnown,
 }
 

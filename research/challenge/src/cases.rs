@@ -1,7 +1,7 @@
 //! The cases.
 //!
-//! A change starts at 45 s where nothing else is said and takes half a second. Sizes that no loop
-//! bears (a delay times two on `1/s^2`) are those of the persons who bear them: who would lose
+//! A change starts at 45 s where nothing else is specified and takes half a second. Sizes that no
+//! loop bears (a delay times two on `1/s^2`) are those of the persons who bear them: who would lose
 //! control is drawn again ([`draw`](super::draw)).
 
 use super::{
@@ -300,7 +300,7 @@ fn delays() -> Vec<Case> {
     vec![
         Case {
             delay: DelayKnown::Fraction,
-            ..default("delay-half", "half a sample next to what is told")
+            ..default("delay-half", "half a sample next to what is reported")
         },
         Case {
             rate_hz: 60.0,

@@ -1,4 +1,4 @@
-//! Who takes part: anything that says what the response of a person is, and when they changed.
+//! Who takes part: anything that reports what the response of a person is, and when they changed.
 
 use hoid_model::{Complex64, Record, SampleTime};
 
@@ -15,7 +15,7 @@ pub struct Task {
     pub label: String,
     /// The span that may be used at once for a start, s. Nothing is asked before its end.
     pub start_s: (f64, f64),
-    /// The delay in samples with the one of the hold, where it is told.
+    /// The delay in samples with the one of the hold, where it is reported.
     pub nk: Option<usize>,
     /// Frequencies at which the response is asked for, rad/s.
     pub lines_rad_s: Vec<f64>,
@@ -77,10 +77,10 @@ impl Task {
     }
 }
 
-/// What is said of the response at a time.
+/// Report about the response at a time.
 #[derive(Debug, Clone, Default)]
 pub struct ReportedResponse {
-    /// H at each line; empty where nothing is said.
+    /// H at each line; empty where nothing is specified.
     pub response: Vec<Complex64>,
     /// Variances of its real and imaginary part and their covariance, at each line.
     pub covariance: Option<Vec<[f64; 3]>>,
@@ -94,14 +94,14 @@ pub struct ReportedResponse {
 pub struct Alarm {
     /// When, s.
     pub t_s: f64,
-    /// True where it is said to be of the remnant alone.
+    /// True where it is reported to be of the remnant alone.
     pub of_remnant: bool,
 }
 
 /// What a contestant answers.
 #[derive(Debug, Clone, Default)]
 pub struct EntrantResult {
-    /// What is said at each time that was asked for.
+    /// What is reported at each time that was asked for.
     pub said: Vec<ReportedResponse>,
     /// The changes that were declared; none for one that declares none.
     pub alarms: Option<Vec<Alarm>>,

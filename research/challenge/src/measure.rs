@@ -1,10 +1,9 @@
 //! What an answer is worth: the line of a contestant in a run.
 //!
-//! The response is asked for at seven lines from .5 to 6 rad/s, at +2, +4, +8, +13, +18 and +28 s
-//! after each change, once before the first, and every 10 s where nobody changes. The error is the
-//! mean of `|dH|/|H|` over the lines; who says nothing, or no number, has the error 1, that of saying
-//! zero. The band of a line covers when real and imaginary part lie within 1.96 standard errors, each
-//! counted by itself.
+//! The response is asked for at seven lines from .5 to 6 rad/s, at +2, +4, +8, +13, +18 and +28 s after each change,
+//! once before the first, and every 10 s where nobody changes. The error is the mean of `|dH|/|H|` over the lines; who
+//! carries no information, or no number, has the error 1, that of saying zero. The band of a line covers when real and
+//! imaginary part lie within 1.96 standard errors, each counted by itself.
 
 use std::collections::BTreeMap;
 
@@ -51,11 +50,11 @@ pub struct Line {
     pub method: String,
     /// Why it could not follow.
     pub failed: Option<String>,
-    /// What it said at each time.
+    /// What it reported at each time.
     pub moments: Vec<Moment>,
     /// Alarms that no change explains; none for one that declares none.
     pub false_alarms: Option<usize>,
-    /// Those among them that are said to be of the remnant alone.
+    /// Those among them that are reported to be of the remnant alone.
     pub of_remnant: usize,
     /// Seconds in which an alarm is false.
     pub exposed_s: f64,
@@ -65,7 +64,7 @@ pub struct Line {
     pub findings: Vec<String>,
 }
 
-/// What was said at a time.
+/// What was reported at a time.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Moment {
     /// `+8` after a change, `before`, `steady`, or the time of the long case.
@@ -227,7 +226,7 @@ fn with_truth(parameters: &mut BTreeMap<String, (f64, Option<bool>)>, truth: &Tr
     }
 }
 
-/// The line of an answer against a true response; parameters are left as they were said.
+/// The line of an answer against a true response; parameters are left as they were reported.
 pub(super) fn scored(
     task: &Task,
     labels: &[String],

@@ -23,7 +23,7 @@ use super::{
 
 /// Logarithm of the likelihood ratio from which a change is certain.
 pub const CERTAIN: f64 = 12.0;
-/// Least course of the strength: at a zero of the error the remnant would say everything.
+/// Least course of the strength: at a zero of the error the remnant would report everything.
 const LEAST_LEVEL: f64 = 0.05;
 /// Order of the noise model of the batch fit, and the least seconds that it takes.
 const ND: usize = 4;
@@ -63,8 +63,8 @@ pub fn evidence(case: &Case, run: &Run, change: usize, seconds: f64) -> f64 {
         .sum()
 }
 
-/// What the batch fit says at the times that are asked for, `changes_s` known; nothing where it has
-/// too few seconds or fails.
+/// What the batch fit shows at the times that are asked for, `changes_s` known; nothing where it
+/// has too few seconds or fails.
 pub fn batch(task: &Task, changes_s: &[f64], tau_e_s: f64) -> Vec<ReportedResponse> {
     let nk = (tau_e_s / task.sample_time.s()).round() as usize + 1;
     let structure = Structure::BoxJenkins;

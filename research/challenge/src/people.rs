@@ -4,8 +4,8 @@
 //! other way round, a change of the plant and so of the person at 40 s, and two of one plant, a seam without a change.
 //! The second trial brings its own ramp as history ([`Seam`]): no filter jumps. Single trials are time without a
 //! change. The truth is the person's average describing function over their other trials on that plant, at the seven
-//! lowest lines of the disturbance: `sum U conj(D) / sum E conj(D)` over trials of two whole periods. Nothing is told
-//! of the delay. The control of a row was read a sample before it was written: e(k) is next to u(k+1).
+//! lowest lines of the disturbance: `sum U conj(D) / sum E conj(D)` over trials of two whole periods. Nothing is
+//! reported of the delay. The control of a row was read a sample before it was written: e(k) is next to u(k+1).
 //!
 //! The recordings are not part of the project.
 

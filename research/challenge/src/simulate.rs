@@ -76,7 +76,7 @@ impl Truth {
         }
     }
 
-    /// The operator's delay in samples of `q^-nk`, where it is told: with the one of the hold.
+    /// The operator's delay in samples of `q^-nk`, where it is reported: with the one of the hold.
     pub fn told_nk(&self) -> Option<usize> {
         let samples = self.first.tau_e_s / self.sample_time.s();
         match self.case.delay {

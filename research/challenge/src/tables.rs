@@ -58,7 +58,7 @@ pub fn tables(lines: &[Line]) -> String {
                 .any(|line| line.method == *m && line.false_alarms.is_some())
         })
         .collect();
-    text += "\n### Alarms an hour without a change\n\nThose that are said to be of the remnant alone are after the plus sign.\n\n";
+    text += "\n### Alarms an hour without a change\n\nThose that are reported to be of the remnant alone are after the plus sign.\n\n";
     head(&mut text, "case", &[&["hours"], declaring.as_slice()].concat());
     for case in &cases {
         let hours = |method: &str| own(lines, case, method).map(|line| line.exposed_s).sum::<f64>() / 3600.0;
@@ -151,7 +151,7 @@ pub fn tables(lines: &[Line]) -> String {
         .filter(|m| lines.iter().any(|line| line.method == *m && !line.findings.is_empty()))
         .collect();
     if !judged.is_empty() {
-        text += "\n### What their verdicts say\n\nThe two findings that a verdict has most often, with the runs that have them.\n\n";
+        text += "\n### What their verdicts report\n\nThe two findings that a verdict has most often, with the runs that have them.\n\n";
         by_case(&mut text, &cases, &judged, WORDS_BESIDE, |case, method| {
             commonest(own(lines, case, method))
         });

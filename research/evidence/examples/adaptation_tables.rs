@@ -227,7 +227,7 @@ impl Tables {
         println!();
     }
 
-    /// Errors of all methods in other cases, and what those that declare changes say there.
+    /// Errors of all methods in other cases, and what those that declare changes report there.
     fn elsewhere(&self, cases: &[(&str, &str)], quantities: &[&str], telling: &[&str]) {
         let titles: Vec<&str> = cases.iter().map(|(_, title)| *title).collect();
         println!(

@@ -3,9 +3,9 @@
 //!
 //! `cargo run --release -p hoid-evidence --example conditions_evidence -- [RUNS] [M,..] [LEVEL,..] [METHOD,..] [CONDITION,..]`
 //!
-//! Methods: `adaptive` is told nothing; `multiple-model`, `rls` and `rpem` are told the delay and start from a fit of
-//! the first 30.72 s (RLS and RPEM by the settings of the text). Their first rows are therefore not causal: the ratios
-//! are of the rows from then on, and those of 10 s on are alongside.
+//! Methods: `adaptive` gets no information; `multiple-model`, `rls` and `rpem` are given the delay and start from a fit
+//! of the first 30.72 s (RLS and RPEM by the settings of the text). Their first rows are therefore not causal: the
+//! ratios are of the rows from then on, and those of 10 s on are alongside.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 use hoid_evidence::task::{CHANGE_S, START_S, median, on_all_cores, scenario};

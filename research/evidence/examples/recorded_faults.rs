@@ -1,12 +1,12 @@
-//! What the guard tells of recordings: of those as they are, and of faults that are put into them.
+//! What the guard reports recordings: of those as they are, and of faults that are put into them.
 //!
 //! `HOID_PILOT_DATA=DIR cargo run --release -p hoid-evidence --example recorded_faults --
 //! [RUNS|all] [METHOD]`
 //!
-//! The folder is that of the example `pilots_evidence`. Of each recording as it is the first line counts what was told,
-//! by kind. Each fault of the study `tracker-faults` that fits into it, and steps and ramps of a target as well, is put
-//! in at two places; *told* is an event between its first sample and 3 s after its last that the recording without it
-//! does not have there.
+//! The folder is that of the example `pilots_evidence`. Of each recording as it is the first line counts what was
+//! reported, by kind. Each fault of the study `tracker-faults` that fits into it, and steps and ramps of a target as
+//! well, is put in at two places; *told* is an event between its first sample and 3 s after its last that the recording
+//! without it does not have there.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 #[path = "../../../crates/hoid/tests/common/tracker_faults/faults.rs"]
@@ -23,7 +23,7 @@ use rayon::prelude::*;
 /// Where faults are put in, s after the start, and the longest of them.
 const PLACES_S: [f64; 2] = [33.3, 47.77];
 const LONGEST_S: f64 = 20.0;
-/// Time after a fault in which it may be told, s.
+/// Time after a fault in which it may be reported, s.
 const BEHIND_S: f64 = 3.0;
 
 struct Recording {

@@ -1,4 +1,4 @@
-//! What the verdict of a trace says of runs that are not what they claim, and of clean ones.
+//! What the verdict of a trace reports about runs that are not what they claim, and of clean ones.
 //!
 //! `cargo run --release -p hoid-evidence --example verdict_evidence -- [--runs N] [--seed S] [--method M] [--element]
 //! [--kinds]`
@@ -354,7 +354,7 @@ fn run(kind: Kind, attack: Attack, seed: u64, number: u64) -> Option<(Record, El
     None
 }
 
-/// What is said of a run.
+/// Report about a run.
 struct RunVerdict {
     what: String,
     level: VerdictLevel,

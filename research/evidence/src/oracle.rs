@@ -2,7 +2,7 @@
 //! before it, where both are known.
 //!
 //! The gains s of each are those of all trials of that element (but the one that is looked at), in the basis of the
-//! usual person; after the whitening filter of the first trial's remnant, with its variance,
+//! default person; after the whitening filter of the first trial's remnant, with its variance,
 //!
 //! `log Lambda = sum (limited (y - x' s_0))^2 - (limited (y - x' s_1))^2) / 2 sigma^2`
 //!

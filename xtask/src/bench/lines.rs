@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-/// What one peer says of one task.
+/// What one peer reports about one task.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Line {
     pub task: String,

@@ -73,7 +73,7 @@ enum Profile {
     Tests,
 }
 
-/// Builds a program and says where it is.
+/// Builds a program and reports where it is.
 fn build(arguments: &[&str], program: &str, profile: Profile) -> Result<PathBuf, String> {
     let mut command = cargo_command();
     command.args(["build", "--quiet"]).args(arguments);
@@ -112,7 +112,7 @@ fn run_ours(program: &Path, options: &Options, first: bool) -> Result<Vec<Line>,
     Ok(lines)
 }
 
-/// A peer that does not run is a line that says so.
+/// A peer that does not run is a line that reports it.
 fn run_peer(script: &Path, python: &str, options: &Options) -> Vec<Line> {
     let record = data().join("record.csv");
     let (program, before, behind): (&str, &[&str], &[&str]) = match script.extension().and_then(|e| e.to_str()) {

@@ -1,5 +1,5 @@
-//! What is identified from recordings: an estimator, what is taken out of the data for it, and what its fit
-//! alone says of itself.
+//! What is identified from recordings: an estimator, the self-description of is taken out of the data for it, and what
+//! its fit alone.
 //!
 //! | file | the estimator |
 //! |---|---|
@@ -29,7 +29,7 @@ use crate::{
 pub trait BatchEstimator: Sized + 'static {
     /// Its result.
     type Fit: Answers;
-    /// Whose records it judges: of a person, who answers an error within a second, one without a response is told.
+    /// Whose records it judges: of a person, who answers an error within a second, one without a response is reported.
     const OF: Of = Of::Person;
 
     /// What the registry knows of it: one entry, or one for each of its methods.
@@ -47,7 +47,7 @@ pub trait BatchEstimator: Sized + 'static {
     /// Method and limits of its search.
     fn search(&self) -> &SearchOptions;
 
-    /// What it says of initial states.
+    /// The report about initial states.
     fn initial_state(&self) -> &'static str;
 
     /// The same estimator with its defaults.
@@ -78,7 +78,7 @@ pub trait BatchEstimator: Sized + 'static {
 pub struct Fitted<F> {
     /// The fit.
     pub fit: F,
-    /// What it says of itself, and what a second opinion says.
+    /// Its self-description, and what a second opinion reports.
     pub verdict: Verdict,
     /// The describing function that is next to it.
     pub described: Option<Description>,

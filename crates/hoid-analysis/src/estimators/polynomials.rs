@@ -166,7 +166,8 @@ impl BatchEstimator for Polynomials {
         let told = progress::counter("candidates", combinations.len());
         let search = |estimator: &Estimator| fit_or_choose(estimator, &ranges, how.criterion, records, &told);
         let (mut fit, choice) = match search(&estimator) {
-            // What is not told from a level, as e that stays constant, is fitted next to the means.
+            // What is not distinguished from a level, as e that stays constant, is fitted next to
+            // the means.
             Err(IdentError::SingularRegressors { .. }) if estimator.level => {
                 estimator.level = false;
                 search(&estimator)?

@@ -178,7 +178,7 @@ impl<'a> PolynomialAnswer<'a> {
         }
         let ts = fit.model().sample_time().s();
         set("roots", fit.roots().iter().map(|r| root(r, ts)).collect());
-        // Residuals that are rounding say nothing.
+        // Residuals that are rounding carry no information.
         let tested = if fit.covariance().is_some() {
             self.validations.as_slice()
         } else {
@@ -235,8 +235,8 @@ impl BatchAnswer for GreyBoxFit {
     }
 }
 
-/// Crossover and margins in the range of manual control, below half the sampling frequency: the sampled model
-/// says nothing above it.
+/// Crossover and margins in the range of manual control, below half the sampling frequency: the sampled model carries
+/// no information above it.
 fn loop_margins(fit: &Fit, element: &ContinuousTransferFunction) -> MarginEstimates {
     let (low, high) = MANUAL_CONTROL_RANGE_RAD_S;
     let high = high.min(fit.model().sample_time().nyquist_rad_s());

@@ -52,7 +52,7 @@ impl Look {
         })
     }
 
-    /// The columns that say their unit, and it: next to the name, or in it as in `Stick [V]`.
+    /// The columns that report their unit, and it: next to the name, or in it as in `Stick [V]`.
     pub fn units(&self) -> Vec<(&str, &str)> {
         let all = self.survey.columns.iter();
         all.filter_map(|column| Some((column.path.as_str(), unit_of(column)?)))

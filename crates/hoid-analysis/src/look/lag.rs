@@ -8,8 +8,8 @@
 //! Y - b D = g H exp(-j omega Ts/2) (U exp(j omega N Ts) + a D)
 //! ```
 //!
-//! The whole N and the case (a, b) that leave the smallest part of the power of the output
-//! unexplained by a real gain g decide; nothing is said where none explains it.
+//! The whole N and the case (a, b) that leave the smallest part of the power of the output unexplained by a real gain g
+//! decide; nothing is reported where none explains it.
 
 use std::f64::consts::TAU;
 

@@ -12,7 +12,7 @@
 //! | `periods` | the excitation, its period and lines, and the longest span of whole periods |
 //! | `lag` | by how many samples the control was recorded later than the output of the controlled element |
 //! | `file` | all of this of a file: [`Look`] |
-//! | `other_columns` | what a reader is told of a file without the columns that were asked for |
+//! | `other_columns` | what a reader is reported of a file without the columns that were asked for |
 //! | `advice` | how the file is to be read, and the command to type |
 
 mod advice;

@@ -1,5 +1,5 @@
-//! A file without the columns that were asked for, in which error and control are found all the same: nothing
-//! is chosen silently, the reader is told what to ask for.
+//! A file without the columns that were asked for, in which error and control are found all the same: nothing is chosen
+//! silently, the reader is shown what to ask for.
 
 use std::path::Path;
 
@@ -83,7 +83,7 @@ pub fn other_columns(error: &IoError, path: &Path, options: &ReadOptions) -> Opt
     };
     let found = survey(path).ok()?;
     let names = names(&found);
-    // Only the usual names stand for what is not known; another name was meant as it was typed.
+    // Only the common names stand for what is not known; another name was meant as it was typed.
     let of = |column: &ColumnExpression, default: &str| {
         let found = column.is_among(&names).then(|| column.to_string());
         (found.is_some() || column.to_string() == default).then_some(found)

@@ -6,7 +6,7 @@
 //!
 //! A high rate is lowered; orders that are open are searched on the start span; the recursion goes over the record,
 //! with a second run that chooses its covariance where one is given; the verdict is that of the trace after what the
-//! recording says. Faults are the guard's, sample by sample: a recording is not repaired before.
+//! recording shows. Faults are the guard's, sample by sample: a recording is not repaired before.
 
 mod errors;
 mod run;

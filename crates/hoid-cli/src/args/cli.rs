@@ -38,7 +38,7 @@ pub enum Command {
     Simulate(SimulateArgs),
     /// Gain, lead, delay ... of the person, from whole records
     ///
-    /// Fits a model to one or several records, and says what the result is worth.
+    /// Fits a model to one or several records, and reports what the result is worth.
     Identify(Box<IdentifyArgs>),
     /// Gain and phase at the lines of the excitation, without a model
     ///
@@ -86,7 +86,7 @@ pub enum Command {
     /// Differences between the conditions or people of a group, with intervals, tests, effect sizes and a sentence each: what
     /// `hoid group` found of each person, over people.
     Compare(CompareArgs),
-    /// The forcing function that tells most of a person
+    /// The forcing function that is most informative about a person
     ///
     /// Lines, amplitudes and phases of a forcing function, and the standard errors to be expected of so many runs, for a person
     /// and a controlled element that are about known.

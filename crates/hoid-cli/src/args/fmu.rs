@@ -37,7 +37,7 @@ pub struct FmuArgs {
     /// hoid identify --json has printed, which goes into the unit [default: population]
     #[arg(long, value_name = "PRIOR", conflicts_with = "operator")]
     pub prior: Option<String>,
-    /// Controlled element in s, as 90/(s(s+6)): crossover and phase margin are told
+    /// Controlled element in s, as 90/(s(s+6)): crossover and phase margin are reported
     #[arg(
         long,
         value_name = "ELEMENT",

@@ -1,14 +1,14 @@
 //! What help shows: `hoid -h` lists the commands by what they are for; `hoid COMMAND -h` shows the
 //! options that most people need, under headings, and two examples; `--help` shows everything.
 //!
-//! The tables here hold names of commands and options alone: what an option does is said where it is
-//! defined. A test holds them to the definitions, and parses every example.
+//! The tables here hold names of commands and options alone: what an option does is reported where
+//! it is defined. A test holds them to the definitions, and parses every example.
 
 use clap::{Arg, Command, CommandFactory};
 
 use super::Cli;
 
-/// What help says of a command besides its options.
+/// What help reports about a command besides its options.
 struct Help {
     command: &'static str,
     examples: &'static [&'static str],

@@ -48,7 +48,7 @@ pub struct ReadArgs {
 /// What is done to a record before it is used, in this order.
 #[derive(Debug, Clone, Args)]
 pub struct PrepareArgs {
-    /// Units that the file does not say, as e=deg,u=deg: units are printed only where they are
+    /// Units that the file does not report, as e=deg,u=deg: units are printed only where they are
     /// declared
     #[arg(long, value_name = "CHANNEL=UNIT", value_parser = parse_unit, value_delimiter = ',')]
     pub unit: Vec<(String, String)>,

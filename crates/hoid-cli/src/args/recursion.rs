@@ -54,7 +54,7 @@ pub struct RecursionArgs {
     /// Magnitude of e or u beyond which a sample is taken for a fault and skipped
     #[arg(long, value_name = "X", default_value = "1e6")]
     pub largest: f64,
-    /// Frequencies in rad/s at which gain and phase are told, with errors, as 0.5,1,2.5
+    /// Frequencies in rad/s at which gain and phase are reported, with errors, as 0.5,1,2.5
     #[arg(long, value_name = "LIST", value_delimiter = ',')]
     pub at: Vec<f64>,
     /// Controlled element in s, as 90/(s(s+6)), or NUM/DEN by descending powers of s, as 90/1,6,0:

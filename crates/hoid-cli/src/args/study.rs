@@ -11,7 +11,7 @@ pub enum StudyCommand {
     Run(StudyRunArgs),
     /// Join the shards of a study that were run apart
     Merge(StudyMergeArgs),
-    /// Check a plan and say what it would do, without running anything
+    /// Check a plan and report what it would do, without running anything
     Check(StudyCheckArgs),
     /// List the plans that come with the program, or write one of them to standard output
     Plans(StudyPlansArgs),

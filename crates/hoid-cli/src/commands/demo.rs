@@ -63,8 +63,8 @@ pub fn run(args: &DemoArgs) -> Result<(), CliError> {
     Ok(())
 }
 
-/// Traces of the whole run: the default, which is told nothing, and the two methods of the text, from the batch
-/// fit before the change on.
+/// Traces of the whole run: the default, which gets no information, and the two methods of the text, from the batch fit
+/// before the change on.
 fn tracked(record: &Record, stages: &[Stage]) -> Result<Vec<(String, Trace)>, CliError> {
     let (_, from, to) = SPANS[0];
     let nk = stages[0].choice.fit.orders().nk;

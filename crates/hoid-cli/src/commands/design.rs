@@ -1,4 +1,5 @@
-//! `hoid design`: the forcing function that tells most of a person, and the errors to be expected.
+//! `hoid design`: the forcing function that is most informative about a person, and the errors to
+//! be expected.
 
 use std::path::Path;
 
@@ -75,7 +76,7 @@ pub fn run(args: &DesignArgs) -> Result<(), CliError> {
 fn person(args: &DesignArgs) -> Result<FamilyState, CliError> {
     let element = || -> Result<ContinuousTransferFunction, CliError> {
         let missing = || {
-            CliError::Usage("a fit does not say what was controlled: add --controlled-element '90/(s(s+6))'".to_owned())
+            CliError::Usage("a fit does not report what was controlled: add --controlled-element '90/(s(s+6))'".to_owned())
         };
         args.controlled_element.clone().ok_or_else(missing)
     };

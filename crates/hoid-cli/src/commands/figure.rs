@@ -7,7 +7,8 @@ use hoid::report::figures::{FigureFormat, with_width_mm};
 
 use crate::{error::CliError, output};
 
-/// Whether a figure can be written in the format that its name says: known before anything is read.
+/// Whether a figure can be written in the format that its name states: known before anything is
+/// read.
 ///
 /// # Errors
 /// [`CliError::Usage`].

@@ -125,7 +125,7 @@ fn words(file: &str, found: &FileSurvey) -> String {
     for sampling in &found.samplings {
         text.push_str(&sampled(sampling));
     }
-    // Most files say no units, and an empty column makes a table too wide for a screen.
+    // Most files state no units, and an empty column makes a table too wide for a screen.
     let has_units = found.columns.iter().any(|column| !column.unit.is_empty());
     let mut headings = vec!["column", "unit", "type", "rows", "min", "max", "mean", "deviation"];
     headings.retain(|heading| has_units || *heading != "unit");

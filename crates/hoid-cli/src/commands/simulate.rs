@@ -90,7 +90,7 @@ fn with_changes(mut scenario: Scenario, args: &SimulateArgs) -> Result<Scenario,
     Ok(scenario)
 }
 
-/// The remnant of an operator of the family is what its file says.
+/// The remnant of an operator of the family is what its file states.
 fn of_family(mut scenario: FamilyScenario, args: &SimulateArgs) -> Result<FamilyScenario, CliError> {
     let remnant = [
         ("--remnant-order", args.remnant_order.is_some()),

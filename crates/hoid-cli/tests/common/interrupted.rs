@@ -137,8 +137,8 @@ impl Bench {
     }
 }
 
-/// All files below a directory, by their paths. The page of a reproduction says how long its studies
-/// took, which is the one thing that differs.
+/// All files below a directory, by their paths. The page of a reproduction reports how long its
+/// studies took, which is the one thing that differs.
 pub fn files(directory: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     let mut found = BTreeMap::new();
     let mut open = vec![directory.to_owned()];

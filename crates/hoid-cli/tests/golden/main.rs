@@ -50,7 +50,7 @@ fn answers_are_what_they_were() {
         .collect();
     assert!(
         changes.is_empty(),
-        "{} answers changed; where that is meant, say so in the commit and renew them by HOID_UPDATE_GOLDEN=1:\n{}",
+        "{} answers changed; where that is meant, report it in the commit and renew them by HOID_UPDATE_GOLDEN=1:\n{}",
         changes.len(),
         changes.join("\n")
     );

@@ -1,4 +1,4 @@
-//! Sums over blocks of half a second, and what the last of them say against those before.
+//! Sums over blocks of half a second, and what the last of them report against those before.
 //!
 //! After the whitening filter, with the regressors of gains and level r, those of what is held
 //! `q_j = sum_i theta_i dx_i/dj`, both where the estimate is at that sample, and the held values p of that sample,
@@ -7,8 +7,8 @@
 //! `y + q' p = r' s + q' p' + eps`.
 //!
 //! Each sample counts as one over the variance of eps, so that the sums are in its units, and is limited to some
-//! standard deviations about its prediction. What is held has a weak prior at where it is now, the same for all
-//! spans: where the data say nothing of it, two spans do not differ.
+//! standard deviations about its prediction. What is held has a weak prior at where it is now, the same for all spans:
+//! where the data carry no information about it, two spans do not differ.
 
 use hoid_numerics::{cholesky, products::dot};
 
@@ -19,7 +19,7 @@ const PRODUCTS: usize = STATES * (STATES + 1) / 2;
 /// Share of the diagonal that is added to it.
 const RIDGE: f64 = 1e-3;
 
-/// What a sample says.
+/// What a sample shows.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Row {
     /// Regressors of gains and level, then of what is held.

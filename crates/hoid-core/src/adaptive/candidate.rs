@@ -263,7 +263,7 @@ impl Candidate {
         y - innovation + innovation.max(-most).min(most)
     }
 
-    /// What the sample says to the detector.
+    /// What the sample shows to the detector.
     #[inline(always)]
     fn row(&self, white: &Whitened, innovation: f64, limit: f64) -> Row {
         let Regressors { x, by } = self.basis.regressors(&white.signals);

@@ -1,9 +1,9 @@
 //! Now against before: the difference of two solutions, with the covariance that their scores show.
 //!
-//! The noise model whitens, but what it says of the band in which a person controls rests on few data:
-//! a noise model of 16 lags at 100 Hz sees .16 s, and a person turns within seconds. Where it is wrong by some factor
-//! there, `sigma^2 A^-1` is too. So the variance of the score `g = b - A s` is taken from the data as well: with
-//! the scores `g_k` of stretches of one second, which hardly depend on each other,
+//! The noise model whitens, but what it reports about the band in which a person controls rests on few data: a noise
+//! model of 16 lags at 100 Hz sees .16 s, and a person turns within seconds. Where it is wrong by some factor there,
+//! `sigma^2 A^-1` is too. So the variance of the score `g = b - A s` is taken from the data as well: with the scores
+//! `g_k` of stretches of one second, which hardly depend on each other,
 //!
 //! `S = sum_k g_k g_k' / (1 - (N + 3) / K)`, `W_i = w n_i/n S + (1 - w) sigma^2 A_i`,
 //!
@@ -27,7 +27,7 @@ type Matrix = [[f64; STATES]; STATES];
 
 /// Blocks of a stretch.
 const BLOCKS_PER_SCORE: usize = 2;
-/// Share of what the scores show in the variance of the score, and where the noise model is believed.
+/// Share of what the scores show in the variance of the score, and where the noise model is trusted.
 pub(super) const EMPIRICAL_SHARE: f64 = 2.0 / 3.0;
 pub(super) const MODEL_ONLY: f64 = 0.0;
 /// Least share of the degrees of freedom that is left.

@@ -1,8 +1,8 @@
 //! What is usual of people, in seconds: where the recursion starts for a person of whom nothing is known.
 //!
-//! The usual person (lag 3 s, neuromuscular system of 11 rad/s and .25, their form `(T_L s + 1)^2/(T_I s + 1)`) is what
-//! recorded people have been found to be. All other numbers were set on simulated people: those whose operator has a
-//! lag, whose delay is not a whole number of samples, and whose remnant is an autoregression with a level that may
+//! The default person (lag 3 s, neuromuscular system of 11 rad/s and .25, their form `(T_L s + 1)^2/(T_I s + 1)`) is
+//! what recorded people have been found to be. All other numbers were set on simulated people: those whose operator has
+//! a lag, whose delay is not a whole number of samples, and whose remnant is an autoregression with a level that may
 //! change, and those of the conditions C1 to C6, seed 9000; none on recorded people.
 
 use super::{
@@ -14,7 +14,7 @@ use super::{
     sizes::{DYNAMICS, STARTS},
 };
 
-/// Lag T_I in s, natural frequency in rad/s and damping of the usual person.
+/// Lag T_I in s, natural frequency in rad/s and damping of the default person.
 pub const LAG_S: f64 = 3.0;
 /// Natural frequency of the neuromuscular system, rad/s.
 pub const OMEGA_RAD_S: f64 = 11.0;

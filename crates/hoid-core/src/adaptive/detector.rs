@@ -10,16 +10,16 @@
 //! long present: small changes need more data than large ones. A second between present and past is left out:
 //! nobody changes at the end of a block.
 //!
-//! Some people vary more than others, so T is divided by the root of the level c at which it has been so far, from
-//! the mean of log T, whose expectation for a chi-square is `ln 2 + psi(nu/2)`; c is at least one, and what is
-//! supposed of it counts for half a minute. T is then told as what it has against chance, in nats: with
+//! Some people vary more than others, so T is divided by the root of the level c at which it has been so far, from the
+//! mean of log T, whose expectation for a chi-square is `ln 2 + psi(nu/2)`; c is at least one, and what is supposed of
+//! it counts for half a minute. T is then reported as what it has against chance, in nats: with
 //! `x = T/2 sqrt c`
 //!
 //! `-ln P(chi^2 > 2x) = x - ln (1 + x + .. + x^(nu/2-1)/(nu/2-1)!)`.
 //!
-//! A change is declared where one of them is above the threshold. When it was, and what changed, is told by the block
-//! that leaves least where all is free before it and after it (R. E. Quandt, *J. American Statistical Association* 53
-//! (1958) 873-880).
+//! A change is declared where one of them is above the threshold. When it was, and what changed, is reported by the
+//! block that leaves least where all is free before it and after it (R. E. Quandt, *J. American Statistical
+//! Association* 53 (1958) 873-880).
 //!
 //! The blocks are those of the candidate of now (`last_blocks`), all after its noise model and in its basis: when
 //! another takes over, so do its blocks. From three seconds after a gap on, what is after it is held against what was
@@ -120,7 +120,7 @@ fn log_significance(x: f64, pairs: u32) -> f64 {
     half - libm::log(sum)
 }
 
-/// What the blocks say.
+/// What the blocks show.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Detector {
     settings: Detection,
@@ -198,9 +198,9 @@ impl Detector {
     }
 
     /// The change is supposed to be at the block that leaves least where all is free before it and after it. What
-    /// changed is told in the metric of the noise model, whose covariance is raised by how much more the scores show in
-    /// the mean between the halves of what was before: that of the scores alone is too uncertain to tell gains from a
-    /// delay, and those after the change have the change in them.
+    /// changed is reported in the metric of the noise model, whose covariance is raised by how much more the scores
+    /// show in the mean between the halves of what was before: that of the scores alone is too uncertain to distinguish
+    /// gains from a delay, and those after the change have the change in them.
     fn locate_change(&mut self, blocks: &[Block], dynamics: [f64; DYNAMICS], recent: usize) {
         let mut best: Option<Contrast> = None;
         self.ago = recent.min(blocks.len().saturating_sub(1));

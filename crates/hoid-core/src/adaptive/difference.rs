@@ -1,16 +1,15 @@
 //! What changed: the difference of now from before, with its full covariance.
 //!
-//! Gains, level and what is held differ by d with the covariance C (`contrast`). Of that difference, `W = C^-1`,
-//! nobody asks for all at once: a delay that grows looks
-//! like gains that turn, and seconds hardly tell them apart. So each group (the gains; natural frequency
-//! and damping; the delay) is supposed to have changed or not, the level always; what is in the set S is
-//! then
+//! Gains, level and what is held differ by d with the covariance C (`contrast`). Of that difference, `W = C^-1`, nobody
+//! asks for all at once: a delay that grows looks like gains that turn, and seconds hardly distinguish them. So each
+//! group (the gains; natural frequency and damping; the delay) is supposed to have changed or not, the level always;
+//! what is in the set S is then
 //!
 //! `d_S = (W_SS)^-1 (W d)_S`, with the covariance `(W_SS)^-1`,
 //!
-//! and `chi_S^2 = d' W d - d_S' (W d)_S` is what the others would have to have changed by chance. The set with
-//! the least `chi_S^2 + 4 |S|` is told: between the 2 of Akaike and the logarithm of the number of samples
-//! of Schwarz (G. Schwarz, *Annals of Statistics* 6 (1978) 461-464).
+//! and `chi_S^2 = d' W d - d_S' (W d)_S` is what the others would have to have changed by chance. The set with the
+//! least `chi_S^2 + 4 |S|` is reported: between the 2 of Akaike and the logarithm of the number of samples of Schwarz
+//! (G. Schwarz, *Annals of Statistics* 6 (1978) 461-464).
 
 use hoid_numerics::{cholesky, products::dot};
 
@@ -102,7 +101,7 @@ mod tests {
     #![allow(clippy::unwrap_used)]
     use super::*;
 
-    /// A delay that is told only together with the gains.
+    /// A delay that is reported only together with the gains.
     fn contrast(difference: [f64; STATES]) -> Contrast {
         let mut covariance = [[0.0; STATES]; STATES];
         for (i, row) in covariance.iter_mut().enumerate() {

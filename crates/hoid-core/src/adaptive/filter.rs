@@ -347,7 +347,7 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         self.live.remember(u);
     }
 
-    /// What the detector says of the last blocks.
+    /// What the detector reports about the last blocks.
     fn test_for_change(&mut self) {
         let dynamics = core::array::from_fn(|j| self.live.mixture.mean()[LINEAR + j]);
         self.detector.test(&self.live.blocks, dynamics);
@@ -397,7 +397,8 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         &self.alternatives
     }
 
-    /// Samples of the record so far that said something: while nothing arrives nothing grows old.
+    /// Samples of the record so far that reported something: while nothing arrives nothing grows
+    /// old.
     pub(super) fn read(&self) -> u64 {
         self.history.samples().saturating_sub(self.passed)
     }

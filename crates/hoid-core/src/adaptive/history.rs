@@ -107,7 +107,7 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> History<E> {
         self.put(USES, newest, use_of_it.number());
     }
 
-    /// Says something else of the sample before the newest, from which had been learnt.
+    /// Reports something else of the sample before the newest, from which had been learnt.
     pub fn revise_previous(&mut self, use_of_it: Use) {
         if let Some(previous) = self.samples.checked_sub(2)
             && self.output(previous).1 == Use::Update

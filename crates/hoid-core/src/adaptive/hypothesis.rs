@@ -99,7 +99,7 @@ impl Hypothesis {
         &self.segments[..self.changes.min(SEGMENTS)]
     }
 
-    /// One that says that the operator changes after this block.
+    /// One that reports that the operator changes after this block.
     pub fn child(&self, block: u64) -> Self {
         let mut child = *self;
         let changes = self.changes.min(SEGMENTS);

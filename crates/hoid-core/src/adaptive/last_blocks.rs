@@ -69,7 +69,7 @@ impl LastBlocks {
         self.closed = true;
     }
 
-    /// A sample says nothing, and is not a fault.
+    /// A sample carries no information, and is not a fault.
     pub fn pass_over(&mut self) {
         self.closed = false;
     }

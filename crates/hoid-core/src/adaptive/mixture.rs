@@ -1,6 +1,6 @@
 //! When did the operator last change? A mixture over the answers.
 //!
-//! After each block the likeliest hypotheses have children that say that the operator changed in it: they are what
+//! After each block the likeliest hypotheses have children that report that the operator changed in it: they are what
 //! their parents were before it, and the covariance of a change is added to that of the gains. A whitening filter D of
 //! order p has D(theta x) for D theta x while it reaches back to before the change: where the noise is steep, the step
 //! of the response is then hundreds of innovations, which no gains explain. So a child takes nothing of that block, and
@@ -354,7 +354,7 @@ impl Mixture {
         c
     }
 
-    /// The mean over the hypotheses of what each says.
+    /// The mean over the hypotheses of what each reports.
     pub fn mean_of(&self, what: impl Fn(&[f64; STATES], &Covariance) -> f64) -> f64 {
         self.all()
             .iter()
@@ -367,8 +367,7 @@ impl Mixture {
         self.all().iter().map(|h| h.weight() * h.variance).sum()
     }
 
-    /// What the likeliest says of the past: the states before its changes, the oldest first, and the one of
-    /// now.
+    /// What the likeliest reports about the past: the states before its changes, the oldest first, and the one of now.
     pub fn segments(&self) -> Segments {
         let mut segments = Segments::NONE;
         if let Some(best) = self.likeliest(|_| true) {

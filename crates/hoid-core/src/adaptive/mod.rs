@@ -21,19 +21,19 @@
 //!   record again ([`AdaptiveFilter`]), from where the estimate points, with what has been learnt of the noise, and
 //!   takes over when it has caught up. Every second one starts elsewhere. So the estimate is that of a batch fit which
 //!   is repeated again and again, at a bounded cost for each sample.
-//! - **Changes** ([`mixture`]). Within a candidate, hypotheses say when the operator last changed: they are born
-//!   in each block, weighed by what they predicted, and pruned. Of each there are forms and drifts.
+//! - **Changes** ([`mixture`]). Within a candidate, hypotheses assume when the operator last changed: they are born in
+//!   each block, weighed by what they predicted, and pruned. Of each there are forms and drifts.
 //! - **Noise** ([`noise`], `volatility`). D is a long autoregression of the residuals, by least squares. The
-//!   innovations of a steep remnant have 1e-7 of the power of u, those of a flat one 1e-2: what is supposed of
-//!   their variance and of D before the data is in the scale of what D leaves, never in that of u. How unevenly
-//!   the innovations come says how many samples count for one.
-//! - **What else predicts as well** (`alternatives`). Other poles and delays that predict u about as well are in
-//!   the errors that are told.
+//!   innovations of a steep remnant have 1e-7 of the power of u, those of a flat one 1e-2: what is supposed of their
+//!   variance and of D before the data is in the scale of what D leaves, never in that of u. How unevenly the
+//!   innovations come reports how many samples count for one.
+//! - **What else predicts as well** (`alternatives`). Other poles and delays that predict u about as well are in the
+//!   errors that are reported.
 //! - **The end of the stick** (`saturation`). An output that is there says that it would be at least so far.
-//! - **Declared changes** ([`detector`]). From the difference of gains and what is held between the last seconds
-//!   and the time before (`blocks`, `last_blocks`), by least squares, with the errors that the scores show
-//!   ([`contrast`]; G. C. Chow, Econometrica 28 (1960) 591-605; H. White, Econometrica 48 (1980) 817-838). What
-//!   changed is told by [`difference`].
+//! - **Declared changes** ([`detector`]). From the difference of gains and what is held between the last seconds and
+//!   the time before (`blocks`, `last_blocks`), by least squares, with the errors that the scores show ([`contrast`];
+//!   G. C. Chow, Econometrica 28 (1960) 591-605; H. White, Econometrica 48 (1980) 817-838). What changed is reported by
+//!   [`difference`].
 //!
 //! Nothing has to be fitted before: the estimate starts with the first second, whose ratio of output to error gives the
 //! scale of the gains' prior. Where an earlier fit of the person is at hand ([`known`]), it starts there.

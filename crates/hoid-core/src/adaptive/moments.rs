@@ -1,8 +1,8 @@
-//! The second moments of a block: all that its samples say of an operator.
+//! The second moments of a block: all that its samples show about an operator.
 //!
-//! After the whitening filter a sample has the signals of the basis and the level, `z` (seven numbers),
-//! and the output y. The response of a state s (gains, level, corrections) is `w(s)' z`, bilinear in
-//! gains and corrections, so that the block says of s only what is in
+//! After the whitening filter a sample has the signals of the basis and the level, `z` (seven numbers), and the output
+//! y. The response of a state s (gains, level, corrections) is `w(s)' z`, bilinear in gains and corrections, so that
+//! the block shows about s only what is in
 //!
 //! `sum z z'`, `sum z y`, `sum y^2`.
 //!

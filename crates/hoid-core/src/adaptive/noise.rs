@@ -6,10 +6,10 @@
 //! solved now and then. The weights w are one, and less where eps is far out. The memory grows with the time since the start up to its limit: the first
 //! seconds, in which the gains are not known, do not stay.
 //!
-//! Before the data say more the coefficients are supposed to be normal about those of a usual remnant, with the
-//! standard deviation `PRIOR_DEVIATION`, which adds `sigma^2/PRIOR_DEVIATION^2` to the diagonal of the sums, sigma^2 the variance of eps.
-//! It is in units of eps and not of v: the spectrum of a steep remnant, of more than two poles, falls far
-//! below a share of its power, and D has to follow it there.
+//! Before the data show more the coefficients are supposed to be normal about those of a typical remnant, with the
+//! standard deviation `PRIOR_DEVIATION`, which adds `sigma^2/PRIOR_DEVIATION^2` to the diagonal of the sums, sigma^2
+//! the variance of eps. It is in units of eps and not of v: the spectrum of a steep remnant, of more than two poles,
+//! falls far below a share of its power, and D has to follow it there.
 //!
 //! D is only ever used as a filter of finite length: it need not be stable.
 
@@ -133,7 +133,7 @@ impl NoiseModel {
             self.fade = 1.0;
         }
         let weight = weight / self.fade;
-        // As a constant the usual order makes loops of known length.
+        // As a constant the default order makes loops of known length.
         match self.order {
             ORDER => self.add(v, weight, ORDER),
             order => self.add(v, weight, order),

@@ -1,4 +1,4 @@
-//! The operator that is told: parameters and their covariance from gains and corrections.
+//! The operator that is reported: parameters and their covariance from gains and corrections.
 //!
 //! Gains of the basis are not parameters of an operator. K_e and K_e_dot are those of the gain and lead that are
 //! nearest to it at [`NEAR_RAD_S`], by least squares in

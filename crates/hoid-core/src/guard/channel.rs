@@ -13,8 +13,8 @@
 //!
 //! The size of an outlier does not enter: one sample moves q by 5 % whatever it is. A quantile in the tail, and not a
 //! median: people's u rests and moves by pulses, and its tails are what the limit must let pass. p_j is the 90 %
-//! quantile, in the same way with g = .02. Samples at which the signal stays constant say nothing of how it moves: they
-//! enter neither.
+//! quantile, in the same way with g = .02. Samples at which the signal stays constant carry no information about how it
+//! moves: they enter neither.
 //!
 //! **Outliers.** A sample is held back where `|r_j| > max(m_j q_j, floor)` with
 //!
@@ -45,7 +45,7 @@ const INNER_GAIN: f64 = 0.02;
 /// Least and largest limit in units of the quantile.
 const LIMIT: f64 = 2.5;
 const HEAVIEST: f64 = 12.0;
-/// Largest mean magnitude, in units of the inner quantile, of a signal that moves as usual: Gaussian errors have
+/// Largest mean magnitude, in units of the inner quantile, of a signal that moves as by default: Gaussian errors have
 /// .49 and Laplacian ones .43, and those of a signal five times as large 2.4 and 2.2.
 const TYPICAL: f64 = 1.3;
 /// Blocks over which the tails are averaged.

@@ -29,7 +29,7 @@ pub const CHANNELS: usize = 2;
 const LEARNT: u32 = 10;
 /// Weight of a block thereafter.
 const WEIGHT: f64 = 1.0 / 60.0;
-/// Limits of the rules. Share of the usual mean difference up to which a signal stays constant.
+/// Limits of the rules. Share of the typical mean difference up to which a signal stays constant.
 pub const STILL: f64 = 1e-3;
 const FROZEN_U_BLOCKS: u32 = 3;
 const IDLE: f64 = 0.05;
@@ -41,7 +41,7 @@ const OTHER: f64 = 2.0;
 const LARGER_BLOCKS: u32 = 2;
 const SWAPPED_DRIFT: f64 = 1.0;
 const SWAPPED: f64 = 6.0;
-/// What one block says at most.
+/// What one block shows at most.
 const MOST_EVIDENCE: f64 = 4.0;
 const MISFIT: f64 = 4.0;
 /// R below which no model predicts too little.
@@ -49,7 +49,7 @@ const LEAST_RATIO: f64 = 1.5;
 /// Growth of the innovations without which it is not a misfit.
 const LEAST_GROWTH: f64 = 2.0;
 const MISFIT_BLOCKS: u32 = 2;
-/// Distance of a block that is as usual: four logarithms of four.
+/// Distance of a block that is as by default: four logarithms of four.
 const ALIKE: f64 = 4.0 * 1.386;
 /// And of one that is not.
 const UNLIKE: f64 = 4.0;
@@ -167,12 +167,12 @@ pub enum Trouble {
 }
 
 impl Trouble {
-    /// True for what may have become usual; nobody tracks in silence.
+    /// True for what may have become typical; nobody tracks in silence.
     pub fn may_be_the_new_level(self) -> bool {
         !matches!(self, Self::FrozenInput | Self::FrozenOutput | Self::Idle)
     }
 
-    /// Blocks that it has lasted for at least when it is first told.
+    /// Blocks that it has lasted for at least when it is first reported.
     pub fn blocks(self) -> u32 {
         match self {
             Self::FrozenInput => 1,
@@ -250,14 +250,13 @@ impl Profile {
             && self.misfits == 0
     }
 
-    /// True for the means of a block unlike those that are usual: by a factor of e in the mean of the
-    /// logarithms.
+    /// True for the means of a block unlike those that are typical: by a factor of e in the mean of the logarithms.
     pub fn is_unusual(&self, block: &Block) -> bool {
         self.is_known() && self.distance(block, [0, 1]) > UNLIKE
     }
 
-    /// True for the means of a block like those that are usual: within a factor of four in the mean
-    /// of the logarithms.
+    /// True for the means of a block like those that are typical: within a factor of four in the
+    /// mean of the logarithms.
     pub fn resembles(&self, block: &Block) -> bool {
         self.is_known() && self.distance(block, [0, 1]) < ALIKE
     }
@@ -318,7 +317,7 @@ impl Profile {
         }
     }
 
-    /// Blocks that a trouble which was just told has lasted for at least.
+    /// Blocks that a trouble which was just reported has lasted for at least.
     pub fn lasting(&self, trouble: Trouble) -> u32 {
         match trouble {
             Trouble::FrozenOutput => self.frozen_u.max(trouble.blocks()),
@@ -499,7 +498,7 @@ mod tests {
         assert_eq!(after(true, &quiet(0.19, 0.02)), None);
         assert_eq!(after(true, &quiet(0.21, 0.02)), Some((3, Trouble::FrozenOutput)));
         assert_eq!(after(true, &quiet(0.0, 0.0)), Some((1, Trouble::FrozenInput)));
-        // One that was believed for long has lasted for as long.
+        // One that was trusted for long has lasted for as long.
         let mut profile = known();
         (0..9).for_each(|_| assert_eq!(profile.judge(&quiet(0.0, 0.02), true), None));
         let told = profile.judge(&quiet(0.0, 0.02), false);

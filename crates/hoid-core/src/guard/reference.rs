@@ -9,8 +9,8 @@
 //! distribution, and a few outliers weigh little. The innovations of a sound recursion are larger than those of a fixed
 //! model by half of its effective number of parameters over its memory: .2 % for memories of 2 to 5 s and white
 //! innovations, several per cent for seconds where its noise model is too small for the remnant, and more for a person
-//! who is not steady. What a block says beyond [`DRIFT`] counts. The one-sided cumulative sum (E. S. Page, *Biometrika*
-//! 41 (1954) 100-115) tells of an estimate that has gone diverged when it reaches [`ASTRAY`].
+//! who is not steady. What a block shows beyond [`DRIFT`] counts. The one-sided cumulative sum (E. S. Page,
+//! *Biometrika* 41 (1954) 100-115) reports an estimate that has gone diverged when it reaches [`ASTRAY`].
 //!
 //! A person who has changed is predicted better by an estimate that followed than by the start: the sum stays at zero.
 
@@ -20,7 +20,7 @@ pub const ROOM: usize = 16;
 pub const DRIFT: f64 = 0.2;
 /// Sum at which the estimate is diverged.
 pub const ASTRAY: f64 = 40.0;
-/// What one block says at most.
+/// What one block shows at most.
 const MOST: f64 = 15.0;
 
 /// Orders of the model: na, nb, nc, nd, nf.
@@ -62,7 +62,7 @@ impl ReferenceModel {
         })
     }
 
-    /// At rest, with nothing said.
+    /// At rest, with nothing reported.
     pub fn reset(&mut self) {
         (self.past, self.sum, self.samples, self.score) = ([[0.0; ROOM]; 5], 0.0, 0, 0.0);
     }
@@ -106,7 +106,7 @@ impl ReferenceModel {
         let own = self.sum / f64::from(self.samples.max(1));
         let said = f64::from(self.samples) * (libm::log(innovation / own) - DRIFT);
         self.skip_block();
-        // A comparison with NaN is false: zero over zero says nothing.
+        // A comparison with NaN is false: zero over zero carries no information.
         if said.abs() <= f64::INFINITY {
             self.score = (self.score + said.clamp(-MOST, MOST)).max(0.0);
         }

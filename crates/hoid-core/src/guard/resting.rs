@@ -14,7 +14,7 @@
 //! §2.1); twice as long it is, with exponential rests, with a probability of about `2/((n+1)(n+2))`. The least of 8 s
 //! is for the time in which only a few rests have been seen.
 //!
-//! A rest is judged by who calls: e has to move on meanwhile, and the innovations must be no larger than usual.
+//! A rest is judged by who calls: e has to move on meanwhile, and the innovations must be no larger than typical.
 
 /// Values that are kept.
 pub const ATOMS: usize = 4;

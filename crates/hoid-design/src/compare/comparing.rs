@@ -48,7 +48,7 @@ named_choice!(Covariate, "covariate", 1, {
 pub struct Comparing {
     /// The factors; the conditions where there is none.
     pub factors: Vec<Factor>,
-    /// Where they vary; found from the group where it is not said.
+    /// Where they vary; found from the group where it is not specified.
     pub variation: Option<Variation>,
     /// What is compared; [`Quantity::defaults`], as far as it is there, where there is nothing.
     pub of: Vec<Quantity>,
@@ -82,7 +82,7 @@ impl Comparing {
         };
         if !group.has_runs() {
             let from_runs = |q: &&Quantity| matches!(q.column(), None | Some("rms_e" | "rms_u"));
-            let what = self.covariate.map(|_| "what each run says".to_owned());
+            let what = self.covariate.map(|_| "what each run shows".to_owned());
             if let Some(what) = what.or(quantities.iter().find(from_runs).map(Quantity::words)) {
                 return Err(CompareError::NotInJson { what });
             }
@@ -419,7 +419,7 @@ impl Work<'_> {
             self.findings.push(Finding::doubt(
                 "few-people",
                 format!(
-                    "{name}: {} people leave one degree of freedom, and an interval of so few says little",
+                    "{name}: {} people leave one degree of freedom, and an interval of so few carries little information",
                     people.len()
                 ),
             ));

@@ -1,8 +1,9 @@
 //! What is compared of each person: a sum of their conditions with weights.
 //!
 //! - A factor **within** people: the mean over the conditions of the one level less that over those of the other, so
-//!   that a second factor is averaged out. One contrast a person, and its mean over people: no assumption on how the conditions of
-//!   a person scatter together (sphericity) is left, and a mixed model of the balanced experiment says the same.
+//!   that a second factor is averaged out. One contrast a person, and its mean over people: no assumption on how the
+//!   conditions of a person scatter together (sphericity) is left, and a mixed model of the balanced experiment states
+//!   the same.
 //! - A factor **between** people: the mean over the conditions that they have, and the difference of two groups of people.
 //! - **Two factors within**: next to each of them their interaction, by how much the effect of the first differs
 //!   between the levels of the second. **One within, one between**: the effect of the first, compared between the

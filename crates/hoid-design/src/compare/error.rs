@@ -18,8 +18,8 @@ pub enum CompareError {
     /// A value or an error that is not a number.
     #[error("an estimate or its standard error is not finite, or negative: leave that person out")]
     NotFinite,
-    /// Columns that cannot be told apart.
-    #[error("the covariates cannot be told apart (one is constant, or a sum of others): leave one out")]
+    /// Columns that cannot be distinguished.
+    #[error("the covariates cannot be distinguished (one is constant, or a sum of others): leave one out")]
     Collinear,
     /// Nothing to judge a mean by.
     #[error("all estimates are equal: there is no scatter to judge a difference by; is a run given twice?")]

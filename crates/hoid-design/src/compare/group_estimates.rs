@@ -1,4 +1,4 @@
-//! What a group says of each person in each condition: from the directory of its results, or from the JSON that
+//! What a group reports about each person in each condition: from the directory of its results, or from the JSON that
 //! `hoid group` printed.
 //!
 //! A person in a condition is a cell. Crossover, margin and parameters are those of all runs together with

@@ -14,9 +14,10 @@
 //!   (`tests/coverage.rs`, where other numbers of people and other tau are). With one or two degrees of freedom all weights are
 //!   equal: two and three people are a t test.
 //! - **beta** is `(X'W X)^-1 X'W y`, its covariance `s^2 (X'W X)^-1` with `s^2 = y'P y/(n - p)`, and its interval
-//!   Student's with n - p degrees of freedom (J. Hartung and G. Knapp, *Stat. Med.* 20 (2001) 3875-3889; of
-//!   regression G. Knapp and J. Hartung, *Stat. Med.* 22 (2003) 2693-2710). With equal errors and X of ones alone this is the
-//!   t test of one sample, whatever tau^2 is; s^2 is not held at one or above, which would make few people say less than they do.
+//!   Student's with n - p degrees of freedom (J. Hartung and G. Knapp, *Stat. Med.* 20 (2001) 3875-3889; of regression
+//!   G. Knapp and J. Hartung, *Stat. Med.* 22 (2003) 2693-2710). With equal errors and X of ones alone this is the t
+//!   test of one sample, whatever tau^2 is; s^2 is not held at one or above, which would make few people show less than
+//!   they do.
 //! - **Q** is `y'P y` at tau^2 = 0, chi-squared with n - p degrees of freedom where all people are the same, and
 //!   `I^2 = tau^2/(tau^2 + v)` with the typical `v = (n - p)/tr P` at zero (J. P. T. Higgins and S. G. Thompson,
 //!   *Stat. Med.* 21 (2002) 1539-1558).

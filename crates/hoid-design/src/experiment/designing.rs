@@ -1,4 +1,4 @@
-//! The forcing function that tells most of a person.
+//! The forcing function that is most informative about a person.
 //!
 //! With a remnant that has its share of the variance of u, the errors depend on how the power of u is spread over the lines, not on its size
 //! (`information`): of the shares q of the lines in the response of u to the forcing function the information is

@@ -1,4 +1,4 @@
-//! What an experiment will say of a person: standard errors before it is done.
+//! What an experiment will report about a person: standard errors before it is done.
 //!
 //! A person H(s; theta) answers the error of a loop with the controlled element P, `u = H e + n`, and a line of the forcing function of
 //! amplitude A at omega makes one of e of amplitude `a = A |S|` (a target), or `A |P S|` (a disturbance at the input of P), with `S = 1/(1 + H P)`.
@@ -240,7 +240,8 @@ impl<'a> Loop<'a> {
         self.worth(omega).control
     }
 
-    /// What can be wanted: its name, its gradient along the coordinates, and what its error is told by: 1 deg, or the value.
+    /// What can be wanted: its name, its gradient along the coordinates, and what its error is reported by: 1 deg, or
+    /// the value.
     pub fn gradients(&self) -> Vec<(&'static str, DVector<f64>, f64)> {
         let [(crossover, of_crossover), (_, of_margin)] = self.margin_gradients(&self.task.state.operator);
         let parameters = self.task.state.operator.named_gradients().into_iter();

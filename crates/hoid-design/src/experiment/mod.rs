@@ -1,9 +1,9 @@
-//! What an experiment will say, before it is done.
+//! What an experiment will report, before it is done.
 //!
 //! | module | what it holds |
 //! |---|---|
 //! | [`expected`] | standard errors of a person by the information of the lines of a forcing function |
-//! | [`Designing`] | amplitudes and places of the lines that tell most, under limits |
+//! | [`Designing`] | amplitudes and places of the lines that are most informative, under limits |
 //! | [`crest_factor`] | lines without common harmonics (`lines`), and their phases |
 
 mod designing;

@@ -20,7 +20,7 @@ pub type Fmi2Logger = unsafe extern "C" fn(*mut c_void, *const c_char, c_int, *c
 /// `fmi3LogMessageCallback`.
 pub type Fmi3Logger = unsafe extern "C" fn(*mut c_void, c_int, *const c_char, *const c_char);
 
-/// Who is told what went wrong.
+/// Who is shown what went wrong.
 #[derive(Clone, Copy)]
 pub(super) enum Logger {
     Nobody,
@@ -108,7 +108,7 @@ pub(super) unsafe fn free(component: *mut Component) {
     drop(unsafe { Box::from_raw(component) });
 }
 
-/// Works on an instance: its status; what went wrong is told.
+/// Works on an instance: its status; what went wrong is reported.
 ///
 /// # Safety
 /// `component` is null or was made here, and no other thread uses it.

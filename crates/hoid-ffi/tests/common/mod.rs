@@ -48,7 +48,7 @@ pub fn shared_library() -> PathBuf {
     ))
 }
 
-/// A compiler that is here; its absence is told.
+/// A compiler that is here; its absence is reported.
 pub fn compiler(name: &str) -> Option<String> {
     let there = Command::new(name).arg("--version").stdout(Stdio::null()).status();
     if there.is_ok_and(|status| status.success()) {

@@ -1,6 +1,6 @@
 //! Initial states of a record, eliminated exactly.
 //!
-//! What a record does not say about its own past enters the residuals linearly: the nf past values of w through the
+//! What a record does not report about its own past enters the residuals linearly: the nf past values of w through the
 //! free responses of `1/F` (as `-(D/C) h`, h the impulse response of `1/F`), the nc past innovations through those of
 //! `1/C`. With G the matrix of these responses and `G = Q R`, the states of least squares are `x = -R^-1 Q' eps_0` and
 //! the residuals `eps = (I - Q Q') eps_0`. The responses die away, so that Q is short compared with the record. Source:

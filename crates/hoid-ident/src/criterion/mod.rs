@@ -44,7 +44,7 @@
 //! | `initial_state` | what is assumed about the time before a record |
 //! | `polynomials` | A, B, C, D and F as parts of theta |
 //! | `signals`, `whitening` | the signals of a record at one theta |
-//! | `initial_state_responses` | what a record does not say about its past, eliminated exactly |
+//! | `initial_state_responses` | what a record does not report about its past, eliminated exactly |
 //! | `stationary_noise` | the noise before the record, when it was stationary |
 //! | `pass` | a pass over a record; a long one span by span |
 //! | `normal_equations` | products of the residuals and the columns of psi |

@@ -32,7 +32,7 @@ impl Fit {
         all.extend(choice.and_then(delay_at_end));
         all.extend(self.too_few());
         all.extend(self.system_findings());
-        // Residuals that are rounding say nothing.
+        // Residuals that are rounding carry no information.
         if let Some(share) = self.rounding() {
             all.push(Finding::note(
                 "no-noise",
@@ -69,7 +69,7 @@ impl Fit {
         })
     }
 
-    /// What the system from e to u says, without a record.
+    /// What the system from e to u shows, without a record.
     fn system_findings(&self) -> Vec<Finding> {
         let mut all = Vec::new();
         if !self.model.is_stable() {

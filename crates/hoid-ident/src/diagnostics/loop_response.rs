@@ -81,7 +81,7 @@ mod tests {
             v = 0.8 * v + stream(&mut seed);
             u[t] = 2.0 * if t >= 10 { e[t - 10] } else { 0.0 } + 0.3 * v;
         }
-        // Without a noise of its own e and its past say all of u.
+        // Without a noise of its own e and its past show all of u.
         let e = e.iter().map(|e| e + 1e-3 * stream(&mut seed)).collect();
         [e, u]
     }

@@ -24,7 +24,7 @@
 //! | `answer` | whether e answers to u, as it does in a loop |
 //! | `no_response` | whether u responds to e at all |
 //! | `operator` | gains, poles and delay of an operator |
-//! | `operator_step` | what a stretch of data says against an operator |
+//! | `operator_step` | what a stretch of data shows against an operator |
 //! | `second_opinion` | fits to records that no single sample can carry |
 //! | `whitened` | least squares after an autoregression, for those that need one |
 //! | `fit`, `grey_box`, `sigmoid` | the verdict of each kind of fit |

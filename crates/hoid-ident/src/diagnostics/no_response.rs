@@ -1,9 +1,9 @@
 //! Whether u responds to e at all.
 //!
-//! A search over forms, delays and orders finds a response in any two records; what it found says little of whether
-//! there is one. The question is asked beforehand, of all forms at once. Both channels are whitened by an
+//! A search over forms, delays and orders finds a response in any two records; what it found carries little information
+//! about whether there is one. The question is asked beforehand, of all forms at once. Both channels are whitened by an
 //! autoregression each, so that nothing slow counts for many samples. At the frequencies `omega_k` of the record up to
-//! [`HIGHEST_RAD_S`] the whitened output is regressed on a gain, a lead and a lag of e after a usual neuromuscular
+//! [`HIGHEST_RAD_S`] the whitened output is regressed on a gain, a lead and a lag of e after a typical neuromuscular
 //! system and a delay,
 //!
 //! `U_k = (A_u/A_e) N e^{-j omega tau} (b_1 + b_2 j omega + b_3/(j omega + a)) E_k + R_k`,
@@ -58,13 +58,13 @@ impl Response {
         (self.reached_by + 1) as f64 / (self.surrogates + 1) as f64
     }
 
-    /// That there is none, where the records do not tell otherwise.
+    /// That there is none, where the records do not determine otherwise.
     pub fn finding(&self) -> Option<Finding> {
         (self.reached_by > 0).then(|| {
             Finding::undetermined(
                 "no-response",
                 format!(
-                    "no response of u to e can be told from chance: {} of {} pairs of records with the same spectra and \
+                    "no response of u to e can be distinguished from chance: {} of {} pairs of records with the same spectra and \
                      no relation show as much (p = {:.2}); check that both channels are of one run, and which is which",
                     self.reached_by,
                     self.surrogates,

@@ -1,5 +1,5 @@
-//! What speaks against an operator: gains that are not told from zero, poles of no person, a delay
-//! at the end of its range.
+//! What speaks against an operator: gains that are not distinguished from zero, poles of no person,
+//! a delay at the end of its range.
 
 use std::f64::consts::PI;
 
@@ -95,7 +95,7 @@ pub fn neuromuscular_finding(omega_nm_rad_s: f64, zeta_nm: f64, sample_time: Sam
     Some(Finding::doubt(
         "neuromuscular-lag",
         format!(
-            "{what}: the two poles have become a lag and say nothing of the neuromuscular system; take the grey box or the \
+            "{what}: the two poles have become a lag and carry no information about the neuromuscular system; take the grey box or the \
              operator family, or a model of another order"
         ),
     ))
@@ -114,13 +114,13 @@ fn not_determined(open: &[String]) -> Option<Finding> {
     })
 }
 
-/// A delay in s at the end of the range in which it was sought.
+/// A delay in s at the end of the range in which it was searched for.
 pub(super) fn delay_finding(tau_s: f64, (low, high): (f64, f64), of: &str) -> Option<Finding> {
     (high > low && (tau_s <= low || tau_s >= high)).then(|| {
         Finding::doubt(
             "delay-at-bound",
             format!(
-                "the delay{of} {tau_s:.3} s lies at the end of the range {low:.3} to {high:.3} s in which it was sought; \
+                "the delay{of} {tau_s:.3} s lies at the end of the range {low:.3} to {high:.3} s in which it was searched for; \
                  widen it"
             ),
         )

@@ -1,4 +1,4 @@
-//! What a stretch of data says against an operator that was found otherwise: one step towards its own fit.
+//! What a stretch of data shows against an operator that was found otherwise: one step towards its own fit.
 //!
 //! The operator stays constant, a noise model `D v = eps` of order [`NOISE`] is fitted to what it leaves of u, and with
 //! `psi = -d eps/d eta` for `eta = [K_e, K_e_dot, omega_nm, zeta_nm, tau_e]`
@@ -54,8 +54,8 @@ impl OperatorStep {
     }
 }
 
-/// The steps of K_e, K_e_dot (s), omega_nm (rad/s), zeta_nm and tau_e (s). `None` where the record is too
-/// short or says nothing.
+/// The steps of K_e, K_e_dot (s), omega_nm (rad/s), zeta_nm and tau_e (s). `None` where the record is too short or
+/// carries no information.
 pub fn operator_step(operator: &OperatorParameters, record: &Record) -> Option<[OperatorStep; OPERATOR]> {
     let ts = record.sample_time();
     let eta = delayed_parameters(operator);

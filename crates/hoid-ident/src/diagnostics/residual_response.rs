@@ -1,11 +1,11 @@
 //! Whether a response to the error is left that a model does not have.
 //!
-//! Of a model that is linear in what it has to estimate, `u = X b + v`, the columns X are known: responses
-//! of a basis, their derivatives by what is held, a level. With an autoregression `D v = eps` of order
-//! [`NOISE`] the question is whether further taps on e say anything about eps, Z in place of the
-//! impulse response that X cannot have: means of e over [`TAPS`] spans of [`TAP_S`] one after another. By the
-//! statistic of the Lagrange multiplier (T. S. Breusch and A. R. Pagan, *Review of Economic Studies* 47 (1980)
-//! 239-253; L. Ljung, *System Identification*, 1999, section 16.6, for the residuals of a model)
+//! Of a model that is linear in what it has to estimate, `u = X b + v`, the columns X are known: responses of a basis,
+//! their derivatives by what is held, a level. With an autoregression `D v = eps` of order [`NOISE`] the question is
+//! whether further taps on e carry information about eps, Z in place of the impulse response that X cannot have: means
+//! of e over [`TAPS`] spans of [`TAP_S`] one after another. By the statistic of the Lagrange multiplier (T. S. Breusch
+//! and A. R. Pagan, *Review of Economic Studies* 47 (1980) 239-253; L. Ljung, *System Identification*, 1999, section
+//! 16.6, for the residuals of a model)
 //!
 //! `s(t) = z(t) eps(t)`, z what is left of D Z when D X and the lags of v are taken out,
 //!
@@ -123,8 +123,8 @@ mod tests {
 
     const TS: f64 = 0.02;
 
-    /// e, the column that is known and u: `e(t) = .98 e(t-1) + w - .3 v(t-1)`, `u = e(t-2) + echo e(t-20) + v`,
-    /// v autoregressive, louder where `loud` says so.
+    /// e, the column that is known and u: `e(t) = .98 e(t-1) + w - .3 v(t-1)`, `u = e(t-2) + echo e(t-20) + v`, v
+    /// autoregressive, louder where `loud` reports it.
     fn loop_of(seed: u64, echo: f64, loud: impl Fn(usize) -> f64) -> (Vec<f64>, Vec<f64>, Vec<f64>) {
         let mut seed = seed;
         let n = 3000;

@@ -1,4 +1,4 @@
-//! Second fits to the records with something taken out, and what they say of the first.
+//! Second fits to the records with something taken out, and what they report about the first.
 //!
 //! | without | where the fit differs, this carries it | finding |
 //! |---|---|---|
@@ -194,7 +194,7 @@ pub fn of_sigmoid(estimator: &SigmoidChange, fit: &SigmoidFit, records: &[Record
     if fit.change_found() != other.change_found() {
         return Some(Finding::doubt(
             "leverage",
-            "few samples carry the fit: with each held to its neighbours the records say something else about a change; \
+            "few samples carry the fit: with each held to its neighbours the records show something else about a change; \
              look at the recording",
         ));
     }

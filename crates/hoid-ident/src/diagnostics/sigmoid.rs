@@ -67,7 +67,7 @@ impl SigmoidFit {
             match parameter.remark {
                 Some(Remark::AtBound) if name == "tau_e" => all.push(Finding::doubt(
                     "delay-at-bound",
-                    format!("the delay {value:.3} s lies at the end of the range in which it was sought; widen it"),
+                    format!("the delay {value:.3} s lies at the end of the range in which it was searched for; widen it"),
                 )),
                 // A pure integration, or a lag that is none.
                 Some(Remark::AtBound) if name == "T_I" => all.push(Finding::note(
@@ -102,8 +102,8 @@ impl SigmoidFit {
     }
 }
 
-/// What of operators of the family is not told from zero, and poles of no person. A gain or a lead
-/// that is open is named; where neither end has a response, nothing is known.
+/// What of operators of the family is not distinguished from zero, and poles of no person. A gain
+/// or a lead that is open is named; where neither end has a response, nothing is known.
 fn family_findings(operators: &[(&str, &ChangedOperator)], sample_time: SampleTime) -> Vec<Finding> {
     let mut all = Vec::new();
     let mut open = Vec::new();
@@ -143,7 +143,7 @@ fn family_findings(operators: &[(&str, &ChangedOperator)], sample_time: SampleTi
             ),
         ));
     }
-    // An error of T_I as large as half of it: 1/T_I is not told from zero.
+    // An error of T_I as large as half of it: 1/T_I is not distinguished from zero.
     if first.get("T_I").as_ref().is_some_and(is_open) {
         all.push(Finding::note(
             "lag",

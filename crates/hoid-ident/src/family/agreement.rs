@@ -20,9 +20,9 @@
 //! **Coordinates that count** are determined by the data and owe less than a quarter to the prior
 //! in each method: a resonance above the lines is the prior in one method and not in the other.
 //!
-//! The gain is compared as `ln |Y|` in the middle of the band of manual control. Gain and lead
-//! time, or gain and lag, make up for each other along a curve, K T_L nearly constant, and what lies
-//! apart on a curve is not apart for it: a straight line through one of them would say so.
+//! The gain is compared as `ln |Y|` in the middle of the band of manual control. Gain and lead time, or gain and lag,
+//! make up for each other along a curve, K T_L nearly constant, and what lies apart on a curve is not apart for it: a
+//! straight line through one of them would report it.
 //!
 //! T is chi-square with as many degrees of freedom. Of several pairs the smallest probability counts,
 //! times their number (Bonferroni): a test at 1 % doubts one person in a hundred at most whose

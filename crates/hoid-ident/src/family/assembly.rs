@@ -1,5 +1,5 @@
-//! From the searches of the forms that count to the result: operators with their errors, averaged over
-//! forms; for the form in front what the methods say of each other; and the verdict.
+//! From the searches of the forms that count to the result: operators with their errors, averaged over forms; for the
+//! form in front what the methods report about each other; and the verdict.
 //!
 //! The order matters: both methods are compared with their own errors, and only then does their
 //! difference become a part of the errors of the operator (`Covariances::add_bias`).
@@ -71,7 +71,7 @@ pub(super) struct Chosen<'p, 'a> {
 }
 
 impl<'a> Chosen<'_, 'a> {
-    /// All that is said of the person.
+    /// All that is informed of the person.
     ///
     /// # Errors
     /// Those of the model.
@@ -444,7 +444,7 @@ fn coherent_share(describing: &DescribingFunction) -> Option<f64> {
 }
 
 /// Whether a form next to the one in front knows the response: one whose parameters make up for each other, the data
-/// leave as open as if they were fewer, and their errors say nothing.
+/// leave as open as if they were fewer, and their errors carry no information.
 fn knows_the_response(of: &OperatorInForm) -> bool {
     let errors = response_errors(&of.operator, of.covariance.as_deref());
     errors.is_some_and(|all| all.iter().sum::<f64>() < LARGEST_RESPONSE_ERROR * all.len() as f64)

@@ -102,8 +102,8 @@ fn retain(counting: &mut [Option<f64>], is_good: impl Fn(usize) -> bool) {
     }
 }
 
-/// True where a combination of parameters is open, or the gain is not told from zero: the other parameters of the
-/// form are then shares of nothing, and a form with fewer of them says the same.
+/// True where a combination of parameters is open, or the gain is not distinguished from zero: the other parameters of
+/// the form are then shares of nothing, and a form with fewer of them states the same.
 fn is_open(fit: &PredictionFit<'_>) -> bool {
     let p = fit.parameters();
     let known = |covariances: Covariances| {

@@ -1,4 +1,4 @@
-//! Within what the coordinates of an operator are sought.
+//! Within what the coordinates of an operator are searched for.
 
 use hoid_model::{
     SampleTime,

@@ -20,7 +20,7 @@ use crate::{Termination, diagnostics::residuals::ResidualMeasures};
 const LARGEST_REDUCED_CHI_SQUARED: f64 = 3.0;
 /// Level below which methods do not agree, and below which a free model refutes the form.
 const LEVEL: f64 = 0.01;
-/// Loss above that of a free model beyond which a refuted form is said to be so.
+/// Loss above that of a free model beyond which a refuted form is reported to be so.
 const LARGEST_EXCESS_LOSS: f64 = 0.01;
 /// Relative error of the response, at its best, beyond which nothing is known of the person.
 pub(super) const LARGEST_RESPONSE_ERROR: f64 = 0.5;
@@ -83,7 +83,7 @@ pub(super) fn findings(judged: &DiagnosticInputs<'_>) -> Vec<Finding> {
         all.push(Finding::doubt(
             "delay-at-bound",
             format!(
-                "the delay {tau:.3} s lies at the end of the range {low} to {high} s in which it was sought; widen it"
+                "the delay {tau:.3} s lies at the end of the range {low} to {high} s in which it was searched for; widen it"
             ),
         ));
     }
@@ -120,7 +120,7 @@ pub(super) fn findings(judged: &DiagnosticInputs<'_>) -> Vec<Finding> {
     all
 }
 
-/// Forms that the data do not tell apart.
+/// Forms that the data do not distinguish.
 fn unsettled(weighed: &[WeighedForm]) -> Option<Finding> {
     let front = weighed.first().filter(|front| front.weight < SETTLED_WEIGHT)?;
     let mut all: Vec<&WeighedForm> = weighed.iter().filter(|w| w.weight >= 1.0 - SETTLED_WEIGHT).collect();
@@ -136,7 +136,7 @@ fn unsettled(weighed: &[WeighedForm]) -> Option<Finding> {
     ))
 }
 
-/// True where it rests at the end of what is sought: it has no error of its own.
+/// True where it rests at the end of what is searched for: it has no error of its own.
 fn at_bound(parameter: &Parameter) -> bool {
     parameter.standard_error.is_none()
 }
@@ -208,7 +208,7 @@ fn determined(judged: &DiagnosticInputs<'_>, all: &mut Vec<Finding>) {
         all.push(Finding::doubt(
             "neuromuscular-lag",
             format!(
-                "zeta_nm = {:.1}: the neuromuscular poles have become lags and say nothing of muscles; take a form with a lag, or \
+                "zeta_nm = {:.1}: the neuromuscular poles have become lags and carry no information about muscles; take a form with a lag, or \
                  --neuromuscular no",
                 zeta.value
             ),

@@ -61,7 +61,7 @@ impl Errors {
 }
 
 /// Intervals by profile likelihood of the elements whose interval reaches the end of what is
-/// sought: there the criterion is not a parabola.
+/// searched for: there the criterion is not a parabola.
 fn profiles(
     fit: &PredictionFit<'_>,
     covariances: Option<&Covariances>,

@@ -1,4 +1,4 @@
-//! What the error does between its samples, which no sample says and the delay depends on.
+//! What the error does between its samples, which no sample shows and the delay depends on.
 //!
 //! | name | the error | response of the samples to the operator's | tau_e |
 //! |---|---|---|---|

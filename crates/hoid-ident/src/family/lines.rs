@@ -16,7 +16,7 @@ use crate::frequency::DescribingFunction;
 
 /// Degrees of freedom nu_0 of what a variance is drawn towards.
 const PRIOR_FREEDOM: f64 = 8.0;
-/// Runs from which on their scatter has a say in c.
+/// Runs from which on their scatter has a report in c.
 const FEWEST_RUNS: usize = 3;
 
 /// The lines of one or several runs.

@@ -22,7 +22,7 @@ use super::open_loop::{Crossover, followed_margin_deg};
 
 /// Where crossings are looked for, rad/s.
 const RANGE_RAD_S: (f64, f64) = (0.05, 60.0);
-/// Largest phase margin that is believed of a person, deg.
+/// Largest phase margin that is trusted of a person, deg.
 const FARTHEST_MARGIN_DEG: f64 = 120.0;
 /// Quantile of 95 % of chi-squared with two degrees of freedom.
 const CHI_SQUARED: f64 = 5.991_464_547_107_979;
@@ -39,14 +39,14 @@ pub struct KnownResponse {
     pub relative: Option<[[f64; 2]; 2]>,
 }
 
-/// Everything that an open loop says without being asked for one crossing.
+/// Everything that an open loop shows without being asked for one crossing.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LoopShape {
     /// All frequencies in rad/s at which `|L| = 1`, the lowest first, each with its phase margin in deg.
     pub crossovers: Vec<(Estimate, Estimate)>,
     /// The frequency in rad/s at which L crosses the negative real axis nearest to -1, with the gain margin in dB.
     pub gain_margin: Option<(Estimate, Estimate)>,
-    /// Closed-loop poles in the right half plane; `None` where that cannot be told.
+    /// Closed-loop poles in the right half plane; `None` where that cannot be determined.
     pub unstable_poles: Option<usize>,
     /// Least chi-squared of a loop at the limit of stability; `None` without a covariance.
     distance: Option<f64>,
@@ -113,14 +113,14 @@ impl LoopShape {
         self.crossovers.iter().copied().min_by(nearest)
     }
 
-    /// True where the closed loop is stable; `None` where that cannot be told.
+    /// True where the closed loop is stable; `None` where that cannot be determined.
     pub fn is_stable(&self) -> Option<bool> {
         self.unstable_poles.map(|count| count == 0)
     }
 
-    /// What the loop says against who is said to have held it: a record that stays bounded was made in a stable loop,
-    /// which has a crossover and no phase margin below zero, and a person's has none above 120 deg. `reach_deg` is half
-    /// of the 95 % interval of the margin at the lowest crossover. `None` where nothing is against it.
+    /// What the loop shows against the assumed operator: a record that stays bounded was made in a stable loop, which
+    /// has a crossover and no phase margin below zero, and a person's has none above 120 deg. `reach_deg` is half of
+    /// the 95 % interval of the margin at the lowest crossover. `None` where nothing is against it.
     pub fn doubt(&self, reach_deg: f64) -> Option<Finding> {
         let remedy = "check the controlled element, the signs and units of e and u and the time between them";
         let (Some((crossover, _)), Some(margin)) = (self.crossovers.first(), self.followed_deg) else {

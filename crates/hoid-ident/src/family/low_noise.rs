@@ -299,7 +299,7 @@ mod tests {
             (held.intersample, held.delay_if_straight_s(0)),
             (Intersample::Zoh, None)
         );
-        // Straight lines, of a delay that is half a sample longer than this model says.
+        // Straight lines, of a delay that is half a sample longer than this model shows.
         let straight = fitted(record(&truth().interpolate(ts).unwrap(), 0.0));
         assert!(worst(&straight, 0.243 + 0.0125) < 1e-10);
         assert_eq!(

@@ -3,14 +3,13 @@
 //! `u = Y e + (C/D) eps` with Y an operator of the family ([`hoid_model::operator_family`]). People differ from a
 //! simulation in three ways that decide whether their parameters mean anything: they integrate slow errors (a lag that
 //! the operator must have), their remnant is not a filter of first order (the noise model must be rich), and they vary
-//! (error bars must come from the scatter between runs). What the data do not determine is said to be so.
+//! (error bars must come from the scatter between runs). What the data do not determine is reported to be so.
 //!
 //! 1. The describing function at the lines of a periodic excitation, where one was recorded
 //!    ([`crate::frequency`]); each form is fitted to it ([`LineFit`]). Without one, the response of
 //!    an ARX model of high order gives the starts.
-//! 2. Each form by prediction error, with an autoregressive (or ARMA) noise model whose order
-//!    Akaike's criterion chooses, and a weak prior on what seconds of tracking do not tell
-//!    ([`OperatorPrior`]).
+//! 2. Each form by prediction error, with an autoregressive (or ARMA) noise model whose order Akaike's criterion
+//!    chooses, and a weak prior on what seconds of tracking do not determine ([`OperatorPrior`]).
 //! 3. Forms are weighed by Akaike's criterion ([`FormFigures`]), and estimates averaged over those that the data
 //!    leave ([`WeighedForm`]).
 //! 4. Errors by the scatter of runs or blocks; intervals in coordinates that are nearly normal, by

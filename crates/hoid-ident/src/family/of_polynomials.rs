@@ -1,7 +1,8 @@
 //! The operator of the family that polynomials stand for: `q^-nk B/F` (or `B/A`) back to K, T_L,
 //! T_I, omega_nm, zeta_nm and tau_e.
 //!
-//! The poles say which is the lag and which are the neuromuscular system ([`super::pole_reading`]).
+//! The poles show which is the lag and which are the neuromuscular system
+//! ([`super::pole_reading`]).
 //!
 //! The exact model of an operator ([`FamilyOperator::hold`]) has fewer parameters than B has
 //! coefficients, so that estimated polynomials lie next to it. The operator is the one whose exact
@@ -234,7 +235,7 @@ impl<'a> Nearest<'a> {
         let ts = sample_time.s();
         let reach = (nk as f64 + 2.0 * LATER[LATER.len() - 1]) * ts;
         let mut limits = coordinates::limits(form, neuromuscular, (0.0, reach), sample_time);
-        // The poles are known: they move by what B has to say of them and no further.
+        // The poles are known: they move by what B has to report about them and no further.
         for (limit, coordinate) in limits.iter_mut().zip(form.coordinates(neuromuscular)) {
             match coordinate {
                 Coordinate::LagRate | Coordinate::LogOmega | Coordinate::LogZeta => {
@@ -464,7 +465,7 @@ mod tests {
 
     #[test]
     fn errors_are_those_of_the_coefficients() {
-        // Each coefficient moved by a small step: the coordinates move as dx/dtheta says.
+        // Each coefficient moved by a small step: the coordinates move as dx/dtheta reports.
         let operator = FamilyOperator::new(Form::LeadLag, true, &LEAD_LAG).unwrap();
         let model = exact(&operator);
         let n = model.theta().len();

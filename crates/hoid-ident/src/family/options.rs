@@ -90,7 +90,7 @@ impl FamilyEstimator {
             };
             if !matches!(name.as_str(), "nc" | "nd") {
                 return Err(refuse(
-                    "the orders nc and nd of the noise alone: the form says the others".to_owned(),
+                    "the orders nc and nd of the noise alone: the form states the others".to_owned(),
                 ));
             }
             if *range.end() > HIGHEST_NOISE_ORDER {

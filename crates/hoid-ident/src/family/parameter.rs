@@ -5,10 +5,10 @@
 //! is long, `1/T_I` has a symmetric error and T_I has none. Intervals are made in the coordinates
 //! and carried over; one that reaches `1/T_I = 0` is open above in T_I and in K.
 //!
-//! **Determined** is what the data say: less than half of the variance before the data is left of
-//! it ([`Parameter::prior_share`]), it does not rest at a bound of what is sought, and its interval
-//! excludes zero; for omega_nm and zeta_nm, whose prior has a scale, that it is known within a
-//! factor of two.
+//! **Determined** is what the data show: less than half of the variance before the data is left of
+//! it ([`Parameter::prior_share`]), it does not rest at a bound of what is searched for, and its
+//! interval excludes zero; for omega_nm and zeta_nm, whose prior has a scale, that it is known
+//! within a factor of two.
 
 use hoid_model::{
     FamilyOperator, Form,
@@ -130,7 +130,7 @@ pub(super) struct CoordinateEstimate<'a> {
     pub covariance: Option<&'a [f64]>,
     /// For each coordinate.
     pub prior_share: &'a [f64],
-    /// For each coordinate, what was sought.
+    /// For each coordinate, what was searched for.
     pub limits: &'a [(f64, f64)],
     /// Intervals by profile likelihood, where there are such.
     pub profile: &'a [Option<(f64, f64)>],
@@ -173,7 +173,7 @@ impl CoordinateEstimate<'_> {
         (inside && c[i * x.len() + i] > 0.0).then(|| c[i * x.len() + i].sqrt())
     }
 
-    /// 95 % of a coordinate, within what was sought.
+    /// 95 % of a coordinate, within what was searched for.
     fn interval(&self, i: usize) -> Option<(f64, f64)> {
         let x = self.operator.coordinates()[i];
         if let Some(profile) = self.profile[i] {
@@ -225,7 +225,7 @@ impl CoordinateEstimate<'_> {
         let interval = self.interval(i);
         match coordinate {
             Coordinate::LagRate => {
-                // Zero up to the bound of what is sought is a pure integration.
+                // Zero up to the bound of what is searched for is a pure integration.
                 let end = |rate: f64| {
                     if rate <= self.limits[i].0 {
                         f64::INFINITY

@@ -2,7 +2,7 @@
 //!
 //! The poles are `s_i = ln z_i / Ts`: a pair of complex poles is the neuromuscular system, the real
 //! one that is left is the lag. Of three real poles each may be the lag; all three readings are
-//! tried by who asks, and what was read is told ([`RealPole`]).
+//! tried by who asks, and what was read is reported ([`RealPole`]).
 
 use hoid_model::{NotConvertible, SampleTime, operator_family::Coordinate, polynomial, polynomial_model::monic};
 
@@ -50,7 +50,7 @@ impl Reading {
         all
     }
 
-    /// A coordinate that the poles say; zero for others.
+    /// A coordinate that the poles show; zero for others.
     pub fn coordinate(&self, wanted: Coordinate) -> f64 {
         let (omega, zeta) = self.neuromuscular.unwrap_or((1.0, 1.0));
         match wanted {

@@ -5,8 +5,9 @@
 //! A prior is next to the data as `kappa sigma^2 sum_i (g_i - m_i)^2/s_i^2`. Its weight is in units
 //! of the innovation variance sigma^2, and of kappa, by how much the variances of clusters (runs,
 //! or blocks of one) exceed those that white residuals would give: people vary in ways that no
-//! stationary noise holds, so that their samples say less than as many of a simulation (M. Ribatet,
-//! D. Cooley and A. C. Davison, *Statistica Sinica* 22 (2012) 813-845, the magnitude adjustment).
+//! stationary noise holds, so that their samples show less than as many of a simulation (M.
+//! Ribatet, D. Cooley and A. C. Davison, *Statistica Sinica* 22 (2012) 813-845, the magnitude
+//! adjustment).
 
 use hoid_model::{
     SampleTime,
@@ -49,7 +50,7 @@ pub(super) struct Prediction<'a> {
     pub sample_time: SampleTime,
     /// What the error does between its samples.
     pub intersample: Intersample,
-    /// Whether the data show that, or somebody has said it.
+    /// Whether the data show that, or somebody has reported it.
     pub course_is_known: bool,
     /// Share of the power of u that an output error leaves, where it is little.
     pub little_noise: Option<f64>,

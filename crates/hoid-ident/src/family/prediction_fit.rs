@@ -89,8 +89,8 @@ impl PredictionFit<'_> {
             .collect()
     }
 
-    /// Elements of eta that were sought, at a bound or off it: what others are uncertain by because
-    /// of one that rests at its bound, where the truth need not be.
+    /// Elements of eta that were searched for, at a bound or off it: what others are uncertain by
+    /// because of one that rests at its bound, where the truth need not be.
     pub fn sought(&self) -> Vec<usize> {
         let limits = &self.criterion.limits;
         (0..limits.len()).filter(|&i| limits[i].0 < limits[i].1).collect()

@@ -1,15 +1,15 @@
 //! What is known of people before they are measured.
 //!
-//! Some seconds of tracking say little about the neuromuscular system: its resonance lies above the
-//! frequencies at which people are excited. A weak prior keeps its parameters where people's are,
-//! and does nothing where the data speak. A positive parameter x has a log-normal prior,
-//! `ln x ~ N(ln centre, spread)`, so that the spread is relative. In the criterion it stands as one
-//! more measurement of the parameter (a maximum a posteriori estimate; L. Ljung, *System
+//! Some seconds of tracking carry little information about the neuromuscular system: its resonance
+//! lies above the frequencies at which people are excited. A weak prior keeps its parameters where
+//! people's are, and does nothing where the data speak. A positive parameter x has a log-normal
+//! prior, `ln x ~ N(ln centre, spread)`, so that the spread is relative. In the criterion it stands
+//! as one more measurement of the parameter (a maximum a posteriori estimate; L. Ljung, *System
 //! Identification*, 1999, section 7.4).
 //!
 //! How much of a result is prior is the ratio of its variance after the data to that before
-//! ([`prior share`](super::Parameter::prior_share)): one means that the data said nothing. By how
-//! much the prior moves the estimate follows from it ([`OperatorPrior::pull`]).
+//! ([`prior share`](super::Parameter::prior_share)): one means that the data carried no
+//! information. By how much the prior moves the estimate follows from it ([`OperatorPrior::pull`]).
 
 use std::{fmt, str::FromStr};
 
@@ -21,7 +21,7 @@ use hoid_model::{
 use super::Parameter;
 use crate::{IdentError, grey_box::objective::Penalty};
 
-/// Spread of a parameter that is in all but name fixed: refused, as `--fix` says so openly. What
+/// Spread of a parameter that is in all but name fixed: refused, as `--fix` reports it openly. What
 /// another fit knows better is taken to be known so well.
 const LEAST_SPREAD: f64 = 1e-3;
 

@@ -60,7 +60,7 @@ pub struct OperatorInForm {
     pub parameters: Vec<Parameter>,
 }
 
-/// Whether the form can be told from a Box-Jenkins model of the same orders.
+/// Whether the form can be distinguished from a Box-Jenkins model of the same orders.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct FreeModel {
     /// Loss of Box-Jenkins with the orders and the delay of the fit.
@@ -129,7 +129,7 @@ pub struct FamilyFit {
     /// What the error does between its samples, as it was fitted.
     #[serde(default)]
     pub intersample: Intersample,
-    /// Whether the data show that, or it was said; else the delay may be half a sample longer
+    /// Whether the data show that, or it was reported; else the delay may be half a sample longer
     /// ([`FamilyFit::delay_if_straight_s`]).
     #[serde(default)]
     pub course_is_known: bool,
@@ -156,7 +156,7 @@ pub(super) fn title(form: Form, neuromuscular: bool, (nc, nd): (usize, usize)) -
 }
 
 impl FamilyFit {
-    /// Form and noise model in a line; [`Fit::title`] of its polynomials says the same.
+    /// Form and noise model in a line; [`Fit::title`] of its polynomials states the same.
     pub fn title(&self) -> String {
         title(self.form, self.neuromuscular, self.noise_orders)
     }
@@ -186,7 +186,7 @@ impl FamilyFit {
     }
 
     /// Delay tau_e in s of a record if its error runs straight from sample to sample, logged from what is faster or
-    /// continuous: half a sample longer, as it was recorded, where nothing shows or says what it does.
+    /// continuous: half a sample longer, as it was recorded, where nothing shows or reports what it does.
     pub fn delay_if_straight_s(&self, record: usize) -> Option<f64> {
         let of = self.operator(record);
         let averaged = of.parameters.iter().find(|p| p.name == Coordinate::Delay.parameter());
@@ -235,9 +235,9 @@ impl FamilyFit {
         omega_rad_s.iter().map(point).collect()
     }
 
-    /// What the loop of a record with a controlled element says against the result: a record that stays
-    /// bounded was made in a stable loop, which has a crossover and no phase margin below zero, and a person's has
-    /// none above 120 deg. `None` where nothing is against it.
+    /// What the loop of a record with a controlled element reports against the result: a record that stays bounded was
+    /// made in a stable loop, which has a crossover and no phase margin below zero, and a person's has none above 120
+    /// deg. `None` where nothing is against it.
     pub fn loop_finding(&self, record: usize, element: &ContinuousTransferFunction) -> Option<Finding> {
         let reach = (self.loop_measures_in_front(record, element))
             .and_then(|found| found.phase_margin_interval)

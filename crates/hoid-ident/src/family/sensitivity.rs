@@ -11,11 +11,10 @@
 //! noise models speak: for each element by itself, since the response in the band of manual control, and with it
 //! crossover and margin, is known from the lines.
 //!
-//! **Without lines** they do not tell all: where e is nearly the remnant alone, above the band of
-//! the forcing function, all noise models share most of the bias. Their squares count one and a half times, and
-//! the neuromuscular system has a variance besides. Both numbers, and the largest share of the
-//! prior with lines, were set on 160 virtual people and held on 160 others; the page *Error bars of
-//! people* has the coverage on a third set.
+//! **Without lines** they do not determine all: where e is nearly the remnant alone, above the band of the forcing
+//! function, all noise models share most of the bias. Their squares count one and a half times, and the neuromuscular
+//! system has a variance besides. Both numbers, and the largest share of the prior with lines, were set on 160 virtual
+//! people and held on 160 others; the page *Error bars of people* has the coverage on a third set.
 
 use hoid_model::operator_family::Coordinate;
 

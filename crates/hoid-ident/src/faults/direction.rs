@@ -8,11 +8,10 @@
 //! and e on u alike; P = [`OWN`], L = [`OTHER`] blocks. In a closed loop such a prediction is consistent
 //! whatever the loop is (L. Ljung, *System Identification*, 1999, section 13.4).
 //!
-//! **Exchanged.** A person answers no sooner than after their delay, a tenth of a second and more; a
-//! controlled element answers at once. The gain of a lag j is by how much the loss grows without b_1:
-//! `R = (V_without - V)/V`. Where e answers u late and u answers e at once, `R` of u beyond
-//! [`AT_ONCE`] and [`TIMES`] times that of e, input and output are exchanged. Where neither answers at
-//! once nothing is said.
+//! **Exchanged.** A person answers no sooner than after their delay, a tenth of a second and more; a controlled element
+//! answers at once. The gain of a lag j is by how much the loss grows without b_1: `R = (V_without - V)/V`. Where e
+//! answers u late and u answers e at once, `R` of u beyond [`AT_ONCE`] and [`TIMES`] times that of e, input and output
+//! are exchanged. Where neither answers at once nothing is reported.
 //!
 //! **Sign.** All that a person does with an error starts in its direction: `sum_j b_j` is positive. It is the wrong
 //! sign where the sum lies [`WRONG`] standard errors below zero.
@@ -33,7 +32,7 @@ const AT_ONCE: f64 = 0.1;
 const TIMES: f64 = 20.0;
 /// Standard errors by which the sum of an answer is negative.
 const WRONG: f64 = 4.0;
-/// Blocks below which nothing is said.
+/// Blocks below which nothing is reported.
 const FEWEST: usize = 200;
 
 /// A wrong direction, and its statistic: the ratio of the growths, or standard errors.

@@ -1,11 +1,10 @@
 //! Stretches in which a channel does not move: frozen, dropped out, idle.
 //!
-//! A *hold* is a run of equal values. A channel in full precision has none, but where it stays at its
-//! largest or smallest value (a rail, which is another matter): [`FROZEN`] equal samples are frozen. A
-//! channel in steps, or a hand that rests, holds by its nature: there a hold is frozen where it is
-//! longer than [`LONGER`] times the length that nine of ten holds do not exceed, [`RESTING_S`] at
-//! least, and e moves meanwhile by half of its deviation or more. At the [rest](super::rest) of a stick
-//! that is told from the holds there. A hold that the channel jumps to and
+//! A *hold* is a run of equal values. A channel in full precision has none, but where it stays at its largest or
+//! smallest value (a rail, which is another matter): [`FROZEN`] equal samples are frozen. A channel in steps, or a hand
+//! that rests, holds by its nature: there a hold is frozen where it is longer than [`LONGER`] times the length that
+//! nine of ten holds do not exceed, [`RESTING_S`] at least, and e moves meanwhile by half of its deviation or more. At
+//! the [rest](super::rest) of a stick that is distinguished from the holds there. A hold that the channel jumps to and
 //! back from, by more than it moves from one sample to the next in 999 of 1000, is a dropout.
 //!
 //! *Idle* is a stretch of [`IDLE_S`] or more in which e and u stay both within [`QUIET`] of their deviations, in each
@@ -20,7 +19,7 @@ use super::{
 
 /// Equal samples that are frozen, in full precision.
 const FROZEN: usize = 6;
-/// Times the usual hold of a channel in steps.
+/// Times the default hold of a channel in steps.
 const LONGER: f64 = 20.0;
 /// Shortest hold of a channel in steps that is frozen, s.
 const RESTING_S: f64 = 3.0;

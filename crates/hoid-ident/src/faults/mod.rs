@@ -18,14 +18,14 @@
 //! | `autoregression`, `robust` | | fits and scales that faults cannot carry |
 //!
 //! Each channel is judged by itself, since its own neighbours know a sample better than any other channel does; only
-//! what *nothing* happens in is told by e and u together. No model of the person is needed. What people do is not a
-//! fault: their remnant comes in pulses and bursts, but through their muscles, and the statistics of the spikes tell
-//! pushes from faults.
+//! what *nothing* happens in is reported by e and u together. No model of the person is needed. What people do is not a
+//! fault: their remnant comes in pulses and bursts, but through their muscles, and the statistics of the spikes
+//! distinguish pushes from faults.
 //!
-//! [`repair`] looks at a record and does what [`FaultHandling`](hoid_model::FaultHandling) says: by default it bridges what lasts
-//! up to [`BRIDGED_S`], cuts the record at what is longer, and leaves segments of [`SHORTEST_S`] or
-//! more, each a record. Faults of more than [`MOST_SPIKES`] of the samples of a channel are told and
-//! not bridged: then the channel is not what is assumed of it.
+//! [`repair`] looks at a record and does what [`FaultHandling`](hoid_model::FaultHandling) says: by default it bridges
+//! what lasts up to [`BRIDGED_S`], cuts the record at what is longer, and leaves segments of [`SHORTEST_S`] or more,
+//! each a record. Faults of more than [`MOST_SPIKES`] of the samples of a channel are reported and not bridged: then
+//! the channel is not what is assumed of it.
 
 mod autoregression;
 mod direction;

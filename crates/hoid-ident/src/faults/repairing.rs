@@ -1,4 +1,5 @@
-//! What becomes of a record with faults: segments, what was done, and what it says of a result.
+//! What becomes of a record with faults: segments, what was done, and what it reports about a
+//! result.
 
 use std::ops::Range;
 
@@ -22,11 +23,11 @@ pub struct RepairedRecord {
     pub segments: Vec<Record>,
     /// What was found, in the order of time.
     pub faults: Vec<Fault>,
-    /// What that says of any result.
+    /// What that reports about any result.
     pub findings: Vec<Finding>,
 }
 
-/// The faults of e and u of a record, repaired as is said, and the spikes of its excitation.
+/// The faults of e and u of a record, repaired as specified, and the spikes of its excitation.
 ///
 /// # Errors
 /// None that a record can give; [`ModelError`] is that of making one.
@@ -111,7 +112,7 @@ pub fn repair(record: &Record, handling: FaultHandling) -> Result<RepairedRecord
             .map(|s| whole.span(whole.time_s(s.start), whole.time_s(s.end)))
             .collect::<Result<_, _>>()?,
     };
-    // Of what is left: faults would say more than the channels do.
+    // Of what is left: faults would states more than the channels do.
     let longest = segments.iter().max_by_key(|segment: &&Record| segment.len());
     faults.extend(
         longest

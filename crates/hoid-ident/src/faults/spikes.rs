@@ -23,11 +23,11 @@
 //! The first samples of a record are looked at backwards, where they are last: a normal autoregression
 //! is the same in both directions.
 //!
-//! A channel without memory, and the last sample of a record, tell the two apart: there a sample beyond [`WILD`] deviations is a
-//! fault. sigma is the median absolute innovation over 0.6745, of the record or of the second around
-//! the sample, whichever is larger: remnants come and go, and follow u. Found faults are bridged, the
-//! autoregression is fitted again, and the search repeats (C. Chen and L. M. Liu, *J. American
-//! Statistical Association* 88 (1993) 284-297).
+//! A channel without memory, and the last sample of a record, distinguish the two: there a sample beyond [`WILD`]
+//! deviations is a fault. sigma is the median absolute innovation over 0.6745, of the record or of the second around
+//! the sample, whichever is larger: remnants come and go, and follow u. Found faults are bridged, the autoregression is
+//! fitted again, and the search repeats (C. Chen and L. M. Liu, *J. American Statistical Association* 88 (1993)
+//! 284-297).
 
 use std::ops::Range;
 

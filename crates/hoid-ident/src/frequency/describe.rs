@@ -83,7 +83,7 @@ impl Line {
     }
 }
 
-/// What one run says by itself.
+/// What one run shows by itself.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RunSummary {
     /// Label of its record.
@@ -100,7 +100,7 @@ pub struct RunSummary {
     pub noise_ratio: f64,
 }
 
-/// A describing function with what the records say next to it.
+/// A describing function with what the records show next to it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DescribingFunction {
     /// The lines, by frequency.

@@ -1,11 +1,10 @@
 //! What makes a describing function doubtful.
 //!
-//! Of n runs with a u that is not related to the excitation, the squared coherence `gamma^2` at a
-//! line exceeds x with the probability `(1 - x)^{n-1}` (N. R. Goodman, 1957, in J. S. Bendat and A.
-//! G. Piersol, *Random Data*, 2010, section 9.2): one of twenty is above
-//! `1 - 0.05^{1/(n-1)}`. So `-(n-1) ln(1 - gamma^2)` is exponential with mean 1, and twice its sum
-//! over K lines has the chi-square distribution with 2K degrees of freedom (R. A. Fisher's
-//! combination of tests): what all lines say together, which two periods are enough for.
+//! Of n runs with a u that is not related to the excitation, the squared coherence `gamma^2` at a line exceeds x with
+//! the probability `(1 - x)^{n-1}` (N. R. Goodman, 1957, in J. S. Bendat and A. G. Piersol, *Random Data*, 2010,
+//! section 9.2): one of twenty is above `1 - 0.05^{1/(n-1)}`. So `-(n-1) ln(1 - gamma^2)` is exponential with mean 1,
+//! and twice its sum over K lines has the chi-square distribution with 2K degrees of freedom (R. A. Fisher's
+//! combination of tests): what all lines show together, which two periods are enough for.
 //!
 //! | finding | severity |
 //! |---|---|
@@ -148,7 +147,7 @@ fn of_coherence(found: &DiagnosticInputs<'_>) -> Option<Finding> {
     let low: Vec<usize> = (0..lines.len())
         .filter(|k| lines[*k].coherence.is_some_and(|c| c < least))
         .collect();
-    // Two periods exclude chance at a single line only near 1, which `few-runs` has said.
+    // Two periods exclude chance at a single line only near 1, which `few-runs` has reported.
     if low.is_empty() || n < 3 {
         return None;
     }

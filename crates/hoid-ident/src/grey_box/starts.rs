@@ -1,6 +1,6 @@
 //! Where the search in physical parameters starts.
 //!
-//! 1. `grid`: delays every 0.04 s over their range with a usual neuromuscular system, then at the
+//! 1. `grid`: delays every 0.04 s over their range with a typical neuromuscular system, then at the
 //!    best of them frequencies and dampings in the range of human operators. The residual is affine
 //!    in K_e and K_e_dot, so that both are eliminated at each point; the noise model is that of one
 //!    T_n. The best points by loss are starts.

@@ -12,7 +12,7 @@
 //!   without its common factor: any nd of them are D, any nf of the rest F, and A and B follow by
 //!   least squares.
 //!
-//! A few steps of the search from each tell which of them lead down.
+//! A few steps of the search from each show which of them lead down.
 
 use hoid_model::{Complex64, Orders, polynomial, polynomial_model::monic};
 

@@ -312,7 +312,7 @@ impl<'a> IvProblem<'a> {
         if !solved.has_full_rank() {
             return Err(IdentError::SingularInstruments {
                 dependence: format!(
-                    "they do not tell the regressors apart: {}",
+                    "they do not distinguish the regressors: {}",
                     solved.describe_dependence(&self.names)
                 ),
             });

@@ -170,7 +170,7 @@ fn by_normal_equations(orders: &Orders, data: &[Data<'_>], first: usize) -> Opti
         theta[i] += correction[i];
         squares -= correction[i] * sign(i) * residuals.products[i];
     }
-    // An exact fit leaves the rounding of the residuals, which QR says better.
+    // An exact fit leaves the rounding of the residuals, which QR reports better.
     if !squares.is_finite() || squares < EXACT * power {
         return None;
     }

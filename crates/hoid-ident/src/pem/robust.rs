@@ -274,7 +274,8 @@ mod tests {
 
     #[test]
     fn what_cannot_be_held_is_fitted_as_it_is() {
-        // A constant error has no neighbours that say anything of it, and no response to find.
+        // A constant error has no neighbours that carry information about it, and no response to
+        // find.
         let clean = simulated(2);
         let e = Channel::new("e", "", vec![1.0; clean.len()]);
         let u = Channel::new("u", "", clean.output().to_vec());

@@ -1,4 +1,4 @@
-//! Within what the parameters of a change are sought.
+//! Within what the parameters of a change are searched for.
 
 use std::collections::BTreeMap;
 
@@ -13,8 +13,8 @@ const ZETA_LIMITS: (f64, f64) = (1e-4, 100.0);
 const LAG_LIMITS_S: (f64, f64) = (1e-3, 1e6);
 /// Largest omega_nm as a share of pi/Ts.
 const HIGHEST_FREQUENCY: f64 = 0.999;
-/// Share of the span at either end in which t_M is not sought by default: less of a record does not
-/// determine two gains.
+/// Share of the span at either end in which t_M is not searched by default: less of a record does
+/// not determine two gains.
 const ENDS: f64 = 0.05;
 /// Largest rate times the sample time: four fifths of the change take two samples (2 ln 9 = 4.4). A
 /// faster one looks the same, and its likelihood would be a staircase in t_M, with a step for each
@@ -24,7 +24,7 @@ pub(crate) const FASTEST: f64 = 2.0;
 /// Largest rate times the sample time that can be given.
 const FASTEST_GIVEN: f64 = 10.0;
 /// Smallest rate times the span: nine tenths of the change fill it (2 ln 19 = 5.9), and its ends
-/// are hardly told from a line.
+/// are hardly distinguished from a line.
 const SLOWEST: f64 = 5.0;
 
 /// What bounds depend on.
@@ -74,8 +74,8 @@ pub(crate) fn limits(
 
 type Range = (f64, f64);
 
-/// Where a parameter has a meaning at all, and where it is sought unless the user says otherwise,
-/// in the units that are typed.
+/// Where a parameter has a meaning at all, and where it is searched for unless the user specifies
+/// otherwise, in the units that are typed.
 fn ranges(layout: &Layout, frame: &Frame, element: Element) -> Result<(Range, Range), IdentError> {
     let (from, to) = frame.span_s;
     let span = to - from;

@@ -30,7 +30,7 @@ pub enum Remark {
     /// It rests at a bound.
     AtBound,
     /// G rests at its upper bound: the change takes no longer than two samples, and how fast it was
-    /// cannot be told.
+    /// cannot be determined.
     Abrupt,
     /// The records show no change (BIC): t_M and G mean nothing, and gains on either side of it are
     /// chosen by chance.
@@ -58,7 +58,7 @@ impl fmt::Display for Remark {
         f.write_str(match self {
             Self::Fixed => "fixed",
             Self::AtBound => "rests at a bound",
-            Self::Abrupt => "at its upper bound: the change takes no longer than two samples, its rate cannot be told",
+            Self::Abrupt => "at its upper bound: the change takes no longer than two samples, its rate cannot be determined",
             Self::NoChange => "the records show no change: take the fit without one",
             Self::ChangePoint => "the change is too fast for a normal error: take the likelihood interval",
             Self::Undetermined => "not determined by the data",
@@ -79,7 +79,7 @@ pub struct Comparison {
     pub bic_difference: f64,
 }
 
-/// What the minimum with a change says next to theta.
+/// What the minimum with a change reports next to theta.
 pub(super) struct Inference {
     /// Variance of the innovations, weighted where the noise level changes.
     pub innovation_variance: f64,

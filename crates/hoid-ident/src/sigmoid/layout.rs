@@ -123,7 +123,7 @@ impl Layout {
         self.form.degree() == self.order()
     }
 
-    /// How many samples more than nk must pass before the state alone tells of the past.
+    /// How many samples more than nk must pass before the state alone reports the past.
     pub fn reach(&self) -> usize {
         if self.has_direct_part() { 2 } else { 0 }
     }

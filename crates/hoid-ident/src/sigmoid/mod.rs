@@ -26,7 +26,7 @@
 //! | `options` | [`SigmoidChange`]: what may be chosen, by fields and by names |
 //! | `estimator` | the fit |
 //! | `layout` | order and meaning of the parameters |
-//! | `bounds` | within what they are sought |
+//! | `bounds` | within what they are searched for |
 //! | `instant` | the sigmoid and the numerator at one time |
 //! | `unit_operator` | responses of each power of s over the poles, with their derivatives |
 //! | `objective` | the criterion and its derivatives |

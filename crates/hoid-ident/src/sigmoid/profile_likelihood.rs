@@ -44,8 +44,8 @@ pub(crate) enum Profile {
 
 /// Whether t_M, with this standard error of a regular parameter, is a change point.
 pub(crate) fn is_change_point(layout: &Layout, theta: &[f64], standard_error: f64) -> bool {
-    // Derivatives at one t_M do not tell about another one a width of the change away: the ends of
-    // a 95 % interval.
+    // Derivatives at one t_M do not determine about another one a width of the change away: the
+    // ends of a 95 % interval.
     2.0 * standard_error >= (-theta[layout.log_rate]).exp()
 }
 

@@ -20,7 +20,7 @@ use crate::linalg::least_squares::{add_scaled, dot, solve_symmetric};
 const SETTLING: f64 = 4.0;
 /// Where the pole is that settles last, when there is no neuromuscular part, 1/s.
 const FAST: f64 = 10.0;
-/// Lead times that a square of a lead is sought at, s: from the first by the factor.
+/// Lead times that a square of a lead is searched for at, s: from the first by the factor.
 const LEADS_S: (f64, f64, usize) = (0.02, 1.12, 60);
 
 /// Responses for given poles, delay and noise model.

@@ -4,12 +4,12 @@
 //! starts, and next to it from the true parameters and from random starts. The lowest loss of all
 //! is the reference; the own starts reach it where their loss is at most 1e-6 (relative) above it.
 //!
-//! **What does not count.** Short records often have their lowest loss at a model that says nothing
-//! about the system: a root of C or F on the unit circle (farther out than 1 - 1e-4), where the
-//! estimated initial state of that root removes a trend or a sinusoid from the record; or common
-//! factors, a zero of B next to a root of F or a root of C next to one of D (closer than 0.01),
-//! where the parameters of both are not determined. Where the reference is such a minimum, the
-//! system is counted apart.
+//! **What does not count.** Short records often have their lowest loss at a model that carries no
+//! information about the system: a root of C or F on the unit circle (farther out than 1 - 1e-4),
+//! where the estimated initial state of that root removes a trend or a sinusoid from the record; or
+//! common factors, a zero of B next to a root of F or a root of C next to one of D (closer than
+//! 0.01), where the parameters of both are not determined. Where the reference is such a minimum,
+//! the system is counted apart.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 mod systems;
@@ -159,7 +159,7 @@ fn own_starts_reach_the_global_minimum_of_a_thousand_systems() {
 
 #[test]
 fn own_starts_reach_the_global_minimum() {
-    // The usual starts alone miss one system in twelve.
+    // The default starts alone miss one system in twelve.
     let [counted, reached, ..] = study(0..60, 6);
     assert!(counted > 50 && reached == counted, "{reached} of {counted}");
 }

@@ -1,7 +1,7 @@
 //! Refined instrumental variables on recorded people.
 //!
-//! The recordings lie in the directory that `HOID_HUMAN_DATA` names; without it the test says so and
-//! passes.
+//! The recordings lie in the directory that `HOID_HUMAN_DATA` names; without it the test reports it
+//! and passes.
 #![allow(clippy::unwrap_used, clippy::print_stdout, clippy::print_stderr)]
 
 use hoid_ident::{Estimator, InstrumentalVariable, Instruments, IvMethod};
@@ -51,7 +51,7 @@ fn trial(text: &str) -> Record {
     .unwrap()
 }
 
-/// What says that it has converged is not worse than the prediction error method by much: on the
+/// What states that it has converged is not worse than the prediction error method by much: on the
 /// border of stability it once was, by half of the loss.
 #[test]
 #[ignore = "minutes; prints the table of all cells"]

@@ -16,7 +16,7 @@ const LEAST_PART: usize = 5;
 const PAUSE: f64 = 10.0;
 /// Rows within which a step that was taken too far is set right.
 const NEAR: usize = 4;
-/// Times that say where a grid starts.
+/// Times that report where a grid starts.
 const BEGIN: usize = 8;
 
 /// Where the rows are on an even grid.
@@ -128,7 +128,7 @@ impl Grid {
 fn follow(times: &[f64], ts: f64, pull: f64, steps: &mut [f64]) {
     steps.fill(1.0);
     let mut owed: Option<usize> = None;
-    // Where a grid starts, the first times together say where it lies: one alone is off by its
+    // Where a grid starts, the first times together report where it lies: one alone is off by its
     // jitter.
     let begin = |i: usize| {
         let ahead = times[i..]

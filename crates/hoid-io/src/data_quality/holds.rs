@@ -2,11 +2,11 @@
 //! on.
 //!
 //! One channel may hold because a hand rests, and two in coarse steps may do so together. A stall
-//! is told by the channel that naturally holds shortest: all hold for longer than `min_c L_c`. For
-//! a channel in steps L is ten times the length that nine of ten of its holds do not exceed; for
-//! one in full precision twice its longest hold while another channel moves, which is 0 unless it
-//! is printed with few decimals: then each hold of all channels is told, unless one of them is in
-//! steps and the hold is of one row. A channel that is alone must be in full precision to be
+//! is reported by the channel that naturally holds shortest: all hold for longer than `min_c L_c`.
+//! For a channel in steps L is ten times the length that nine of ten of its holds do not exceed;
+//! for one in full precision twice its longest hold while another channel moves, which is 0 unless
+//! it is printed with few decimals: then each hold of all channels is reported, unless one of them
+//! is in steps and the hold is of one row. A channel that is alone must be in full precision to be
 //! judged.
 
 use std::ops::Range;

@@ -41,7 +41,7 @@ pub(crate) fn issues_of_signals(
         .collect();
     used.sort_unstable();
     used.dedup();
-    // A frequency to resample to says nothing of the clock of the file.
+    // A frequency to resample to carries no information about the clock of the file.
     let nominal_hz = options.sampling_hz.filter(|_| !options.repair.resample);
     let mut found = of_columns(table, &used, time, nominal_hz, span_rows(table, time, options));
     // A difference may rightly have one constant term, such as a reference of zero.

@@ -24,7 +24,7 @@ pub enum QualityIssueKind {
     Gap,
     /// Times off an even grid.
     Jitter,
-    /// A clock that is off another, or off a usual rate.
+    /// A clock that is off another, or off a typical rate.
     Clock,
     /// A clock whose rate changes.
     Drift,

@@ -12,9 +12,8 @@
 //! | `search` | all of these, for columns that belong together, and for the channels of a record |
 //! | `in_table` | the same for the columns that a record is made of |
 //!
-//! An operator's channel may be smooth, quiet or constant for good reasons: the rules are made so
-//! that simulated operators without faults give no finding (tested), and say of what they find what
-//! it is and not what it means.
+//! An operator's channel may be smooth, quiet or constant for good reasons: the rules are made so that simulated
+//! operators without faults give no finding (tested), and report about what they find what it is and not what it means.
 
 mod grid;
 mod holds;

@@ -45,7 +45,7 @@ pub fn quality_of_record(record: &Record) -> Vec<QualityIssue> {
     })
 }
 
-/// Whether a name says that a column counts time.
+/// Whether a name states that a column counts time.
 pub(crate) fn names_a_clock(name: &str) -> bool {
     let name = name.to_ascii_lowercase();
     ["time", "clock", "stamp"].iter().any(|word| name.contains(word))

@@ -8,9 +8,9 @@ use crate::wording::{counted, decimal, short};
 
 /// Deviation from the grid that is not jitter, sample times; that of `sampling`.
 const JITTER: f64 = 1e-3;
-/// Relative deviation of a clock from a given rate that is told; crystals are within 1e-4.
+/// Relative deviation of a clock from a given rate that is reported; crystals are within 1e-4.
 const OFF: f64 = 2e-4;
-/// The same from a usual rate that nobody gave, and the farthest that still looks like it.
+/// The same from a typical rate that nobody gave, and the farthest that still looks like it.
 const OFF_COMMON: (f64, f64) = (5e-4, 1e-2);
 /// Usual rates of recorders, Hz.
 const COMMON_HZ: [f64; 42] = [

@@ -7,9 +7,9 @@
 //! It is saturated at an end where it stays there as no peak does. In full precision no two values
 //! in a row are equal by chance: three rows at the extreme value are a rail. In steps a peak stays
 //! longest at its top: of a parabola with its top at the far edge of the last step, 3 times as long
-//! there as on average at the next three steps. A rail is told where the rows at the extreme are at
-//! least 6 times as many as that average, with a stay of 5 rows at least, and where the channel
-//! came there and stayed more than once.
+//! there as on average at the next three steps. A rail is reported where the rows at the extreme
+//! are at least 6 times as many as that average, with a stay of 5 rows at least, and where the
+//! channel came there and stayed more than once.
 
 use std::ops::Range;
 
@@ -17,8 +17,8 @@ use super::issue::{QualityIssue, QualityIssueKind, RowSpan, at};
 use super::signals::{Signal, Signals};
 use crate::wording::{counted, short};
 
-/// A quantised channel is told from this step on, as a share of its deviation: its noise has 1e-5
-/// of its power there.
+/// A quantised channel is distinguished from this step on, as a share of its deviation: its noise
+/// has 1e-5 of its power there.
 const COARSE: f64 = 1e-2;
 /// Rows in a row at the extreme that are a rail, for values in full precision and in steps.
 const STAY: (usize, usize) = (3, 5);

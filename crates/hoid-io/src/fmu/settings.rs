@@ -14,7 +14,7 @@ pub const FMU_SETTINGS: &str = "hoid.json";
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct FmuSettings {
     kind: String,
-    /// Parameters that start with other values than usual.
+    /// Parameters that start with other values than typical.
     #[serde(default)]
     parameters: BTreeMap<String, SettingValue>,
     /// Text of the scenario file of an operator.
@@ -35,7 +35,7 @@ enum SettingValue {
 }
 
 impl FmuSettings {
-    /// A unit with its usual parameters.
+    /// A unit with its default parameters.
     pub fn new(kind: FmuKind) -> Self {
         Self {
             kind: kind.name().to_owned(),

@@ -1,7 +1,7 @@
 //! What the rest of the crate knows of a file format: its name, its endings, how it is read and how
 //! it is written.
 //!
-//! A format says all of this in one [`Format`], in its own module of `formats`; reading, writing,
+//! A format states all of this in one [`Format`], in its own module of `formats`; reading, writing,
 //! the survey of a file and all messages go through it.
 
 use std::io::{self, Write};
@@ -58,7 +58,7 @@ pub(crate) enum Reading {
 pub(crate) enum Writing {
     /// Row by row, in bounded memory.
     Rows(RowsStart),
-    /// Each column as one array, which says its length first: all rows have to be there.
+    /// Each column as one array, which reports its length first: all rows have to be there.
     Columns(ColumnsWriter),
     /// Not at all; what the extension stands for, as in "the format of a recorder".
     ReadOnly(&'static str),

@@ -42,7 +42,7 @@ pub(super) fn unpacked(bytes: &[u8], file: &str) -> Result<Vec<u8>, IoError> {
     }
 }
 
-/// What the file next to a table without a header says of it.
+/// What the file next to a table without a header states about it.
 #[derive(Deserialize)]
 struct Sidecar {
     #[serde(rename = "SamplingFrequency")]
@@ -53,7 +53,7 @@ struct Sidecar {
     columns: Vec<String>,
 }
 
-/// The table with a header and a column t, where a file of JSON next to it says both.
+/// The table with a header and a column t, where a file of JSON next to it reports both.
 pub(super) fn with_sidecar(bytes: Vec<u8>, path: &Path) -> Vec<u8> {
     let said = fs::read(path.with_extension("json")).ok();
     let Some(sidecar) = said.and_then(|json| serde_json::from_slice::<Sidecar>(&json).ok()) else {

@@ -30,7 +30,7 @@ pub fn write_atomically(path: &Path, write: impl FnOnce(&mut dyn Write) -> io::R
 /// Makes a directory for results, and those above it, where they are not there yet.
 ///
 /// # Errors
-/// [`IoError::Unwritable`] for what the system says.
+/// [`IoError::Unwritable`] for errors that the operating system reports.
 pub fn make_directory(path: &Path) -> Result<(), IoError> {
     fs::create_dir_all(path).map_err(|source| IoError::Unwritable {
         file: path.display().to_string(),

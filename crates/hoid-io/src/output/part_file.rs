@@ -88,8 +88,8 @@ impl Drop for Part {
     }
 }
 
-/// A file of the usual permissions (those of the umask), where temporary files are otherwise closed
-/// to all others.
+/// A file of the default permissions (those of the umask), where temporary files are otherwise
+/// closed to all others.
 fn make(directory: &Path) -> io::Result<NamedTempFile> {
     let mut builder = tempfile::Builder::new();
     builder.prefix(PREFIX).suffix(SUFFIX);

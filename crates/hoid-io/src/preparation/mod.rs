@@ -4,7 +4,7 @@
 //!
 //! | step | module | what it does |
 //! |---|---|---|
-//! | units | `scaling` | units that the file does not say |
+//! | units | `scaling` | units that the file does not report |
 //! | scale | `scaling` | a channel times a factor, or from one unit to another |
 //! | offset | `offset` | channels that were recorded late are put next to the others |
 //! | rate | `rate` | every M-th sample, or a new sampling frequency, after a low-pass filter |

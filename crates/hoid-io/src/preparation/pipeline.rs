@@ -17,7 +17,7 @@ use crate::IoError;
 /// are called.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Preparation {
-    /// Units by channel that the file does not say.
+    /// Units by channel that the file does not report.
     pub units: BTreeMap<String, String>,
     /// Factors and units by channel.
     pub scale: BTreeMap<String, Scaling>,

@@ -1,8 +1,8 @@
 //! Factors and units of channels: `u=12.5`, `u=12.5:deg`, `e=rad:deg`.
 //!
-//! A factor says by what the numbers of the file are multiplied; after a colon stands the unit that
-//! they then have. Two known units of one kind give the factor themselves, exactly: `rad:deg` is
-//! 180 / pi. Parameters of the operator are ratios of u and e: with e in deg and u in V the gain
+//! A factor reports by what the numbers of the file are multiplied; after a colon stands the unit
+//! that they then have. Two known units of one kind give the factor themselves, exactly: `rad:deg`
+//! is 180 / pi. Parameters of the operator are ratios of u and e: with e in deg and u in V the gain
 //! K_e is in V/deg.
 
 use std::f64::consts::PI;
@@ -48,7 +48,7 @@ const OTHER_NAMES: [(&[&str], &str); 9] = [
     (&["newton", "newtons"], "N"),
 ];
 
-/// A unit by its usual name; one that is not known as it is.
+/// A unit by its default name; one that is not known as it is.
 fn canonical(unit: &str) -> &str {
     let small = unit.to_lowercase();
     let other = OTHER_NAMES
@@ -77,7 +77,7 @@ impl Scaling {
         if factor == 0.0 || !factor.is_finite() {
             return Err(refused(
                 &factor.to_string(),
-                "a factor that is finite and not 0, since a channel times 0 says nothing",
+                "a factor that is finite and not 0, since a channel times 0 carries no information",
             ));
         }
         Ok(Self {
@@ -118,7 +118,7 @@ impl FromStr for Scaling {
             return Self::by(factor, right).map_err(|_| {
                 refused(
                     text,
-                    "a factor that is finite and not 0, since a channel times 0 says nothing",
+                    "a factor that is finite and not 0, since a channel times 0 carries no information",
                 )
             });
         }
@@ -157,7 +157,7 @@ fn refused(found: &str, expected: &str) -> IoError {
 }
 
 impl RecordParts {
-    /// Units that are declared next to the file; what the file says is not overruled.
+    /// Units that are declared next to the file; what the file states is not overruled.
     pub(super) fn declare_units(&mut self, units: &std::collections::BTreeMap<String, String>) -> Result<(), IoError> {
         const STEP: &str = "unit";
         let named = units.iter().map(|(name, unit)| (name.clone(), unit.as_str()));

@@ -88,7 +88,7 @@ fn reach(preparation: &Preparation, late_samples: f64, ts_s: f64) -> f64 {
 }
 
 /// Moves the channels of a wide record, cuts out the span of a narrow one, and does what comes
-/// after the offsets; `None` where that is not possible, and the narrow record says why.
+/// after the offsets; `None` where that is not possible, and the narrow record gives the reason.
 fn moved_within(
     wide: Record,
     narrow: &Record,

@@ -2,8 +2,8 @@
 //!
 //! Reading takes the columns that are asked for, finds the sampling, checks every value in use and
 //! gives a [`Record`], or the error that names the place. Nothing is repaired unless
-//! [`Repair`](crate::Repair) asks for it, and what was repaired is said in the notes. The format
-//! follows from the extension.
+//! [`Repair`](crate::Repair) asks for it, and what was repaired is reported in the notes. The
+//! format follows from the extension.
 
 use std::io::Write;
 use std::path::Path;

@@ -58,7 +58,7 @@ pub fn read_segments(
                     list_of(&trials)
                 ));
             } else {
-                // What is said of the file was said of its first trial.
+                // Report about the file was reported about its first trial.
                 read.notes.clear();
             }
             all.push(read);

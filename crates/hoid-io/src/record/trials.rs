@@ -76,7 +76,7 @@ fn between(begins: &[usize], rows: usize) -> Vec<Range<usize>> {
     from.zip(to).map(|(from, to)| from..to).collect()
 }
 
-/// What a cell says; nothing where it is empty.
+/// What a cell states; nothing where it is empty.
 fn cell(table: &Table<'_>, at: usize, row: usize) -> Option<String> {
     let value = table.columns[at].values[row];
     if value.is_finite() {

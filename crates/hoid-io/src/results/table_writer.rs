@@ -18,7 +18,7 @@ enum Sink {
     Columns(WaitingColumns),
 }
 
-/// Columns that wait for their end, since an array says its length first.
+/// Columns that wait for their end, since an array reports its length first.
 struct WaitingColumns {
     write: ColumnsWriter,
     schema: TableSchema,
@@ -108,7 +108,7 @@ impl TableWriter {
     /// # Errors
     /// [`IoError::UnknownFormat`]; [`IoError::NoColumns`], [`IoError::DuplicateColumn`] or
     /// [`IoError::ChannelName`] for a schema that cannot be written; [`IoError::Unwritable`] for
-    /// what the system says.
+    /// errors that the operating system reports.
     pub fn create(path: &Path, schema: &TableSchema) -> Result<Self, IoError> {
         let format = format_to_write(path)?;
         let name = path.display().to_string();
@@ -159,7 +159,7 @@ impl TableWriter {
     /// Ends the file and puts it in its place.
     ///
     /// # Errors
-    /// [`IoError::Unwritable`] for what the system says.
+    /// [`IoError::Unwritable`] for errors that the operating system reports.
     pub fn finish(mut self) -> Result<(), IoError> {
         if self.waiting.iter().any(|waiting| !waiting.is_empty()) {
             self.group()?;

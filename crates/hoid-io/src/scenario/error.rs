@@ -12,7 +12,7 @@ pub enum ScenarioFileError {
     Unreadable {
         /// The file.
         path: String,
-        /// What the system says.
+        /// Error reported by the operating system.
         reason: String,
     },
     /// No TOML, or keys and types that do not belong to a scenario.

@@ -34,7 +34,7 @@ impl Source<'_> {
             (Some(ts), None) => SampleTime::new(ts).map_err(|error| self.model(error))?,
             (None, Some(rate)) => SampleTime::new(1.0 / rate).map_err(|error| self.model(error))?,
             (Some(_), Some(_)) => {
-                return Err(self.keys("sample_time_s and sampling_rate_hz say the same: give one of them"));
+                return Err(self.keys("sample_time_s and sampling_rate_hz state the same: give one of them"));
             }
         };
         let initial = self.family_state(form, file.neuromuscular, "initial", &file.initial)?;
@@ -146,7 +146,7 @@ impl Source<'_> {
             .find(|(key, value)| value.is_some() && !used.contains(key))
         {
             return Err(self.keys(&format!(
-                "[{table}] has {}, which the form {form} has not, or which says what another key says; it takes {}",
+                "[{table}] has {}, which the form {form} has not, or which reports what another key states; it takes {}",
                 key.0,
                 used.join(", ")
             )));
@@ -367,7 +367,8 @@ impl FamilyStateTable {
         ]
     }
 
-    /// What this leaves out is that of `base`. Of two ways to say the gain it is the one said here.
+    /// What this leaves out is that of `base`. Of two ways to state the gain it is the one reported
+    /// here.
     fn over(&self, base: &Self) -> Self {
         let says_gain = self.k.is_some() || self.k_over_t_i.is_some();
         let gain = |own: Option<f64>, of_base: Option<f64>| if says_gain { own } else { of_base };

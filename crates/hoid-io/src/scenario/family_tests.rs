@@ -101,7 +101,7 @@ fn what_does_not_fit_is_refused_with_its_remedy() {
         (with("form", "sample_time_s = 0\nform"), "line 1: sample_time_s is 0"),
         (
             with("form", "sample_time_s = 0.01\nsampling_rate_hz = 100\nform"),
-            "say the same",
+            "state the same",
         ),
         (more("K_e = 1"), "unknown field `K_e`"),
         (more("[last]\nT_L_s = 0.5"), "add [schedule]"),

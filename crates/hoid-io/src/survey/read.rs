@@ -57,7 +57,8 @@ fn decimal_commas(table: &Table<'_>) -> Vec<String> {
     table.columns.iter().enumerate().filter_map(first_text).collect()
 }
 
-/// Columns of numbers in which some cells are text, or infinite: they are refused when read, and told as they are then.
+/// Columns of numbers in which some cells are text, or infinite: they are refused when read, and reported as they are
+/// then.
 fn unusable(table: &Table<'_>) -> Vec<String> {
     let first = |(at, column): (usize, &Column)| {
         let numbers = column.values.iter().any(|value| value.is_finite());

@@ -2,7 +2,7 @@
 //!
 //! Each format fills a [`Table`]; everything after it (choice of columns, sampling, repair) is the
 //! same for all formats. A value that is missing or no number is NaN here; the file is asked again
-//! what was there only when an error has to say so, which keeps a million rows cheap.
+//! what was there only when an error has to report it, which keeps a million rows cheap.
 
 use std::collections::HashMap;
 use std::ops::Range;
@@ -123,7 +123,7 @@ impl Table<'_> {
 
 /// The remedy for a first row without numbers.
 pub(crate) const UNITS_ROW: &str =
-    "no column has a number there: where that line names the units, remove it and say them with --unit e=deg,u=deg";
+    "no column has a number there: where that line names the units, remove it and report them with --unit e=deg,u=deg";
 
 /// Checks that the names differ, and notes the columns without one.
 pub(crate) fn check_names(names: &[String], file: &str, notes: &mut Vec<String>) -> Result<(), IoError> {

@@ -1,8 +1,7 @@
 //! Error and control by the names that people give their columns.
 //!
-//! A column is meant whose whole name is a usual one, whatever its capitals; else the only one that
-//! has a usual name as a word, as in `Tracking error`, `stick [V]` or `e (deg)`. A single letter counts
-//! as the first word alone.
+//! A column is meant whose whole name is a typical one, whatever its capitals; else the only one that has a common name
+//! as a word, as in `Tracking error`, `stick [V]` or `e (deg)`. A single letter counts as the first word alone.
 
 /// Names of the error, the most telling first.
 const ERRORS: [&str; 6] = ["e", "error", "err", "tracking_error", "tracking error", "e_t"];

@@ -11,7 +11,7 @@
 //!
 //! `--time COLUMN[:unit]` wins over all of them. A unit is that of the name; else that of the size of numbers that
 //! count from 1970 (1e11 s would be the year 5138); else that of the steps: whole numbers at least 5 apart are not s
-//! but the unit in which 2 to 2000 of them are in a second. What is taken is said.
+//! but the unit in which 2 to 2000 of them are in a second. What is taken is reported.
 
 use super::time_choice::{TimeChoice, Unit};
 use crate::IoError;
@@ -40,7 +40,7 @@ const WORDS: [&str; 9] = [
 /// Words for a moment, which may as well be the time of day, or a count.
 const STAMPS: [&str; 5] = ["timestamp", "stamp", "datetime", "date time", "date"];
 
-/// What a name says about a column.
+/// What a name states about a column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum ColumnRole {
     Time(Option<Unit>),

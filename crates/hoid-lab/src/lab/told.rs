@@ -1,4 +1,4 @@
-//! What the pages are told: how the session stands, and the live estimate.
+//! What the pages are reported: how the session stands, and the live estimate.
 
 use std::path::{Path, PathBuf};
 
@@ -15,7 +15,7 @@ use crate::{
 impl Shared {
     /// Sends to the pages that `wants` picks.
     pub(super) fn tell(&self, message: &ToPage<'_>, wants: impl Fn(u64, &Page) -> bool) {
-        // Everything that is said can be written as JSON.
+        // Everything that is reported can be written as JSON.
         let Ok(text) = serde_json::to_string(message) else {
             return;
         };

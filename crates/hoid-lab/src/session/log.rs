@@ -34,7 +34,7 @@ pub struct Event {
     pub stamp_ms: f64,
     /// When the page had it, ms from tick 0.
     pub handled_ms: f64,
-    /// What the device said.
+    /// What the device reported.
     pub raw: f64,
 }
 

@@ -24,11 +24,11 @@ pub struct Logged {
 }
 
 impl Logged {
-    /// Reads it, as far as it is whole: to the end of the last line, in the words of a line that is none,
-    /// and nothing of a file that is not there, which says so in `faults`.
+    /// Reads it, as far as it is whole: to the end of the last line, in the words of a line that is none, and nothing
+    /// of a file that is not there, which reports it in `faults`.
     ///
     /// # Errors
-    /// [`LabError::Io`] for what the system says of a file that is there.
+    /// [`LabError::Io`] for errors that the operating system reports of a file that is there.
     pub fn read(stem: &Stem) -> Result<Self, LabError> {
         let mut logged = Self::default();
         let mut faults = Vec::new();

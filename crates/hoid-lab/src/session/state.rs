@@ -178,7 +178,7 @@ impl Session {
     /// # Errors
     /// [`LabError::Damaged`].
     pub fn read(folder: &Path) -> Result<Self, LabError> {
-        // What the copy says is taken only where the file says nothing: it is one change behind at most.
+        // What the copy shows is taken only where the file carries no information: it is one change behind at most.
         let facts = match Facts::read(&folder.join(FACTS)) {
             Ok(facts) => facts,
             Err(damaged) => Facts::read(&folder.join(FACTS_AGAIN)).map_err(|_| damaged)?,

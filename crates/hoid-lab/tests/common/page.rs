@@ -43,7 +43,7 @@ impl Engine {
         writeln!(self.input, "{question}").unwrap();
         let mut line = String::new();
         self.output.read_line(&mut line).unwrap();
-        serde_json::from_str(&line).unwrap_or_else(|error| panic!("the engine said {line:?}: {error}"))
+        serde_json::from_str(&line).unwrap_or_else(|error| panic!("the engine reported {line:?}: {error}"))
     }
 }
 

@@ -22,7 +22,7 @@ pub struct Person {
 }
 
 impl Person {
-    /// Who has said yes.
+    /// Who has agreed.
     pub fn begin(out: &Path, config: Config) -> Self {
         let lab = Lab::open(out, config, Mode::Sessions, None).unwrap();
         let (sender, heard) = channel();
@@ -67,7 +67,7 @@ impl Person {
         self.say(json!({"type": "finish", "number": number}))
     }
 
-    /// How the session stands, as the page was told last.
+    /// How the session stands, as the page was reported last.
     pub fn state(&self) -> Value {
         let states = self.heard.try_iter().filter_map(|outgoing| match outgoing {
             Outgoing::Text(text) => serde_json::from_str::<Value>(&text).ok(),

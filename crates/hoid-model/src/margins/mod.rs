@@ -9,7 +9,7 @@
 //!
 //! Where there are several, the phase margin nearest to 0 deg and the gain margin nearest to 0 dB
 //! are given, each with its frequency. MATLAB's `margin` and python-control's `margin` choose in
-//! the same way. Margins say nothing about a loop that is not stable, nor whether it is:
+//! the same way. Margins carry no information about a loop that is not stable, nor whether it is:
 //! [`closed_loop_is_stable`] does.
 //!
 //! **Scan.** A logarithmic grid, halved wherever the phase turns by more than 0.5 rad between

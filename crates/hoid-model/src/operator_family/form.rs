@@ -41,7 +41,7 @@ crate::named_choice!(Form, "form of the operator", 8, {
 const LEAK: f64 = 1e-4;
 
 /// A coordinate in which an operator is fitted. Lag and neuromuscular part are fitted in
-/// coordinates whose estimates are nearly normal also where the data say little.
+/// coordinates whose estimates are nearly normal also where the data carry little information.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
 pub enum Coordinate {
     /// K without a lag, `K/T_I` with one.

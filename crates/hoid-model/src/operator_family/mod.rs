@@ -5,8 +5,8 @@
 //! Factors in Electronics 8 (1967) 231-249), with or without the neuromuscular part, and two rivals
 //! for controlled elements of second order ([`Form`]).
 //!
-//! A person who integrates slow errors has a lag with a long T_I. Then K and T_I cannot be told
-//! apart, `K/T_I` can; an operator is therefore held by the coordinates
+//! A person who integrates slow errors has a lag with a long T_I. Then K and T_I cannot be
+//! distinguished, `K/T_I` can; an operator is therefore held by the coordinates
 //! `[K/T_I, T_L, 1/T_I, ln omega, ln zeta, tau]` ([`Coordinate`]), in which `1/T_I = 0`, the pure
 //! integration, is a point like others.
 //!

@@ -151,8 +151,8 @@ impl FamilyOperator {
     /// is there when omega_nm is named. A missing tau_e is zero.
     ///
     /// # Errors
-    /// [`ModelError::Operator`] for a name that is unknown, lacking, or said twice, and for values
-    /// without a meaning; else as [`FamilyOperator::new`].
+    /// [`ModelError::Operator`] for a name that is unknown, lacking, or reported twice, and for
+    /// values without a meaning; else as [`FamilyOperator::new`].
     pub fn of_names(form: Form, pairs: &[(String, f64)]) -> Result<Self, ModelError> {
         let wrong = |reason: String| ModelError::Operator { reason };
         let find = |name: &str| pairs.iter().find(|(n, _)| n == name).map(|(_, v)| *v);

@@ -26,10 +26,9 @@
 //! ([`Decimated::lead_s`]), and the delay is the same at both rates. A ratio u/e of samples has this
 //! lead as a phase, which [`Decimated::lead_s`] takes back.
 //!
-//! **When.** People respond below 10 rad/s and their muscles up to 20 rad/s; at 1000 Hz a
-//! neighbouring sample says next to nothing new, and the poles of every model lie within 2 % of 1.
-//! [`Decimation::Auto`] takes what is recorded at more than 200 Hz to about 100 Hz: by the M for
-//! which the new rate is nearest to it.
+//! **When.** People respond below 10 rad/s and their muscles up to 20 rad/s; at 1000 Hz a neighbouring sample carries
+//! almost no new information, and the poles of every model lie within 2 % of 1. [`Decimation::Auto`] takes what is
+//! recorded at more than 200 Hz to about 100 Hz: by the M for which the new rate is nearest to it.
 //!
 //! | file | what it holds |
 //! |---|---|

@@ -144,7 +144,7 @@ pub struct BodeGrid {
 }
 
 /// Magnitude over phase as one figure, with logarithmic frequency in rad/s. `title` is what a
-/// screen reader says.
+/// screen reader announces.
 pub fn bode_grid(id: &str, title: &str, grid: &BodeGrid) -> String {
     let row = |name: &str, unit: &str, of: fn(&BodeCurve) -> Curve| -> Vec<CurvePanel> {
         let panel = |column: &BodeColumn| CurvePanel {

@@ -96,7 +96,7 @@ pub struct BoxGrid {
     pub least_reach: f64,
 }
 
-/// Box plots as one figure. `title` is what a screen reader says.
+/// Box plots as one figure. `title` is what a screen reader announces.
 pub fn box_plots(id: &str, title: &str, grid: &BoxGrid) -> String {
     let columns = grid.columns.max(1);
     let n = grid.panels.len();

@@ -116,7 +116,7 @@ fn frequencies(found: &Description) -> Vec<f64> {
 }
 
 /// The describing function as points with error bars of 1.96 standard errors, and models as lines.
-/// `title` is what a screen reader says.
+/// `title` is what a screen reader announces.
 pub fn describing(id: &str, title: &str, found: &Description, models: &[ModelCurve]) -> String {
     let lines = &found.function.lines;
     let omega: Vec<f64> = lines.iter().map(|line| line.omega_rad_s).collect();
@@ -161,7 +161,7 @@ pub fn describing(id: &str, title: &str, found: &Description, models: &[ModelCur
     phase.push(points(&phases, name));
     let mut panels = vec![panel("magnitude", "dB", magnitude), panel("phase", "deg", phase)];
     let coherences: Vec<Estimate> = lines.iter().filter_map(|l| l.coherence).map(Estimate::fixed).collect();
-    // Without the excitation it is that of u with e, which says little in a loop.
+    // Without the excitation it is that of u with e, which carries little information in a loop.
     let shown = found.channel.is_some() && coherences.len() == omega.len();
     if let Some(chance) = chance_coherence(found.function.runs.len()).filter(|_| shown) {
         let ends = models.iter().flat_map(|m| m.omega_rad_s.iter()).chain(&omega);

@@ -1,4 +1,4 @@
-//! A figure as a file: its width on paper, and the format that the name of the file says.
+//! A figure as a file: its width on paper, and the format that the name of the file states.
 //!
 //! Every figure is drawn as SVG. PDF, whose lines and letters stay such, and PNG, of [`DPI`] dots an
 //! inch, are made of it with the fonts of the system (feature `pdf-png`).
@@ -22,7 +22,7 @@ pub enum FigureFormat {
 }
 
 impl FigureFormat {
-    /// The format that the ending of a name says; none for another ending.
+    /// The format that the ending of a name states; none for another ending.
     pub fn of(path: &Path) -> Option<Self> {
         let ending = path.extension()?.to_str()?.to_ascii_lowercase();
         match ending.as_str() {

@@ -5,7 +5,7 @@
 //! agree on is little: they add up or replace the shifts of tags within tags, drop tags without
 //! text, trim spaces at the edges of a tag, and place each tag for itself where a text is centred.
 //! So the tags stand one after the other, each with text and with the whole step from the one
-//! before, and spaces at their edges do not break. Where a text with tags starts says `svg`.
+//! before, and spaces at their edges do not break. Where a text with tags starts reports `svg`.
 
 /// Stand in the text of labels for the start and end of a subscript and of a superscript; they
 /// become tags.

@@ -69,7 +69,7 @@ pub struct MapGrid {
     pub mark: String,
 }
 
-/// Maps as one figure. `title` is what a screen reader says.
+/// Maps as one figure. `title` is what a screen reader announces.
 pub fn maps(id: &str, title: &str, grid: &MapGrid) -> String {
     let columns = grid.columns.max(1);
     let n = grid.panels.len();

@@ -1,6 +1,6 @@
 //! One quantity over time, and the range of its ordinate.
 //!
-//! An estimate that leaves its usual range for a moment (T_L where K_e nearly vanishes) must not
+//! An estimate that leaves its default range for a moment (T_L where K_e nearly vanishes) must not
 //! flatten all the rest. The ordinate therefore covers the truth, the batch fits and the estimates
 //! between their 10 and 90 % quantiles, and beyond that the quantiles of 1 and 99 % and the middle
 //! of the bands, as far as one and a half such ranges to either side. Where a truth is known and at
@@ -52,7 +52,7 @@ pub struct TraceCurve {
 /// Range of the ordinate.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Ordinate {
-    /// From quantiles, as the module says.
+    /// From quantiles, as the module states.
     Robust,
     /// This one.
     Within(f64, f64),

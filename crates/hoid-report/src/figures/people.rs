@@ -54,7 +54,8 @@ pub struct PeopleGrid {
     pub abscissa: String,
 }
 
-/// People by condition as one figure, two panels in a row where there are several. `title` is what a screen reader says.
+/// People by condition as one figure, two panels in a row where there are several. `title` is what a screen reader
+/// announces.
 pub fn people_by_condition(id: &str, title: &str, grid: &PeopleGrid) -> String {
     let n = grid.panels.len();
     if n == 0 || grid.places.is_empty() {

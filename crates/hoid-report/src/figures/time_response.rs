@@ -20,7 +20,7 @@ const UPPER: f64 = 150.0;
 const LOWER: f64 = 190.0;
 
 /// Measured (grey), predicted (vermillion) and simulated (blue) output over time: the whole record
-/// above, its middle eighth below, where the prediction can be told from the measurement.
+/// above, its middle eighth below, where the prediction can be distinguished from the measurement.
 ///
 /// The ordinate covers the measured output with half its range to either side; what leaves that (an
 /// unstable model) is cut off. Long records are drawn by the smallest and largest sample of each

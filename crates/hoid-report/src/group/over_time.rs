@@ -14,8 +14,8 @@ use crate::{
 /// Recursions in the order of the colours: as everywhere, RLS blue and RPEM vermillion.
 const METHODS: [(&str, &str); 3] = [("RLS", "ARX (RLS)"), ("RPEM", "BJ (RPEM)"), ("PHYSICAL", "physical")];
 
-/// A figure: panels by name and unit, and the columns of RLS and of the others. The runs of a group do not
-/// say the units of e and u, so that gains have none.
+/// A figure: panels by name and unit, and the columns of RLS and of the others. The runs of a group do not report the
+/// units of e and u, so that gains have none.
 type Row = (&'static str, &'static str, &'static str, &'static str);
 
 const OPERATOR: [Row; 5] = [
@@ -187,7 +187,7 @@ impl GroupReport<'_> {
         rows
     }
 
-    /// When the task of a condition changes, s: as the manifest says, or at the seam of joined
+    /// When the task of a condition changes, s: as the manifest states, or at the seam of joined
     /// runs.
     fn change_s(&self, condition: &str) -> Option<f64> {
         let known = self.manifest.conditions.get(condition).and_then(|facts| facts.change_s);

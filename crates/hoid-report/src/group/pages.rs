@@ -149,7 +149,8 @@ pub fn write_group_pages(manifest: &Manifest, path: &Path, out: &Path) -> Result
 const LONGEST_NAME: usize = 80;
 
 /// The name of the page of each subject: letters and digits, a number after it where another
-/// subject has the name already. File systems that do not tell S1 from s1 are counted as well.
+/// subject has the name already. File systems that do not distinguish S1 from s1 are counted as
+/// well.
 fn page_names(subjects: &[&str]) -> Vec<String> {
     let mut taken = BTreeSet::new();
     let name_of = |subject: &&str| {
@@ -168,7 +169,7 @@ fn page_names(subjects: &[&str]) -> Vec<String> {
 }
 
 /// What was done to the runs and what is wrong with their sampling: a row for all files of which the
-/// same is said.
+/// same is reported.
 fn account(preparation: &OutputTable, trouble: &OutputTable) -> Vec<(String, String)> {
     let mut rows: Vec<(String, String)> = Vec::new();
     for (table, what) in [(preparation, "preparation"), (trouble, "sampling trouble")] {

@@ -12,8 +12,8 @@ use minijinja::{Value, context};
 use super::report::GroupReport;
 use crate::numbers;
 
-/// Names and headings of the parameters, in the order of the table. The runs of a group do not say the
-/// units of e and u, so that what scales with u/e has none.
+/// Names and headings of the parameters, in the order of the table. The runs of a group do not report the units of e
+/// and u, so that what scales with u/e has none.
 const COLUMNS: [(&str, &str); 13] = [
     ("K_over_T_I", "K/T_I"),
     ("K_I", "K_I"),

@@ -17,7 +17,7 @@ use crate::{
     fit_summary, page, tables as of_fits,
 };
 
-/// Most traces of a page: more curves over each other cannot be told apart.
+/// Most traces of a page: more curves over each other cannot be distinguished.
 const MOST_TRACES: usize = 4;
 
 /// What the page is about.

@@ -69,7 +69,7 @@ pub(super) struct OperatorState {
     k: usize,
 }
 
-/// What the operator says of a sample before its error is known.
+/// What the operator shows about a sample before its error is known.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct OperatorOutput {
     /// The response without the error of the sample, before the delay of whole samples.
@@ -143,7 +143,7 @@ impl HeldLoop {
         self.delay == 0 && self.taps[0] != 0.0
     }
 
-    /// What the operator says of the sample that is next.
+    /// What the operator shows about the sample that is next.
     #[inline]
     pub fn answer(&self, state: &OperatorState) -> OperatorOutput {
         let [e1, e2] = state.errors;

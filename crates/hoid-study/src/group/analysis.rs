@@ -6,10 +6,9 @@
 //! states of each, the delay that fits best, and the greatest order of the noise model that the manifest allows. In a
 //! closed loop a noise model that is too small biases the operator, and one run is too short for a great one.
 //!
-//! With the chosen orders, ARX and Box-Jenkins models are fitted to the sub-batches of each run and
-//! to the whole of it, and the recursions start from the fit of the first sub-batch; the family is
-//! fitted to the whole run with the form of the person. A row says what was estimated in which
-//! window; what fails is a row with its reason.
+//! With the chosen orders, ARX and Box-Jenkins models are fitted to the sub-batches of each run and to the whole of it,
+//! and the recursions start from the fit of the first sub-batch; the family is fitted to the whole run with the form of
+//! the person. A row reports what was estimated in which window; what fails is a row with its reason.
 
 use std::path::Path;
 
@@ -41,7 +40,7 @@ pub(super) const RECORD: &str = "record";
 /// Name of the table of people.
 pub(super) const PEOPLE: &str = "people";
 
-/// What all runs of a person in a condition say of each.
+/// What all runs of a person in a condition state about each.
 pub(super) struct FromCell {
     arx: Result<Orders, String>,
     box_jenkins: Result<Orders, String>,
@@ -109,7 +108,7 @@ pub(super) fn analyse_together(manifest: &Manifest, base: &Path, cell: &Cell<'_>
     let late_samples = analysis.rows.condition.offset_samples;
     let people = match (&cell.changes, runs.is_empty()) {
         (Some(reason), _) => vec![Person::without(cell.key(), PersonStatus::Changes, reason)],
-        // The run of a file that cannot be read says so.
+        // The run of a file that cannot be read reports it.
         (None, true) => vec![Person::without(
             cell.key(),
             PersonStatus::Failed,
@@ -199,7 +198,7 @@ impl<'a> RunAnalysis<'a> {
         }
     }
 
-    /// A recursion over the run: one that starts itself is told nothing, another has the orders of the cell and
+    /// A recursion over the run: one that starts itself gets no information, another has the orders of the cell and
     /// starts from a fit of the first window.
     fn track(&mut self, run: &Run, windows: &[Window; 3], method: &Method, from_cell: &FromCell) {
         let label = traces::label_of(method);

@@ -94,7 +94,7 @@ impl AnalysisSettings {
         self.methods.iter().map(of).collect()
     }
 
-    /// The polynomial models that are fitted, in their usual order.
+    /// The polynomial models that are fitted, in their default order.
     ///
     /// # Errors
     /// A name of another structure, or of none.

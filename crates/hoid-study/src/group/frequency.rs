@@ -17,7 +17,7 @@
 //! known, a fit agrees when its crossover is within 10 % and its phase margin within 5 deg of those
 //! of the describing function: about what two experiments with the same person differ by; else when
 //! its distance is below 10 %. Where the task changes within the run, both are averages over what
-//! changes, in different ways, and nothing is said.
+//! changes, in different ways, and nothing is reported.
 
 use std::path::Path;
 
@@ -35,7 +35,7 @@ use super::{
 };
 use crate::{columns::Rows, statistics::median};
 
-/// What the describing functions say: a row a line, and a row a subject and condition.
+/// What the describing functions show: a row a line, and a row a subject and condition.
 pub(super) struct Frequencies {
     pub lines: OutputTable,
     pub margins: OutputTable,

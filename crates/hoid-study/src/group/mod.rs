@@ -4,7 +4,7 @@
 //! |---|---|
 //! | [`Manifest`] | which file is which run of which subject, and what is done with it |
 //! | [`ReadSettings`], [`PreparationSettings`], [`AnalysisSettings`], [`ConditionSettings`] | its tables: how runs are read, prepared and analysed, and what is known of a condition |
-//! | [`inspect`], [`commented`] | a manifest completed by what the files say, with the evidence |
+//! | [`inspect`], [`commented`] | a manifest completed by what the files state, with the evidence |
 //! | [`Pattern`] | subject, condition and run from names of files |
 //! | [`run_group`] | the analysis in a directory, part by part |
 //! | `reading` | runs from files, and what was done to them |

@@ -13,7 +13,7 @@
 //! offset = { stick = 0 }
 //! ```
 //!
-//! Where nothing is said of the rate, what is recorded at more than 200 Hz is decimated to about 100 Hz
+//! If the rate is not specified, what is recorded at more than 200 Hz is decimated to about 100 Hz
 //! ([`hoid_model::resampling`]); `offset_samples` of a condition counts samples as they were recorded, after a factor
 //! or a frequency of one's own those of the new rate.
 
@@ -25,7 +25,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// What is done to the runs before they are analysed. What is left out is not done, or as the group
-/// says.
+/// reports.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct PreparationSettings {
@@ -70,13 +70,12 @@ impl NumberOrText {
 }
 
 impl PreparationSettings {
-    /// Whether it says nothing.
+    /// Whether it carries no information.
     pub fn is_empty(&self) -> bool {
         *self == Self::default()
     }
 
-    /// What is said of the rate: it is one thing with two keys, and a condition that names one of them
-    /// names the rate.
+    /// Report about the rate: it is one thing with two keys, and a condition that names one of them names the rate.
     fn rate<'a>(&'a self, condition: Option<&'a Self>) -> (Option<&'a NumberOrText>, Option<f64>) {
         let of = condition.unwrap_or(self);
         let named = of.decimate.is_some() || of.rate_hz.is_some();
@@ -96,8 +95,8 @@ impl PreparationSettings {
         })
     }
 
-    /// What is done to the runs of a condition: what the condition says, and what the group says of
-    /// the rest.
+    /// What is done to the runs of a condition: what the condition states, and what the group
+    /// reports about the rest.
     ///
     /// # Errors
     /// The key that has no meaning, and why.
@@ -128,7 +127,7 @@ impl PreparationSettings {
     }
 }
 
-/// A factor, or the words for it; auto where nothing is said.
+/// A factor, or the words for it; auto where nothing is specified.
 fn decimation(typed: Option<&NumberOrText>) -> Result<Decimation, String> {
     let Some(typed) = typed else {
         return Ok(Decimation::Auto);
@@ -138,7 +137,7 @@ fn decimation(typed: Option<&NumberOrText>) -> Result<Decimation, String> {
         .map_err(|_| format!("decimate is {text}, expected \"auto\", \"off\", or by how many samples, 1 or more"))
 }
 
-/// What is said of each channel; the second list wins.
+/// Report about each channel; the second list wins.
 fn parsed<T>(
     group: &BTreeMap<String, NumberOrText>,
     condition: &BTreeMap<String, NumberOrText>,

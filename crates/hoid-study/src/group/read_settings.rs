@@ -12,7 +12,7 @@ pub struct ReadSettings {
     pub input: String,
     /// Column of the output.
     pub output: String,
-    /// Column of the time and its unit, as `clock:ms`; t, or a usual name of a time, where it is left out.
+    /// Column of the time and its unit, as `clock:ms`; t, or a common name of a time, where it is left out.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub time: Option<String>,
     /// The trial of each file that is read, as `trial=3`.
@@ -46,7 +46,7 @@ pub enum FaultTreatment {
     /// Short ones are bridged; of a run with long ones the longest part without them counts.
     #[default]
     Bridge,
-    /// They are told.
+    /// They are reported.
     Report,
     /// They are not looked for.
     Keep,

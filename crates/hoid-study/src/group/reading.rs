@@ -1,4 +1,4 @@
-//! Reading the runs of a group as the manifest says, and what was done to them.
+//! Reading the runs of a group as the manifest states, and what was done to them.
 
 use std::path::Path;
 
@@ -167,7 +167,7 @@ pub(super) fn read_files<'a>(
         .collect()
 }
 
-/// A run, read and prepared as the manifest says.
+/// A run, read and prepared as the manifest states.
 pub(super) struct Run {
     pub record: Record,
     /// Where the second file starts, s, for a run that is joined of two.
@@ -233,7 +233,7 @@ pub(super) fn run_of(files: Vec<ReadFile<'_>>) -> Result<Run, String> {
 }
 
 /// What was done to the files of a run and what is wrong with them; nothing for one that cannot be
-/// read, which its estimates say.
+/// read, which its estimates show.
 pub(super) fn account(entry: &RunEntry, files: &[ReadFile<'_>]) -> [(&'static str, OutputTable); 2] {
     let [(steps_name, steps), (trouble_name, trouble)] = schemas();
     let (mut steps, mut trouble) = (Rows::new(&steps), Rows::new(&trouble));

@@ -1,4 +1,4 @@
-//! What a finished group says: what failed, the people, and one verdict on all of it.
+//! What a finished group reports: what failed, the people, and one verdict on all of it.
 //!
 //! | finding | weight | when |
 //! |---|---|---|
@@ -10,8 +10,7 @@
 //! | `fits-failed` | note | other fits, which are rows with their reasons |
 //! | `condition-changes` | note | a condition that changes within its runs has no operator |
 //!
-//! One person whose data say nothing makes the group doubtful and not undetermined: the others
-//! stand.
+//! One person whose data carry no information makes the group doubtful and not undetermined: the others stand.
 
 use std::path::Path;
 
@@ -39,7 +38,7 @@ pub struct RunFailure {
     pub reason: String,
 }
 
-/// What a finished group says.
+/// What a finished group reports.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GroupSummary {
     /// Runs that count.

@@ -188,7 +188,7 @@ pub(super) enum StartValue {
 }
 
 impl EstimatorTable {
-    /// Refuses keys that the method does not look at: a setting without effect would be believed.
+    /// Refuses keys that the method does not look at: a setting without effect would be trusted.
     pub(super) fn check_placement(
         &self,
         method: Option<&Method>,

@@ -61,7 +61,7 @@ impl Variant {
         self.lines.get(at).copied()
     }
 
-    /// Reads the text; a problem is told with the line of the plan.
+    /// Reads the text; a problem is reported with the line of the plan.
     pub fn read<T: serde::de::DeserializeOwned>(&self) -> Result<T, PlanProblem> {
         toml::from_str(&self.text).map_err(|error| {
             let line = error.span().map_or(1, |span| line_at(&self.text, span.start));

@@ -16,7 +16,7 @@ pub(super) const BUDGET: usize = 1 << 25;
 /// Parts of each cell: where they stand and their numbers.
 pub(crate) type PartsOfCell<'a> = BTreeMap<usize, Vec<(&'a Path, u64)>>;
 
-/// Columns that say which cell and which estimator a row is about.
+/// Columns that report which cell and which estimator a row is about.
 pub(super) fn setting_columns(plan: &Plan) -> Vec<(String, ColumnKind)> {
     use ColumnKind::{Real, Text, Whole};
     let mut columns: Vec<(String, ColumnKind)> = Vec::new();

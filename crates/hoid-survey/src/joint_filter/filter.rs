@@ -17,11 +17,11 @@ use crate::known_noise::lead_of;
 
 use super::belief::{Belief, ETA, Model, N};
 
-/// Takes a sample into what is believed; the innovation and its variance as expected.
+/// Takes a sample into what is trusted; the innovation and its variance as expected.
 pub(super) type Update = fn(&Model, &mut Belief, f64, f64) -> [f64; 2];
 
-/// Variance of n over that of the remnant: a coloured remnant tells less than a white one of the
-/// same variance.
+/// Variance of n over that of the remnant: a coloured remnant is less informative than a white one
+/// of the same variance.
 const OUTPUT_NOISE: f64 = 10.0;
 /// Variance of what drives v next to the error within one second, over that of the remnant seen
 /// through K_e_dot.

@@ -50,7 +50,7 @@ pub struct PhysicalModel<S, const N: usize> {
 }
 
 /// The recursion. N is the capacity for parameters, K that for the errors of its filters
-/// ([`ErrorLayout::filter_errors`]; 0 for the usual error bars), L the number of past inputs that
+/// ([`ErrorLayout::filter_errors`]; 0 for the default error bars), L the number of past inputs that
 /// are kept: 2 without tau_e, 3 and the range of the delay with it; at least nc.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PhysicalRpem<S, const N: usize, const K: usize, const L: usize, A> {

@@ -54,8 +54,8 @@ settings! {
         /// Standard deviations beyond which an innovation moves the estimate no further
         #[setting(bounds(Bounds::Positive), default("3.5"))]
         pub limit: Option<f64> = None,
-        /// At each sample what all of a recorded run says of it, by hypotheses run from both ends,
-        /// in place of what the past alone says
+        /// At each sample what all of a recorded run shows about it, by hypotheses run from both
+        /// ends, in place of what the past alone shows
         pub smooth: bool = false,
     }
     groups {
@@ -72,7 +72,7 @@ impl RecursiveMethod for MultipleModelOptions {
     fn about(&self) -> About {
         About {
             name: "multiple-model",
-            help: "a bank of hypotheses of when the person changed, which sets its memory itself and tells of changes",
+            help: "a bank of hypotheses of when the person changed, which sets its memory itself and reports changes",
             source: "Andersson 1985; Willsky and Jones 1976; Adams and MacKay 2007; the book, page A person who changes",
             structures: &[Structure::BoxJenkins, Structure::OutputError, Structure::General],
             defaults: &[],

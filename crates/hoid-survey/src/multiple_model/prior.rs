@@ -36,7 +36,7 @@ const LEVEL_MEMORY_S: f64 = 20.0;
 const DOUBT_S: f64 = 1.0;
 /// Births for which a hypothesis is kept whatever it predicts.
 const PROTECTED_BIRTHS: f64 = 4.0;
-/// Age from which a hypothesis can say what changed, s.
+/// Age from which a hypothesis can report what changed, s.
 const SETTLED_S: f64 = 0.5;
 /// A hypothesis of up to this age stands for a change, s.
 const RECENT_S: f64 = 4.0;

@@ -1,15 +1,15 @@
-//! The two-sided estimate of a recorded run: what all of its samples say of the operator at each of
-//! them.
+//! The two-sided estimate of a recorded run: what all of its samples show about the operator at
+//! each of them.
 //!
 //! After the whitening filter the model of [`crate::kernel::multiple_model`] has no dynamics:
 //! `y(t) = K_e psi_1 + K_e_dot psi_2 + eps`, with signals that the record gives once for all. The
 //! bank of hypotheses may therefore be run over it from either end. At t the run from the front
-//! says `p(eta_t | y_1..y_t) = sum_f P(f) N(m_f, P_f)`, where f says when the person changed last,
-//! and the run from the back `p(y_{t+1}..y_N | eta_t)`, in proportion to `sum_b P(b) N(m_b, P_b)`,
-//! where b says when the person will change next. The product is the two-filter smoother (D. C.
-//! Fraser and J. E. Potter, *IEEE Transactions on Automatic Control* 14 (1969) 387-390), here of
-//! two mixtures (G. Kitagawa, *Annals of the Institute of Statistical Mathematics* 46 (1994)
-//! 605-623): with `S = P_f + P_b`,
+//! reports `p(eta_t | y_1..y_t) = sum_f P(f) N(m_f, P_f)`, where f reports when the person changed
+//! last, and the run from the back `p(y_{t+1}..y_N | eta_t)`, in proportion to
+//! `sum_b P(b) N(m_b, P_b)`, where b reports when the person will change next. The product is the
+//! two-filter smoother (D. C. Fraser and J. E. Potter, *IEEE Transactions on Automatic Control* 14
+//! (1969) 387-390), here of two mixtures (G. Kitagawa, *Annals of the Institute of Statistical
+//! Mathematics* 46 (1994) 605-623): with `S = P_f + P_b`,
 //!
 //! - `m = m_f + P_f S^-1 (m_b - m_f)`, `P = P_f - P_f S^-1 P_f`;
 //! - `P(f, b) ~ P(f) P(b) N(m_b - m_f; 0, S)`: a past and a future that contradict each other are
@@ -234,7 +234,7 @@ fn join(before: &[Side], after: &[Side]) -> Joined {
     }
     pairs.retain(|(log, _)| *log >= most + least);
     let each: Vec<(f64, Joined)> = if pairs.is_empty() {
-        // Nothing could be joined: what the past says alone.
+        // Nothing could be joined: what the past shows alone.
         let shares = before.iter().map(|f| (f.log_weight.exp(), alone(f)));
         shares.collect()
     } else {

@@ -135,7 +135,7 @@ impl<'a> Study<'a> {
         let Some(bands) = traces.parameters.get(parameter) else {
             return Ok(NOTHING);
         };
-        // The median of the few runs that convert says nothing of the others.
+        // The median of the few runs that convert carries no information about the others.
         if OPERATOR.contains(&parameter)
             && self.mean(&query.clone().quantity_of("share_not_convertible"))?.value > ENOUGH
         {

@@ -1,4 +1,4 @@
-//! What the data say of a claim.
+//! What the data show of a claim.
 
 use hoid_study::Statistics;
 
@@ -8,7 +8,7 @@ use super::{
     rules::{self, CellOutcome, CellTest, Part, Verdict},
 };
 
-/// What the data say of a claim.
+/// What the data show of a claim.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Finding {
     /// Whether it holds.
@@ -47,7 +47,7 @@ pub struct Measured {
 }
 
 impl Claim {
-    /// What the data say of it.
+    /// What the data show of it.
     pub fn evaluate(&self, evidence: &Evidence<'_>) -> Finding {
         let found = match self.source {
             Source::Data(measure) => measure(evidence),

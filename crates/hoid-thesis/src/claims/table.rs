@@ -27,7 +27,7 @@ pub fn claims_table(findings: &[(Claim, Finding)]) -> OutputTable {
         ),
     };
     OutputTable {
-        comments: vec!["Statements of the thesis and what the data say of them".to_owned()],
+        comments: vec!["Statements of the thesis and what the data show of them".to_owned()],
         columns: vec![
             text("id", &|claim, _| claim.id.to_owned()),
             text("theme", &|claim, _| claim.theme.title().to_owned()),

@@ -1,4 +1,4 @@
-//! What a comparator is: it follows a record, and says what the operator is at some times.
+//! What a comparator is: it follows a record, and reports what the operator is at some times.
 
 use hoid_ident::settings::Settings;
 use hoid_model::{OperatorParameters, Record, SampleTime, delayed_operator};
@@ -6,7 +6,7 @@ use num_complex::Complex64;
 
 use crate::ThesisError;
 
-/// What a comparator says of itself.
+/// Self-description of a comparator.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct About {
     /// Its name in a plan.
@@ -15,7 +15,7 @@ pub struct About {
     pub help: &'static str,
     /// Author, year, place.
     pub source: &'static str,
-    /// What it is told that a recursion is not, in words; empty for nothing.
+    /// What it is reported that a recursion is not, in words; empty for nothing.
     pub told: &'static str,
 }
 
@@ -72,7 +72,7 @@ impl Followed {
 
 /// A method that is compared with others.
 pub trait Comparator: Settings + Send + Sync {
-    /// What it says of itself.
+    /// Its self-description.
     fn about(&self) -> About;
 
     /// Follows a record.

@@ -8,8 +8,8 @@
 //! `x(k) = sum_i (a_i cos omega_i t_k + b_i sin omega_i t_k) + r(k)`
 //!
 //! for x = e and x = u, all lines at once by least squares: over a whole period of the forcing
-//! function these are its Fourier coefficients, over less than one the lines are told apart as far
-//! as their distances allow. `H(j omega_i) = U(j omega_i)/E(j omega_i)`, `X = a_i - j b_i`. The
+//! function these are its Fourier coefficients, over less than one the lines are distinguished as
+//! far as their distances allow. `H(j omega_i) = U(j omega_i)/E(j omega_i)`, `X = a_i - j b_i`. The
 //! window reaches T/2 into what comes after t; at the ends of the record it is the first or last T.
 
 use hoid_ident::{settings, settings::Bounds};
@@ -22,7 +22,7 @@ use super::{
 use crate::ThesisError;
 
 const NAME: &str = "fourier";
-/// Keeps lines apart that a short window does not tell apart: share of their power.
+/// Keeps lines apart that a short window does not distinguish: share of their power.
 const RIDGE: f64 = 1e-4;
 
 settings! {

@@ -8,7 +8,7 @@
 //! `sum_k lambda^(t-k) (u(k) - g' phi(k))^2 + p var(u) g' K^-1 g`.
 //!
 //! The forcing function has ten lines, which excite twenty directions of nb: without the second term the others are
-//! whatever noise and rounding make of them, and the covariance of the usual form of the recursion grows as lambda^-t
+//! whatever noise and rounding make of them, and the covariance of the common form of the recursion grows as lambda^-t
 //! along them until it is not a covariance. K is the *tuned-correlated* kernel `K_ij = decay^max(i, j)` (T. Chen, H.
 //! Ohlsson and L. Ljung, *Automatica* 48 (2012) 1525-1535), the covariance of a response that decays and is smooth; its
 //! inverse is that of independent increments,

@@ -9,8 +9,9 @@
 //!    and structure is the mean of the two, rounded, and T_n* that of their two time constants of the
 //!    remnant (the text: *the average between the best two sub-batch-fitting estimations made*).
 //! 2. With that n_k*, OLS and PEM of both spans again.
-//! 3. RLS and RPEM with lambda = 1 - 1/256 and P0 = 0.1 I over the run, from the fit of the first span. T_n* is told in
-//!    Table 3 and goes no further here: d1 is a parameter of RPEM and starts with that of its fit, as in section V.B.
+//! 3. RLS and RPEM with lambda = 1 - 1/256 and P0 = 0.1 I over the run, from the fit of the first span. T_n* is
+//!    reported in Table 3 and goes no further here: d1 is a parameter of RPEM and starts with that of its fit, as in
+//!    section V.B.
 //!
 //! Figures show the average over the five runs, as the text draws them, and the median alongside.
 //!

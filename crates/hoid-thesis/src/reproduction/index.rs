@@ -50,7 +50,7 @@ impl IndexPage {
         });
     }
 
-    /// Adds the claims of the text with what the data say of them.
+    /// Adds the claims of the text with what the data show of them.
     pub fn add_claims(&mut self, findings: &[(Claim, Finding)]) {
         let mut theme = "";
         for (claim, finding) in findings {

@@ -61,7 +61,7 @@ fn root_mean_square(squares: &[f64]) -> f64 {
 /// The errors of what was found after the samples `at`.
 ///
 /// # Errors
-/// [`ThesisError::Model`] for a record that does not say what its operator was.
+/// [`ThesisError::Model`] for a record that does not report what its operator was.
 pub fn errors(record: &Record, at: &[usize], omega_rad_s: &[f64], found: &Followed) -> Result<Errors, ThesisError> {
     let mut spans = [const { Vec::new() }; 3];
     let mut parameters = [const { Vec::new() }; 5];

@@ -30,7 +30,7 @@ pub struct MethodErrors {
     pub cell: u64,
     /// Name of the method in the plan.
     pub name: String,
-    /// What it was told next to e and u; empty for nothing.
+    /// What it was reported next to e and u; empty for nothing.
     pub told: &'static str,
     /// Errors by run; why there are none where it failed.
     pub runs: Vec<Result<Errors, String>>,
@@ -42,8 +42,8 @@ pub struct MethodErrors {
 /// estimators before the comparators. `each` is called after every run.
 ///
 /// # Errors
-/// [`ThesisError`] for a scenario that cannot be simulated. A method that fails on a run says so in
-/// its errors.
+/// [`ThesisError`] for a scenario that cannot be simulated. A method that fails on a run reports it
+/// in its errors.
 pub fn survey(plan: &SurveyPlan, each: &(dyn Fn(&str) + Sync)) -> Result<Vec<MethodErrors>, ThesisError> {
     let mut all = Vec::new();
     for cell in &plan.study.cells {

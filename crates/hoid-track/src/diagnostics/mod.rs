@@ -13,7 +13,7 @@
 //! | `undetermined-parameter` | K_e is; where K_e_dot alone is, they answer like a gain (a note) |
 //! | `neuromuscular-lag` | poles of no person, or omega_nm at its bound, in a quarter of the rows |
 //! | `delay-at-bound` | the tracked delay rests at an end of its range in a quarter of the rows |
-//! | `covariance-blown-up` | a standard error 30 times its median: the data say too little to forget |
+//! | `covariance-blown-up` | a standard error 30 times its median: the data carry too little information to forget |
 //! | `steps-shortened` | more than 5 % of the steps made shorter by stability or a bound |
 //! | `faults` | more than 10 % of the samples were faults |
 //! | `held-back` | outliers that the guard held back (a note), in more than 1 % of the samples (a doubt) |
@@ -27,18 +27,18 @@
 //! | `many-changes` | three changes or more, one in half a minute or oftener |
 //! | `supposed` | omega_nm, zeta_nm or tau_e of the last row are what was supposed before the record (a note) |
 //! | `last-row` | the estimate at the end is doubtful or no estimate, whatever the other rows are |
-//! | `not-followed` | what the last seconds of the record say against the last row |
-//! | `structure` | errors of before say more of u than the operator at the end does |
+//! | `not-followed` | what the last seconds of the record show against the last row |
+//! | `structure` | errors of before carry more information about u than the operator at the end does |
 //! | `sign` | the response at .5 rad/s would push the error away, where no controlled element is named |
 //! | `unstable-loop`, `no-crossover` | with the controlled element, the loop of the last row could not have been held |
 //! | `undeclared-change`, `drifting`, `swaying` | the response is not the same where no change is declared |
 //! | `no-answer` | e does not answer to u |
 //! | `not-finite` | an estimate that is not a number |
 //!
-//! `operators` judges the operators of the rows, `recording` what the guard, the head and the end of the
-//! record say, `structure` the form of the operator, `steadiness` whether it is the same throughout, `moment` one
-//! sample. Where the response is known at the end, a gain and a lead that are open, or a lead below zero, are notes:
-//! they are one way to say the response, which may not be theirs.
+//! `operators` judges the operators of the rows, `recording` what the guard, the head and the end of the record show,
+//! `structure` the form of the operator, `steadiness` whether it is the same throughout, `moment` one sample. Where the
+//! response is known at the end, a gain and a lead that are open, or a lead below zero, are notes: they are one way to
+//! report the response, which may not be theirs.
 
 mod moment;
 mod operators;
@@ -59,7 +59,7 @@ use crate::trace::Trace;
 const ROWS: usize = 400;
 /// VAF in % of the simulated start fit below which it explains little.
 const LEAST_START_VAF: f64 = 20.0;
-/// Shares of steps and samples beyond which something is said.
+/// Shares of steps and samples beyond which something is reported.
 const SHORTENED: f64 = 0.05;
 const FAULTS: f64 = 0.1;
 /// Standard error over its median beyond which the covariance has blown up.
@@ -195,7 +195,7 @@ impl Trace {
         Some(Finding::doubt(
             "covariance-blown-up",
             format!(
-                "the standard error of {name} grows to {ratio:.0} times its median: for a while the data say too little{remedy}"
+                "the standard error of {name} grows to {ratio:.0} times its median: for a while the data carry too little information{remedy}"
             ),
         ))
     }

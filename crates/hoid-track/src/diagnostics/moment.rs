@@ -32,7 +32,7 @@ impl Tracker {
         if self.options().method.starts_itself() && self.covariance().is_none() {
             return VerdictLevel::NotDetermined;
         }
-        // Without an error of any of them, nothing says that they are known.
+        // Without an error of any of them, nothing states that they are known.
         let known = |e: &Estimate| e.standard_error.is_some_and(|s| s > 0.0);
         if !self.parameters().iter().any(known) {
             return VerdictLevel::Doubtful;

@@ -20,7 +20,7 @@ pub(super) fn is_other(operator: &Operator) -> bool {
     )
 }
 
-/// Shares of the rows beyond which something is said.
+/// Shares of the rows beyond which something is reported.
 const NOT_CONVERTIBLE: f64 = 0.05;
 const MOST: f64 = 0.5;
 const QUARTER: f64 = 0.25;
@@ -30,7 +30,7 @@ const NEGATIVE_LEAD: f64 = 0.1;
 /// rounding.
 const AT_FASTEST: f64 = 0.4999;
 
-/// What the operators of the rows of a trace say.
+/// What the operators of the rows of a trace report.
 pub(super) fn operator_findings(trace: &Trace, operators: &[Operator]) -> Vec<Finding> {
     let mut all = Vec::new();
     if operators.is_empty() || operators.iter().all(is_other) {
@@ -52,7 +52,7 @@ pub(super) fn operator_findings(trace: &Trace, operators: &[Operator]) -> Vec<Fi
     }
     let rows_with = |is: &dyn Fn(&OperatorEstimate) -> bool| share(found.iter().filter(|o| is(o)).count(), found.len());
     let remembers = trace.options().method.memories().is_some();
-    // Where the response is known, gain and lead are one way to say it, which may not be theirs.
+    // Where the response is known, gain and lead are one way to report it, which may not be theirs.
     let of_response = |finding: Finding| match trace.response_is_known {
         true => Finding {
             severity: Severity::Note,
@@ -74,7 +74,7 @@ pub(super) fn operator_findings(trace: &Trace, operators: &[Operator]) -> Vec<Fi
         all.push(Finding::doubt(
             "neuromuscular-lag",
             format!(
-                "in {:.0} % of the rows the two poles are a lag and say nothing of the neuromuscular system (omega_nm near \
+                "in {:.0} % of the rows the two poles are a lag and carry no information about the neuromuscular system (omega_nm near \
                  or above the Nyquist frequency, or zeta_nm above 3)",
                 100.0 * senseless
             ),
@@ -162,7 +162,7 @@ fn gains_over_rows(rows_with: &ShareOfRows<'_>, remembers: bool) -> Option<Findi
         Finding::note(
             "undetermined-parameter",
             format!(
-                "in {} of the rows no lead is told from zero, and the gain is: they answer like a gain, and T_L and K_e_dot are \
+                "in {} of the rows no lead is distinguished from zero, and the gain is: they answer like a gain, and T_L and K_e_dot are \
                  none of their parameters",
                 percent(no_lead)
             ),

@@ -1,5 +1,5 @@
-//! What the recording itself says of a trace: what the guard did, an idle head, and whether the last
-//! seconds are followed by the last row.
+//! What the recording itself shows about a trace: what the guard did, an idle head, and whether the
+//! last seconds are followed by the last row.
 
 use hoid_ident::diagnostics::{is_open, leads_backwards, operator_step};
 use hoid_model::{Finding, Record};
@@ -96,7 +96,7 @@ impl Trace {
         })
     }
 
-    /// What the last seconds of the record say against the last row: a delay that is another now, or an estimate that
+    /// What the last seconds of the record show against the last row: a delay that is another now, or an estimate that
     /// has not come back. A step of [`operator_step`] that is [`UNLIKELY`] next to its own error and that of the row;
     /// of a delay that is a whole number of samples, beyond one and a half.
     pub(super) fn not_followed(&self, record: &Record) -> Option<Finding> {

@@ -23,7 +23,7 @@ const NO_ANSWER: f64 = 0.05;
 const ABOUT_S: f64 = 5.0;
 
 impl Trace {
-    /// The stretches in which no change is told, in samples of the record.
+    /// The stretches in which no change is reported, in samples of the record.
     fn stretches(&self, record: &Record) -> Vec<Range<usize>> {
         let ts = self.sample_time().s();
         let sample = |t: f64| ((t - record.time_s(0)) / ts).round().clamp(0.0, record.len() as f64) as usize;
@@ -65,7 +65,7 @@ impl Trace {
     }
 
     /// The response goes another way than the trace tells. A method that forgets, or that has a model of how people
-    /// drift, does not say that they are constant between its changes.
+    /// drift, does not report that they are constant between its changes.
     pub(super) fn unsteady_finding(&self, record: &Record) -> Option<Finding> {
         self.options().method.lag_of_basis_s()?;
         let unlikely = |found: &Unsteady| match found.course {

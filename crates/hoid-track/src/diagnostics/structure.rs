@@ -2,8 +2,8 @@
 //!
 //! The numerator, corrections of the poles and of the delay, and a level are what the basis of people can estimate;
 //! together they span the six signals of its filter, and one after its lag once more is the correction of the lag,
-//! where that is all that is missed. Whether the errors before, since the last change, say anything more of u is the
-//! question ([`hoid_ident::diagnostics::residual_response()`]).
+//! where that is all that is missed. Whether the errors before, since the last change, carry more information about u
+//! is the question ([`hoid_ident::diagnostics::residual_response()`]).
 
 use hoid_core::adaptive::basis::{Basis, Point, Signals};
 use hoid_ident::diagnostics::{ResidualResponse, residual_response};
@@ -22,14 +22,14 @@ const SETTLING_S: f64 = 10.0;
 const LAG_S: f64 = 3.0;
 
 impl Trace {
-    /// What the record says against the structure.
+    /// What the record shows against the structure.
     pub(super) fn missed_structure(&self, record: &Record) -> Option<Finding> {
         let found = self.residual_response(record)?;
         (found.p_value < UNLIKELY).then(|| {
             Finding::doubt(
                 "structure",
                 format!(
-                    "structure missed: the errors before say more of u than the operator at the end does, with any gains \
+                    "structure missed: the errors before carry more information about u than the operator at the end does, with any gains \
                      and corrections (p = {:.1e}, {:.1} % of the innovations); its parameters are those of the nearest \
                      person that the method knows",
                     found.p_value,

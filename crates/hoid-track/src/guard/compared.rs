@@ -53,8 +53,8 @@ impl Reference {
         (self.over, self.compared) = (0, SUSPECT_FOR);
     }
 
-    /// Something is unusual: what is said of this block does not count, and the next ones are
-    /// compared.
+    /// Something is unusual: what is reported about this block does not count, and the next ones
+    /// are compared.
     pub fn suspect(&mut self) {
         if self.over >= self.compared {
             self.begin();
@@ -76,7 +76,7 @@ impl Reference {
     /// A block is over; true where the estimate has gone diverged.
     pub fn end_block(&mut self, block: &Block, length: u32) -> bool {
         self.over += 1;
-        // Blocks with samples that were held back say nothing.
+        // Blocks with samples that were held back carry no information.
         let counts = self.over > SETTLING && self.over <= self.compared && block.innovations == length;
         let astray = if counts {
             self.model.end_block(block.innovation)

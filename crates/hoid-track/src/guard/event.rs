@@ -116,7 +116,7 @@ pub struct TrackFault {
 }
 
 impl GuardEvent {
-    /// In times, for what was told at a sample at `now_s`.
+    /// In times, for what was reported at a sample at `now_s`.
     pub fn at(&self, now_s: f64, sample_time: SampleTime) -> TrackFault {
         let ts = sample_time.s();
         let from_s = now_s - self.ago as f64 * ts;

@@ -1,12 +1,12 @@
-//! A guard in front of a recursion: what is done with samples and spans that no tracking makes.
-//! What they are is told by [`hoid_core::guard`].
+//! A guard in front of a recursion: what is done with samples and spans that no tracking makes. What they are is
+//! reported by [`hoid_core::guard`].
 //!
 //! | found | what reaches the recursion | estimate | afterwards |
 //! |---|---|---|---|
 //! | outlier of up to [`LONGEST_S`] | the prediction of e; the recursion's own prediction of u | stays | the recursion is put back to before it and takes the samples again, those that were held back interpolated |
 //! | a jump that stays, a pulse of the hand | the same | stays | the recursion is put back to before it and takes the samples as they came: the result is that without a guard |
 //! | no numbers for longer | the same | stays | goes on once the filters have settled |
-//! | 30 times the usual magnitude | the long-run mean of e, the prediction of u | stays | goes on from there once the filters have settled |
+//! | 30 times the typical magnitude | the long-run mean of e, the prediction of u | stays | goes on from there once the filters have settled |
 //! | frozen, idle, larger or rescaled, swapped, misfit (by blocks of a second) | the samples, into the filters alone | is put back to before it | goes on from there once the span is over and the filters have settled |
 //! | an estimate that has gone diverged by [`hoid_core::guard::reference`] | the samples, into the filters alone | is put back to the start | goes on from there once the filters have settled |
 //!
@@ -38,7 +38,7 @@
 //! | `prime` | the default, from the record of the start span |
 //! | `compared` | the model of the start next to the signals |
 //! | `snapshot` | the numbers of a recursion, kept and put back |
-//! | `event`, `options` | what is told of it, what is chosen |
+//! | `event`, `options` | what is reported of it, what is chosen |
 
 mod blocks;
 mod compared;
@@ -76,7 +76,7 @@ const BLOCK_S: f64 = 1.0;
 /// Sound blocks between two snapshots, and the least age in blocks of one that is gone back to.
 const SOUND_EVERY: u32 = 5;
 const LEAST_AGE: u64 = 4;
-/// Magnitude in units of the usual mean magnitude beyond which a signal is not what it was.
+/// Magnitude in units of the typical mean magnitude beyond which a signal is not what it was.
 const LARGEST: f64 = 30.0;
 /// Least limit of outliers in units of the mean magnitude: e passes a low-pass filter before it
 /// meets an innovation, u is in the innovation itself.
@@ -90,7 +90,7 @@ const GIVEN_UP_S: f64 = 120.0;
 /// What the guard made of a sample.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Guarded {
-    /// What the recursion said; no innovation where the sample did not reach it as it came.
+    /// What the recursion reported; no innovation where the sample did not reach it as it came.
     pub outcome: Option<StepOutcome>,
     /// True where the sample was held back or the estimate is paused.
     pub held: bool,

@@ -19,7 +19,7 @@ use super::Guard;
 const QUANTILES: [(f64, f64); 3] = [(0.5, 0.6745), (0.95, 1.96), (0.99, 2.5758)];
 /// The quantile further in, by its own count.
 const INNER: f64 = 0.9;
-/// Least blocks of a record that says the default.
+/// Least blocks of a record that reports the default.
 const LEAST: usize = 5;
 
 impl Guard {

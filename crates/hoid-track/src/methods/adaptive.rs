@@ -2,7 +2,7 @@
 //! for people, in seconds.
 //!
 //! It needs no start fit: it starts with the defaults for people ([`hoid_core::adaptive::default`]). The delay starts
-//! at that of nk, .2 s where nothing is said, and at half a sample more, for an error that is held.
+//! at that of nk, .2 s where nothing is specified, and at half a sample more, for an error that is held.
 //!
 //! **What is known of the person** before the first sample is `prior`: the default, next to nothing, some parameters,
 //! or an earlier fit, whose estimate and covariance it starts with (`beginning`).
@@ -150,7 +150,7 @@ impl RecursiveMethod for AdaptiveOptions {
     }
 
     fn spread_before(&self) -> Option<[f64; DYNAMICS]> {
-        // What a fit determined is known, whatever the data say.
+        // What a fit determined is known, whatever the data show.
         let known = self.prior.fit().is_some();
         let StartingPoint { point, spread } = StartingPoint::of(&self.prior, 0.0, false, SampleTime::HUNDREDTH).ok()?;
         (!known).then_some([spread[0] * point.omega, spread[1] * point.zeta, spread[2]])
@@ -196,7 +196,8 @@ impl AdaptiveRecursion {
         let supposed = DefaultOperator {
             point,
             spread: beginning.spread,
-            // A structure without a noise model, or with one pole, does not say how it is coloured.
+            // A structure without a noise model, or with one pole, does not report how it is
+            // coloured.
             order: match setup.orders.nd {
                 0 | 1 => defaults::ORDER,
                 nd => nd,

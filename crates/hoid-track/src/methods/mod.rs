@@ -22,7 +22,7 @@ pub use adaptive::AdaptiveOptions;
 pub use rls::RlsOptions;
 pub use rpem::{DEFAULT_LIMIT, RpemOptions, short_for_b};
 
-/// A recursive method with its options; what it says of itself is that of [`RecursiveMethod`].
+/// A recursive method with its options; its self-description is that of [`RecursiveMethod`].
 #[derive(Debug)]
 pub struct Method(Box<dyn RecursiveMethod>);
 

@@ -1,4 +1,4 @@
-"""Libraries from PyPI that fit ARX or Box-Jenkins models or run a recursion, called as their documentation says: pysib, timeseries-toolbox,
+"""Libraries from PyPI that fit ARX or Box-Jenkins models or run a recursion, called as their documentation states: pysib, timeseries-toolbox,
 SIPPY and padasip. Given no start where they take none.
 
 What the answers mean: pysib starts its search at the ARX fit with zeros before the record, SIPPY gives the whole output and its optimiser the

@@ -282,7 +282,7 @@ impl Default for Effort {
     }
 }
 
-/// Runs the work once to warm up, and then as long and as often as the effort says at least.
+/// Runs the work once to warm up, and then as long and as often as the effort reports at least.
 fn median<T>(effort: Effort, mut work: impl FnMut() -> T) -> (f64, T) {
     let begun = Instant::now();
     let mut answer = black_box(work());

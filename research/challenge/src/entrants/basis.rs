@@ -307,7 +307,7 @@ pub(super) fn worth(task: &Task, omega_rad_s: f64) -> [Complex64; GAINS] {
     [common, common * s, common * s * s, Complex64::from(0.0)]
 }
 
-/// What gains say.
+/// What gains show.
 pub(super) fn reported(task: &Task, theta: &Gains, covariance: &Square) -> ReportedResponse {
     let covariance: Vec<f64> = covariance.iter().flatten().copied().collect();
     let each: Vec<_> = task.lines_rad_s.iter().map(|omega| worth(task, *omega)).collect();

@@ -6,7 +6,7 @@
 //! of the fit before. Where nothing changes T would be chi-square with two degrees of freedom, were the remnant white
 //! after the filter of the start and the basis that of this person. As neither is, T is divided by the level at which
 //! it has been so far, from the mean of its logarithm (that of a chi-square is `ln 2 - gamma`), and held against
-//! [`THRESHOLD`]. After an alarm what came before it is forgotten. The response that is said is that of all seconds
+//! [`THRESHOLD`]. After an alarm what came before it is forgotten. The response that is reported is that of all seconds
 //! since, 40 at most.
 
 use std::collections::VecDeque;

@@ -1,8 +1,8 @@
 //! The methods of `hoid_track` with their default options.
 //!
-//! Where the delay is told, it is given; where it is not, it is searched on the start span over the
-//! range that the program searches, the other orders as they are. H is the response that a row or a
-//! tracker tells.
+//! Where the delay is reported, it is given; where it is not, it is searched on the start span over
+//! the range that the program searches, the other orders as they are. H is the response that a row
+//! or a tracker tells.
 
 use hoid_ident::{
     OrderRanges,
@@ -110,7 +110,7 @@ fn over_samples(task: &Task, options: &TrackOptions) -> Result<EntrantResult, St
     Ok(answer)
 }
 
-/// What is said at a time; nothing while one of the responses is not there.
+/// What is reported at a time; nothing while one of the responses is not there.
 fn reported(responses: Option<Vec<Response>>, operator: Option<&OperatorEstimate>) -> ReportedResponse {
     let Some(responses) = responses else {
         return ReportedResponse::default();

@@ -77,7 +77,7 @@ impl FamilyReport<'_> {
             coherence.map_or_else(String::new, |share| format!(
                 "; coherence of u with the excitation {share:.2}"
             )),
-            // Where they do not, a finding says so.
+            // Where they do not, a finding reports it.
             match fit.agreement.is_some() && fit.verdict.findings().iter().all(|found| found.kind != "agreement") {
                 true => "; the methods agree",
                 false => "",
@@ -93,8 +93,8 @@ impl FamilyReport<'_> {
         Ok(page)
     }
 
-    /// What tau_e owes to the course of the error between its samples: the other delay that the data may mean, where half
-    /// a sample is more than the error bar says.
+    /// What tau_e owes to the course of the error between its samples: the other delay that the data may mean, where
+    /// half a sample is more than the error bar reports.
     fn between_samples(&self) -> String {
         let fit = self.fit;
         let named = fit.operator(0).parameters.iter().find(|p| p.name == "tau_e");
@@ -243,7 +243,7 @@ impl FamilyReport<'_> {
         ));
         let quality = self.identified.quality()?;
         page.push_str(&format!(
-            "VAF prediction {:.2} %; simulation {:.2} %, which says little of people: an operator with a lag integrates offset and \
+            "VAF prediction {:.2} %; simulation {:.2} %, which carries little information about people: an operator with a lag integrates offset and \
              drift of e{}.\n",
             quality.vaf_prediction,
             quality.vaf_simulation,

@@ -245,7 +245,7 @@ fn details(found: &PolynomialAnswer<'_>) -> String {
     page.push_str(&text::quality(fit, &found.quality));
     page.push('\n');
     page.push_str(&text::roots(fit));
-    // Residuals that are rounding say nothing.
+    // Residuals that are rounding carry no information.
     if fit.covariance().is_some() {
         page.push_str(&text::residual_tests(found.files, &found.validations));
     }

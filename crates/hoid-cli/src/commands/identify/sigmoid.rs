@@ -171,7 +171,7 @@ impl SigmoidReport<'_> {
             fit.residual_count(),
             numbers::plain(fit.innovation_variance())
         ));
-        // Residuals that are rounding say nothing.
+        // Residuals that are rounding carry no information.
         if fit.covariance().is_some() {
             let mut coloured = false;
             for (file, test) in files.iter().zip(tests) {

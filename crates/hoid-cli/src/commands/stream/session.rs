@@ -48,7 +48,7 @@ pub struct Session {
     event: Option<TrackFault>,
     names: Vec<String>,
     faults: VecDeque<String>,
-    /// That the times go at another rate has been said.
+    /// That the times go at another rate has been reported.
     rate_told: bool,
     /// What they go at.
     rate: Option<Finding>,
@@ -136,7 +136,7 @@ impl Session {
         match line {
             ParsedLine::Nothing => return false,
             ParsedLine::Sample(read) => self.timed(read),
-            // By its time the next line will tell whether a sample is missing.
+            // By its time the next line will show whether a sample is missing.
             ParsedLine::Unreadable(reason) if self.columns.have_time() || !self.columns.are_known() => {
                 self.dropped(format!("{reason}: dropped"));
             }
@@ -149,8 +149,8 @@ impl Session {
         self.lines.is_multiple_of(self.every)
     }
 
-    /// Takes what came as a datagram, of which the samples that count for an answer are told one by
-    /// one. What is not a sample is dropped: it may come from anybody.
+    /// Takes what came as a datagram, of which the samples that count for an answer are reported
+    /// one by one. What is not a sample is dropped: it may come from anybody.
     ///
     /// # Errors
     /// Those of the answers.
@@ -231,8 +231,8 @@ impl Session {
         self.sample(self.scale.0 * read.e, self.scale.1 * read.u, read.reference);
     }
 
-    /// Says once that the times go at another rate than `--fs`; from there on every line carries the
-    /// finding.
+    /// Reports once that the times go at another rate than `--fs`; from there on every line carries
+    /// the finding.
     fn judge_rate(&mut self, t: f64) {
         let fs = 1.0 / self.sample_time.s();
         let (hurried, other) = (self.clock.hurried(), self.clock.other_rate());
@@ -243,7 +243,7 @@ impl Session {
         };
         if let Some(hz) = other.filter(|_| self.rate.is_none()) {
             let words = format!(
-                "up to t = {t} s the times go at {hz:.4} Hz and --fs says {fs} Hz: delay, lead and frequency of the estimate \
+                "up to t = {t} s the times go at {hz:.4} Hz and --fs reports {fs} Hz: delay, lead and frequency of the estimate \
                  are scaled by that; give the rate of the times to --fs, or correct t"
             );
             warn(&words);

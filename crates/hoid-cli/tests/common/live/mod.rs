@@ -25,7 +25,7 @@ pub fn sample(t_s: f64, draw: &mut Draw) -> (f64, f64) {
     (waves(t_s), 0.1 * waves(t_s - 0.3) + 0.05 * (2.0 * draw.share() - 1.0))
 }
 
-/// What a stream says of itself at its end.
+/// Self-description of a stream at its end.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Summary {
     pub samples: usize,
@@ -65,7 +65,7 @@ pub fn signal(child: &Child, name: &str) {
     assert!(Command::new("kill").args([name, &id]).status().unwrap().success());
 }
 
-/// What a program that ends still says; it ends well.
+/// What a program that ends still reports; it ends well.
 pub fn last_words(child: &mut Child, said: &mut BufReader<ChildStderr>) -> String {
     let mut words = String::new();
     said.read_to_string(&mut words).unwrap();

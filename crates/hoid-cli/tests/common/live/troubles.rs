@@ -1,5 +1,5 @@
 //! Readers that stop, either side started again, clocks that jump, hostile datagrams: nothing crashes, and what was
-//! lost is counted. Each returns samples sent, answers, and what the stream says.
+//! lost is counted. Each returns samples sent, answers, and what the stream reports.
 
 use std::{net::UdpSocket, path::Path, time::Duration};
 
@@ -122,7 +122,7 @@ pub fn stream_stops(program: &Path, pause: Duration, draw: &mut Draw) -> Outcome
     outcome
 }
 
-/// A sender that comes back with its sequence at zero is believed after ten samples.
+/// A sender that comes back with its sequence at zero is trusted after ten samples.
 pub fn sender_begins_again(program: &Path, draw: &mut Draw) -> Outcome {
     let mut stream = Stream::new(program, SLOW, &[]);
     let ask = |stream: &Stream, draw: &mut Draw| {
@@ -163,7 +163,7 @@ pub fn stream_begins_again(program: &Path, draw: &mut Draw) -> Outcome {
         refused += usize::from(socket.send(&datagram(k, draw)).is_err());
     }
     assert!(refused > 0);
-    // What the system still has to tell of it.
+    // What the system still has to report it.
     let _ = socket.take_error();
     let stream = Stream::at(program, SLOW, port, socket, &[]);
     for k in 150..250 {
@@ -175,7 +175,7 @@ pub fn stream_begins_again(program: &Path, draw: &mut Draw) -> Outcome {
     outcome
 }
 
-/// Times that jump forth are a gap, those that jump back are believed after ten samples.
+/// Times that jump forth are a gap, those that jump back are trusted after ten samples.
 pub fn clock_jumps(program: &Path, draw: &mut Draw) -> Outcome {
     let stream = Stream::new(program, SLOW, &[]);
     let mut sequence = 0;

@@ -44,7 +44,7 @@ impl Stream {
             .spawn()
             .unwrap();
         let mut said = BufReader::new(child.stderr.take().unwrap());
-        // Where the system has chosen the port, it is said.
+        // Where the system has chosen the port, it is reported.
         let port = loop {
             let mut line = String::new();
             assert!(said.read_line(&mut line).unwrap() > 0, "the stream has ended");
@@ -85,7 +85,7 @@ impl Stream {
         (word(4), std::array::from_fn(number), word(160).cast_signed(), word(164))
     }
 
-    /// Interrupts the stream; what it has said.
+    /// Interrupts the stream; what it has reported.
     pub fn end(mut self) -> String {
         signal(&self.child, "-INT");
         last_words(&mut self.child, &mut self.said)

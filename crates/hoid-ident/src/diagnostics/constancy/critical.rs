@@ -9,8 +9,8 @@
 //! `P(sup T^2 > c) = sqrt(c/2) e^(-c/2)/Gamma(1/2) [(1 - 1/c) ln lambda + 2/c]`,
 //! `lambda = ((1 - pi_0)/pi_0)^2`.
 //!
-//! Of m instants the supremum is at most what Bonferroni's inequality says, m times the p-value of
-//! one; for few instants that is the smaller number.
+//! Of m instants the supremum is at most what Bonferroni's inequality reports, m times the p-value of one; for few
+//! instants that is the smaller number.
 
 use std::f64::consts::PI;
 

@@ -91,7 +91,7 @@ impl Constancy<'_> {
         ))
     }
 
-    /// A doubt that says what changes and about when.
+    /// A doubt that reports what changes and about when.
     pub fn change(&self) -> Option<Finding> {
         let records = self.blocks.last().map_or(0, |block| block.record + 1);
         let of = |delay: bool| strongest(self, delay).filter(|change| change.p_value < LEVEL);

@@ -25,8 +25,8 @@ const CLIPPED: f64 = 1.345;
 const MOST_OFF: f64 = 3.0;
 
 impl Fit {
-    /// Doubts where the operator is not the same throughout the records, or a stretch carries it. Nothing is said of models
-    /// without an input or without noise, and of fits whose scores are not those of the squares.
+    /// Doubts where the operator is not the same throughout the records, or a stretch carries it. Nothing is reported
+    /// about models without an input or without noise, and of fits whose scores are not those of the squares.
     pub(in crate::diagnostics) fn constancy_findings(&self, records: &[Record]) -> Vec<Finding> {
         self.constancy(records).unwrap_or_default()
     }

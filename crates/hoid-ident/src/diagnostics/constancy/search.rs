@@ -137,7 +137,7 @@ pub(super) fn strongest_among(of: &Constancy<'_>, directions: &[&Direction], set
         let typical = upper_median(&mut ratios).unwrap_or(1.0);
         let smallest = all.iter().map(|t| t.share.min(1.0 - t.share)).fold(0.5, f64::min);
         for t in &all {
-            // All blocks have a share in a drift and a sway, and the usual scatter is that of them all.
+            // All blocks have a share in a drift and a sway, and the typical scatter is that of them all.
             let (scatter, freedom) = match sets[t.set].course {
                 Course::Step => (t.by_blocks, n - 2),
                 _ => (0.0, 4 * (n - 2)),
@@ -197,8 +197,8 @@ pub(super) fn drifts(blocks: &[ScoreBlock]) -> Vec<Set> {
     }]
 }
 
-/// Sines over the blocks of one record, of so many s each: periods from [`SHORTEST`] blocks to two thirds of all, half of
-/// what tells two frequencies apart from one to the next, each in four phases.
+/// Sines over the blocks of one record, of so many s each: periods from [`SHORTEST`] blocks to two thirds of all, half
+/// of what distinguishes two frequencies from one to the next, each in four phases.
 pub(super) fn sways(blocks: &[ScoreBlock], block_s: f64) -> Vec<Set> {
     let n = blocks.len();
     let frequencies = (3..)

@@ -1,5 +1,5 @@
-//! The responses to the initial states of 1/F, of a record in each lane, and what is best said of
-//! the states.
+//! The responses to the initial states of 1/F, of a record in each lane, and what is best reported
+//! of the states.
 //!
 //! With h the impulse response of 1/F and g that of D/F, a state that enters w k samples after its
 //! first value adds `x_k h(t-k)` to w and takes `x_k g(t-k)` from the residuals. The columns

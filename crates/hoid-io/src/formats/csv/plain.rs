@@ -5,8 +5,8 @@
 //! run, and is the reader's of whole CSV ([`super::table`]). The numbers are the same, correctly
 //! rounded by both (D. Lemire, *Software: Practice and Experience* 51 (2021) 1700-1727).
 //!
-//! A long text is taken in parts that end with a line, side by side. Each part says how far it was
-//! plain; what is after the first that was not is left.
+//! A long text is taken in parts that end with a line, side by side. Each part reports how far it
+//! was plain; what is after the first that was not is left.
 
 use std::ops::Range;
 use std::thread;

@@ -10,8 +10,9 @@
 //! Where semicolons or tabs divide the cells, as in what a spreadsheet saves in half of Europe, the
 //! numbers may have decimal commas.
 //!
-//! Blank lines are skipped; a byte order mark and CRLF are tolerated. The stated sample time says
-//! without rounding what t can only say up to its last digit; it counts where t agrees with it.
+//! Blank lines are skipped; a byte order mark and CRLF are tolerated. The stated sample time
+//! reports without rounding what t can only say up to its last digit; it counts where t agrees with
+//! it.
 
 use std::collections::HashMap;
 use std::ops::Range;
@@ -271,7 +272,7 @@ impl Rows<'_> {
     }
 }
 
-/// Lines above the last one whose numbers say how long one is.
+/// Lines above the last one whose numbers show how long one is.
 const COMPARED: usize = 8;
 
 /// That the last number of a file may be cut: the last line lacks its end, and its last cell is

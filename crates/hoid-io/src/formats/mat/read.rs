@@ -1,4 +1,4 @@
-//! The variables of a file of any version, told by its first bytes.
+//! The variables of a file of any version, given by its first bytes.
 
 use super::elements::HEADER;
 use super::names::named;

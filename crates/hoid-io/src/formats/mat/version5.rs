@@ -106,8 +106,8 @@ impl Reader<'_> {
         }
     }
 
-    /// The data of the matrix in deflated bytes. Its tag says how long it is at most: Octave counts
-    /// the data that are in a tag twice.
+    /// The data of the matrix in deflated bytes. Its tag states how long it is at most: Octave
+    /// counts the data that are in a tag twice.
     fn inflated(&mut self, bytes: &[u8], big_endian: bool) -> Result<Vec<u8>, Stop> {
         let failed = |error: std::io::Error| Stop::Damaged(told(&error.to_string()));
         let mut decoder = ZlibDecoder::new(bytes);

@@ -40,7 +40,7 @@ struct Reader<'a> {
 }
 
 impl Reader<'_> {
-    /// What the crate says: damage, or what it does not know.
+    /// What the crate reports: damage, or what it does not know.
     fn damaged(&self, place: &str, error: &Error) -> IoError {
         let what = error.to_string();
         let cut = if what.contains("unexpected EOF") {

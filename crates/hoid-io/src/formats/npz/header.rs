@@ -2,9 +2,9 @@
 //! 1 to 3).
 //!
 //! The literal is read here because it is small, and because a general reader of Python literals
-//! recurses as deep as a hostile header says.
+//! recurses as deep as a hostile header states.
 
-/// What a header says.
+/// What a header states.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Header {
     pub(super) descr: Descr,

@@ -97,7 +97,7 @@ impl Item {
         Self::Numbers { kind, big_endian }
     }
 
-    /// The unit that a type says.
+    /// The unit that a type states.
     fn unit(&self) -> String {
         String::from(match self {
             Self::Clock { moments: true, .. } => MOMENTS,

@@ -1,10 +1,10 @@
 //! What the pages of a column unpack to, before any of them is unpacked.
 //!
-//! The footer says how long a column is when unpacked, each page says it again in its header, and nobody
-//! has to be right: a page of a few kB may state 2 GB, which Snappy and LZ4 then fill with zeros, and gzip
-//! unpacks until it ends, whatever was stated. So the headers are read here first, in the compact protocol
-//! of Thrift (<https://github.com/apache/thrift/blob/master/doc/specs/thrift-compact-protocol.md>): a field
-//! is a byte `delta << 4 | type`, numbers are zigzag varints, and a struct ends with a 0. Of `PageHeader`
+//! The footer states how long a column is when unpacked, each page states it again in its header, and nobody has to be
+//! right: a page of a few kB may state 2 GB, which Snappy and LZ4 then fill with zeros, and gzip unpacks until it ends,
+//! whatever was stated. So the headers are read here first, in the compact protocol of Thrift
+//! (<https://github.com/apache/thrift/blob/master/doc/specs/thrift-compact-protocol.md>): a field is a byte
+//! `delta << 4 | type`, numbers are zigzag varints, and a struct ends with a 0. Of `PageHeader`
 //! (<https://github.com/apache/parquet-format>, `parquet.thrift`) are taken
 //!
 //! | field | what |
@@ -56,7 +56,7 @@ pub(super) fn unpacked(column: &[u8], compression: Compression, values: u64) -> 
         if matches!(compression, Compression::GZIP(_)) && header.is_packed {
             let packed = page.get(usize::try_from(header.levels).ok()?..)?;
             let stated = header.unpacked.checked_sub(header.levels)?;
-            // What is damaged otherwise is told by who reads it.
+            // What is damaged otherwise is reported by who reads it.
             let mut limited = MultiGzDecoder::new(packed).take(stated.saturating_add(1));
             if io::copy(&mut limited, &mut io::sink()).is_ok_and(|bytes| bytes > stated) {
                 return None;
@@ -127,7 +127,7 @@ impl PageHeader {
         Some(())
     }
 
-    /// A value that says nothing here.
+    /// A value that carries no information here.
     fn pass_over(&mut self, bytes: &mut &[u8], kind: u8, depth: usize) -> Option<()> {
         match kind {
             TRUE | FALSE | BYTE => drop(byte(bytes)?),
@@ -207,7 +207,7 @@ mod tests {
 
     const GZIP: fn() -> Compression = || Compression::GZIP(GzipLevel::default());
 
-    /// A header of a data page with a text and a list that say nothing, and its page.
+    /// A header of a data page with a text and a list that carry no information, and its page.
     fn page(unpacked: i64, values: i64, packed: &[u8]) -> Vec<u8> {
         let put = |bytes: &mut Vec<u8>, value: i64| {
             let mut rest = ((value << 1) ^ (value >> 63)).cast_unsigned();

@@ -46,7 +46,7 @@ pub(super) fn read(bytes: Vec<u8>, file: &str) -> Result<ReadFile, IoError> {
     guarded(file, || columns(bytes.into(), file))
 }
 
-/// Whether this is Parquet at all, in words that say what it is instead.
+/// Whether this is Parquet at all, in words that report what it is instead.
 fn check_ends(bytes: &[u8], file: &str) -> Result<(), IoError> {
     let file = || file.to_owned();
     let found = if bytes.is_empty() {
@@ -65,7 +65,7 @@ fn check_ends(bytes: &[u8], file: &str) -> Result<(), IoError> {
     } else if !bytes.ends_with(MAGIC) {
         return Err(IoError::Damaged {
             file: file(),
-            found: String::from("it is cut, for its end is missing, which says where the columns stand"),
+            found: String::from("it is cut, for its end is missing, which reports where the columns stand"),
         });
     } else {
         return Ok(());
@@ -123,7 +123,7 @@ fn columns(bytes: Bytes, file: &str) -> Result<ReadFile, IoError> {
             let values = u64::try_from(chunk.num_values()).unwrap_or(0);
             let Some(stated) = pages::unpacked(pages, chunk.compression(), values) else {
                 return Err(damaged(format!(
-                    "{}: a page is longer than it says, or does not say how long it is",
+                    "{}: a page is longer than it reports, or does not report how long it is",
                     place()
                 )));
             };
@@ -285,7 +285,7 @@ impl ColumnPath<'_> {
         taken.map_err(|error| ParquetError::External(Box::new(error)))
     }
 
-    /// What the crate says, with the place.
+    /// What the crate reports, with the place.
     fn error(&self, group: usize, error: ParquetError) -> IoError {
         let file = self.file.to_owned();
         let place = format!("column {}, row group {}", shown(&self.name), group + 1);

@@ -16,7 +16,7 @@ struct ParquetSource<'a> {
     columns: Vec<Cells>,
 }
 
-/// The cells of a column, as far as its values do not say it.
+/// The cells of a column, as far as its values do not report it.
 enum Cells {
     Numbers {
         nulls: Vec<usize>,

@@ -150,7 +150,7 @@ fn empty(format: &str) -> Option<Samples> {
 }
 
 impl Stream {
-    /// What the footer says against what was read.
+    /// What the footer states against what was read.
     ///
     /// # Errors
     /// What is not there.
@@ -171,11 +171,11 @@ impl Stream {
             .into_iter()
             .flat_map(|((from, to), (first, last))| [("first", from, *first), ("last", to, *last)])
         {
-            // Recorders print them with six digits, and may leave out what a sample time says.
+            // Recorders print them with six digits, and may leave out what a sample time reports.
             let slack_s = self.nominal_step_s().max(1e-5 * stated.abs()).max(1e-6);
             if (stated - found).abs() > slack_s {
                 return Err(format!(
-                    "stream {} ({}): its footer says that the {what} sample is at {stated} s, and it is at {found} s: \
+                    "stream {} ({}): its footer states that the {what} sample is at {stated} s, and it is at {found} s: \
                      the file lost a part",
                     self.id,
                     shown(&self.header.name)

@@ -30,9 +30,9 @@ const BREAK_SAMPLES: f64 = 500.0;
 
 /// Lost samples: a step, and then a lateness, of so many sample times.
 const LOST_SAMPLES: f64 = 4.0;
-/// Samples on each side whose median says how late they are.
+/// Samples on each side whose median shows how late they are.
 const BESIDE: usize = 25;
-/// Share by which the rate may be off the stated one before that is said.
+/// Share by which the rate may be off the stated one before that is reported.
 const OFF: f64 = 0.02;
 
 /// The times of the samples, s.
@@ -146,7 +146,7 @@ fn parts(breaks: impl Iterator<Item = usize>, count: usize) -> Vec<(usize, usize
     parts
 }
 
-/// The line `b_0 + b_1 c` through offsets under Huber's loss; none where they say nothing.
+/// The line `b_0 + b_1 c` through offsets under Huber's loss; none where they carry no information.
 fn line(offsets: &[(f64, f64)]) -> (f64, f64) {
     if let [(_, offset)] = offsets {
         return (*offset, 0.0);

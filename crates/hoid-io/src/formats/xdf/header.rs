@@ -71,7 +71,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<Header, String> {
     })
 }
 
-/// What a recorder says of a stream when it closes the file.
+/// What a recorder reports about a stream when it closes the file.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Footer {
     pub(super) samples: Option<u64>,

@@ -240,7 +240,7 @@ mod tests {
         let contents = read(&file_of(&times, Some(cut)), "a.xdf").unwrap();
         let said = |n: &String| n.contains("its footer") && n.contains("1000 samples are read");
         assert!(contents.notes.iter().any(said), "{:?}", contents.notes);
-        // The end of the file is lost between two chunks: nothing contradicts itself, but it is told.
+        // The end of the file is lost between two chunks: nothing contradicts itself, but it is reported.
         let notes = read(&file_of(&times, None), "a.xdf").unwrap().notes;
         assert!(
             notes

@@ -1,5 +1,5 @@
-//! Files of a few bytes to two megabytes that unpack, or say that they unpack, to any size, and what all readers have to
-//! make of them: values or an error in words, in bounded memory.
+//! Files of a few bytes to two megabytes that unpack, or report that they unpack, to any size, and what all readers
+//! have to make of them: values or an error in words, in bounded memory.
 //!
 //! Bomb `k` of a format is the same bytes on every machine.
 //!

@@ -22,7 +22,7 @@ pub const GROUP: usize = 1 << 18;
 const PLAIN: u64 = 0;
 const RUN_LENGTHS: u64 = 3;
 
-/// A page of which anything can be said.
+/// A page of which anything can be reported.
 pub struct Page<'a> {
     pub compression: Compression,
     pub optional: bool,
@@ -37,7 +37,7 @@ pub fn bomb(draw: &mut Draw) -> Vec<u8> {
     let megabytes = 1 << (4 + draw.below(8));
     let values = 1 << (20 + draw.below(12));
     match draw.below(9) {
-        // It unpacks to more than it says.
+        // It unpacks to more than it reports.
         0 => page(&Page {
             compression: gzip(),
             optional: false,
@@ -45,7 +45,7 @@ pub fn bomb(draw: &mut Draw) -> Vec<u8> {
             unpacked: 800,
             packed: &zeros::gzip(megabytes),
         }),
-        // It says more than it holds.
+        // It states more than it holds.
         1 => page(&Page {
             compression: *draw.one_of(&[
                 gzip(),
@@ -58,7 +58,7 @@ pub fn bomb(draw: &mut Draw) -> Vec<u8> {
             unpacked: (8 * values).min(i32::MAX as u64),
             packed: &[0; 20],
         }),
-        // It holds what it says.
+        // It holds what it reports.
         2 => page(&Page {
             compression: gzip(),
             optional: false,

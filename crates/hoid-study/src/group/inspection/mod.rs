@@ -18,11 +18,11 @@ pub use evidence::Evidence;
 use super::{condition_settings::ConditionSettings, manifest::Manifest};
 use crate::StudyError;
 
-/// Completes a manifest by what its files say: the first run of each condition is looked at.
+/// Completes a manifest by what its files state: the first run of each condition is looked at.
 ///
 /// # Errors
-/// [`StudyError::Io`] where the first file cannot be read at all; what cannot be found is said in
-/// the evidence.
+/// [`StudyError::Io`] where the first file cannot be read at all; what cannot be found is reported
+/// in the evidence.
 pub fn inspect(manifest: &mut Manifest, directory: &Path, known: &LookOptions) -> Result<Vec<Evidence>, StudyError> {
     let mut evidence = Vec::new();
     let first = Look::at(&directory.join(&manifest.runs[0].file), known)?;
@@ -42,7 +42,7 @@ pub fn inspect(manifest: &mut Manifest, directory: &Path, known: &LookOptions) -
         "[read]",
         "",
         if units.is_empty() {
-            "the files say no units: gains are in units of output by input".to_owned()
+            "the files state no units: gains are in units of output by input".to_owned()
         } else {
             format!("units in the file: {}", units.join(", "))
         },
@@ -123,7 +123,7 @@ pub fn inspect(manifest: &mut Manifest, directory: &Path, known: &LookOptions) -
     Ok(evidence)
 }
 
-/// What the first run of a condition says of it.
+/// What the first run of a condition states about it.
 fn look_at(
     seen: &RecordSummary,
     condition: &str,

@@ -287,7 +287,7 @@ impl<const M: usize> Bank<M> {
         likeliest
     }
 
-    /// A child that says that the operator changes now.
+    /// A child that reports that the operator changes now.
     fn with_change(&self, parent: &Hypothesis, neuromuscular: bool) -> Hypothesis {
         let mut child = parent.with_change(self.samples, neuromuscular, &self.prior);
         child.before.delay = self.delay();

@@ -1,19 +1,17 @@
 //! When the operator changed, and in what.
 //!
-//! `Lambda = ln(sum of P(h) over those born within the last T)/(sum of P(h) over those that are older))`:
-//! the logarithm of the posterior odds of a change. It is the likelihood ratio of Willsky and Jones
-//! (A. S. Willsky and H. L. Jones, *IEEE Transactions on Automatic Control* 21 (1976) 108-112),
-//! with the size of the change and its time averaged out instead of maximised, so that its
-//! expectation does not grow with the number of times that are tried. A change is declared when
-//! Lambda is over the threshold and the likeliest of the recent hypotheses is old enough to say
-//! what changed. The next is declared only after Lambda has been below zero, when the new values
-//! have become the established ones, or when more turns out to have changed: the neuromuscular
-//! system, by the same odds of such hypotheses against all others, or the delay, by three standard
-//! errors.
+//! `Lambda = ln(sum of P(h) over those born within the last T)/(sum of P(h) over those that are older))`: the logarithm
+//! of the posterior odds of a change. It is the likelihood ratio of Willsky and Jones (A. S. Willsky and H. L. Jones,
+//! *IEEE Transactions on Automatic Control* 21 (1976) 108-112), with the size of the change and its time averaged out
+//! instead of maximised, so that its expectation does not grow with the number of times that are tried. A change is
+//! declared when Lambda is over the threshold and the likeliest of the recent hypotheses is old enough to report what
+//! changed. The next is declared only after Lambda has been below zero, when the new values have become the established
+//! ones, or when more turns out to have changed: the neuromuscular system, by the same odds of such hypotheses against
+//! all others, or the delay, by three standard errors.
 //!
-//! The likeliest of the recent hypotheses says since when, and what held before: the change of each
-//! quantity over its standard error tells in what the operator changed. For the innovation variance
-//! that is `ln(s2/s1)/sqrt(2/n)` with the n samples since.
+//! The likeliest of the recent hypotheses assumes since when, and what held before: the change of each quantity over
+//! its standard error tells in what the operator changed. For the innovation variance that is `ln(s2/s1)/sqrt(2/n)`
+//! with the n samples since.
 
 use super::{
     hypothesis::{Hypothesis, Snapshot},

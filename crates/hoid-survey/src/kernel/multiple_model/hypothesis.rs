@@ -15,7 +15,7 @@
 //!
 //! An innovation beyond the limit counts as one at the limit, in the density and in sigma^2, and as
 //! a measurement of so large a variance that it lies there (P. J. Huber, *Robust Statistics*, 1981,
-//! section 7.3): an outlier says nothing about which hypothesis predicts better.
+//! section 7.3): an outlier carries no information about which hypothesis predicts better.
 
 use super::{
     elementary::{exp, log1p},

@@ -47,7 +47,7 @@ pub struct ChangePrior {
     pub pruning_age: u64,
     /// Samples within which a birth counts as a recent change.
     pub change_window: u64,
-    /// Samples that the estimates take to settle after a change; before, a hypothesis cannot say
+    /// Samples that the estimates take to settle after a change; before, a hypothesis cannot report
     /// what changed.
     pub settling_time: u64,
     /// Logarithm of the posterior odds from which a change is declared.

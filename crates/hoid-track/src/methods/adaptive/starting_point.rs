@@ -29,7 +29,8 @@ use crate::person_prior::PersonPrior;
 const WIDE: [f64; DYNAMICS] = [0.45, 0.75, 0.15];
 /// Frequencies at which the gains of a fit are found, rad/s: the range, and how many.
 const FREQUENCIES: ([f64; 2], usize) = ([0.3, 8.0], 24);
-/// Lags that a basis may have, s: beyond the longest a lag cannot be told from an integration.
+/// Lags that a basis may have, s: beyond the longest a lag cannot be distinguished from an
+/// integration.
 const LAGS_S: [f64; 2] = [0.05, 10.0];
 /// Root mean square of the relative misfit beyond which a form has no place in the basis.
 const MISFIT: f64 = 0.1;
@@ -214,9 +215,8 @@ struct Nearest {
 }
 
 impl Nearest {
-    /// By how much the covariance of the state is to be larger, so that the response is nowhere better
-    /// known than by the fit: gains of one lag cannot say how a lag that is not known goes with the
-    /// frequency.
+    /// By how much the covariance of the state is to be larger, so that the response is nowhere better known than by
+    /// the fit: gains of one lag cannot report how a lag that is not known goes with the frequency.
     fn lost(&self, fit: &FittedOperator, coordinates: &[Coordinate], columns: &[[f64; STATES]]) -> f64 {
         let p = coordinates.len();
         let sizes = |g: &[Complex64]| -> [f64; 2] {
@@ -373,8 +373,9 @@ mod tests {
                     (response.phase_deg(), along(|r| r.im).to_degrees()),
                 ] {
                     let ratio = found.standard_error.unwrap() / expected;
-                    // A lag that is not known is a phase that is not known, which the gains cannot say at low
-                    // frequencies, where it is small compared with the gain's; elsewhere they say a little more.
+                    // A lag that is not known is a phase that is not known, which the gains cannot report at low
+                    // frequencies, where it is small compared with the gain's; elsewhere they carry a little more
+                    // information.
                     assert!((ratio > 0.9 || omega < 1.0) && ratio < 1.5, "{form} {omega}: {ratio}");
                 }
             }

@@ -108,7 +108,7 @@ fn of_text(who: Who, seed: u64, case: u64) -> Result<Base, SimError> {
 }
 
 fn of_person(seed: u64, case: u64) -> Result<Base, SimError> {
-    // A part of the corpus, every tenth case say, must have all kinds of people too.
+    // A part of the corpus, every tenth case report, must have all kinds of people too.
     let i = (case + case / 10) as usize;
     let task = Task {
         sample_time: SampleTime::new([1.0 / 60.0, 0.01][i / 2 % 2])?,

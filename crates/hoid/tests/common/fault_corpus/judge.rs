@@ -21,7 +21,7 @@ pub const LATER_S: f64 = 20.0;
 const NEAR_ERRORS: f64 = 2.5;
 const NEAR_SHARE: f64 = 0.1;
 const LASTING_S: f64 = 5.0;
-/// Findings that tell of faults of the recording, and of nothing else.
+/// Findings that report faults of the recording, and of nothing else.
 const OF_FAULTS: [&str; 4] = ["faults", "held-back", "hostile-span", "restarted"];
 
 /// What is known of a case.
@@ -47,7 +47,7 @@ pub struct CaseOutcome {
     pub level: String,
     /// What speaks against the result, by kinds.
     pub kinds: Vec<String>,
-    /// Whether a finding that is more than a note tells of faults.
+    /// Whether a finding that is more than a note reports faults.
     pub of_faults: bool,
     /// Faults that are reported, and whether one is at the right place.
     pub told: usize,
@@ -67,7 +67,7 @@ impl CaseOutcome {
         }
     }
 
-    /// Whether the user is told that something is amiss.
+    /// Whether the user is reported that something is amiss.
     pub fn flagged(&self) -> bool {
         self.level != "trustworthy" || self.placed
     }
@@ -122,7 +122,7 @@ pub fn of_trace(json: &Value, rows: &[Row], known: &CaseTruth) -> CaseOutcome {
         let after: Vec<&Row> = rows.iter().filter(|row| row.t >= behind).collect();
         let far = |row: &&&Row| !is_near(&row.claims, truth_at(row.t));
         let last = after.last()?.t;
-        // A trace that ends with the fault, or so soon after that nothing can be said.
+        // A trace that ends with the fault, or so soon after that nothing can be reported.
         (last - behind > 1.0).then(|| match after.iter().rfind(far) {
             Some(row) if row.t >= last => f64::INFINITY,
             Some(row) => row.t - behind,

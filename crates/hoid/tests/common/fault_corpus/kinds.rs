@@ -87,7 +87,7 @@ pub enum FaultPosition {
     Middle,
     /// At 90 %.
     End,
-    /// All of it, or where the kind says.
+    /// All of it, or where the kind reports.
     Whole,
 }
 

@@ -1,6 +1,6 @@
-//! What does a fault of a recording do to a result, and does the result say so? Virtual runs whose
-//! operator is known get one fault each, are given to the program `hoid` as files, and what comes
-//! back is judged.
+//! What does a fault of a recording do to a result, and does the result report it? Virtual runs
+//! whose operator is known get one fault each, are given to the program `hoid` as files, and what
+//! comes back is judged.
 //!
 //! A result is *wrong* where a parameter that is reported as determined lies more than
 //! [`judge::WRONG`] of its standard errors from the truth. It is *flagged* where the verdict is not

@@ -84,14 +84,14 @@ pub struct Outcome {
     pub way: Way,
     pub seconds: f64,
     pub judged: CaseOutcome,
-    /// What the program said when it gave no result.
+    /// What the program reported when it gave no result.
     pub refusal: Option<String>,
 }
 
 /// Evaluates a fault in the runs of `who` in each of the ways that are asked for and fit.
 ///
 /// # Errors
-/// What the simulation or the file system says.
+/// What the simulation or the file system reports.
 pub fn outcomes(
     program: &Path,
     seed: u64,
@@ -151,7 +151,7 @@ fn write(base: &Base, fault: &Fault, folder: &Path, seed: u64, case: u64) -> Res
     Ok((files.into_iter().map(|(file, _)| file).collect(), known))
 }
 
-/// The judgement, or what the program said instead of a result.
+/// The judgement, or what the program reported instead of a result.
 fn run(
     program: &Path,
     way: Way,
