@@ -74,7 +74,11 @@ fn small_files_do_not_unpack_without_a_bound() {
             zipped(512 * MEGABYTE / 8, 512 * MEGABYTE, 512),
             unpacks,
         ),
-        ("lying.parquet", zipped(100, 800, 1024), "a page is longer than it reports"),
+        (
+            "lying.parquet",
+            zipped(100, 800, 1024),
+            "a page is longer than it reports",
+        ),
         ("stated.parquet", stated, unpacks),
         ("many.parquet", columns(10_001), "10001"),
         (

@@ -67,7 +67,9 @@ impl SigmoidFit {
             match parameter.remark {
                 Some(Remark::AtBound) if name == "tau_e" => all.push(Finding::doubt(
                     "delay-at-bound",
-                    format!("the delay {value:.3} s lies at the end of the range in which it was searched for; widen it"),
+                    format!(
+                        "the delay {value:.3} s lies at the end of the range in which it was searched for; widen it"
+                    ),
                 )),
                 // A pure integration, or a lag that is none.
                 Some(Remark::AtBound) if name == "T_I" => all.push(Finding::note(

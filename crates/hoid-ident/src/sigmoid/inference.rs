@@ -58,7 +58,9 @@ impl fmt::Display for Remark {
         f.write_str(match self {
             Self::Fixed => "fixed",
             Self::AtBound => "rests at a bound",
-            Self::Abrupt => "at its upper bound: the change takes no longer than two samples, its rate cannot be determined",
+            Self::Abrupt => {
+                "at its upper bound: the change takes no longer than two samples, its rate cannot be determined"
+            }
             Self::NoChange => "the records show no change: take the fit without one",
             Self::ChangePoint => "the change is too fast for a normal error: take the likelihood interval",
             Self::Undetermined => "not determined by the data",
