@@ -141,7 +141,7 @@ fn packages(metadata: &Value) -> Vec<Package> {
     all.into_iter().flatten().filter_map(package).collect()
 }
 
-/// What is wrong with where a crate comes from and its licence.
+/// Problems with where a crate comes from and its licence.
 fn licence_of(package: &Package) -> Option<String> {
     let Package {
         name, version, source, ..

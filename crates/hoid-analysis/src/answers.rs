@@ -1,4 +1,4 @@
-//! What each answer of a result is worth: the response, crossover and phase margin, each parameter.
+//! Reliability of each answer of a result: the response, crossover and phase margin, each parameter.
 //!
 //! What speaks against the data or against the fit speaks against all answers. In addition, an answer can be open by
 //! itself: a parameter that the data do not determine, a crossover whose interval holds zero. The level of the whole is
@@ -29,7 +29,7 @@ pub struct Answered {
     pub open: Option<Finding>,
 }
 
-/// A fit that shows what is known of each of its answers.
+/// A fit that shows the prior knowledge of each of its answers.
 pub trait Answers {
     /// All of them, with this controlled element.
     fn answers(&self, element: Option<&ContinuousTransferFunction>) -> Vec<Answered>;
@@ -60,7 +60,7 @@ pub fn asked_for(names: &[String]) -> Result<Vec<String>, AnalysisError> {
     names.iter().map(one).collect()
 }
 
-/// The verdict on what was asked for, from what is known of the fit and what its answers show; by default of the
+/// The verdict on the request, from the prior knowledge of the fit and what its answers show; by default of the
 /// response, with doubts of the loop.
 pub fn judged(verdict: Verdict, answers: &[Answered], asked: &[String]) -> Verdict {
     let of = |name: &str| answers.iter().find(|answer| answer.name == name);
@@ -79,7 +79,8 @@ pub fn judged(verdict: Verdict, answers: &[Answered], asked: &[String]) -> Verdi
     verdict.append(open)
 }
 
-/// The verdict on one answer: what is known of the fit as a whole, and what makes this one open.
+/// The verdict on one answer: the prior knowledge of the fit as a whole, and what makes this one
+/// open.
 pub fn of_answer(verdict: &Verdict, answer: &Answered) -> Verdict {
     let whole = verdict.findings().iter().filter(|finding| finding.kind != OPEN);
     Verdict::of(whole.chain(&answer.open).cloned().collect())
@@ -188,7 +189,8 @@ mod tests {
         assert_eq!(level(&["response"]), VerdictLevel::Trustworthy);
         assert_eq!(level(&["response", "tau_e"]), VerdictLevel::NotDetermined);
         assert_eq!(level(&["T_I"]), VerdictLevel::NotDetermined);
-        // What speaks against the whole speaks against each, and an answer that is open against itself alone.
+        // A finding against the whole result counts against each answer; an undetermined answer counts only against
+        // itself.
         let whole = Verdict::of(vec![Finding::doubt("leverage", "few samples")]);
         let asked = judged(whole, &answers, &["tau_e".to_owned()]);
         assert_eq!(of_answer(&asked, &answers[0]).level, VerdictLevel::Doubtful);

@@ -28,15 +28,15 @@ pub enum AnalysisError {
     /// An offset of a channel that is not there.
     #[error("--offset: there is no channel {name:?}; the record has {known}, and e and u stand for input and output")]
     NoSuchChannel {
-        /// What was asked for.
+        /// The request.
         name: String,
-        /// What there is.
+        /// The available items.
         known: String,
     },
     /// Options that contradict each other or the model.
     #[error("{reason}")]
     Options {
-        /// What was found, what was expected, what to do.
+        /// The findings, the expected value, what to do.
         reason: String,
     },
     /// A text that is not a result.
@@ -44,7 +44,7 @@ pub enum AnalysisError {
         "this is not a result of a fit: {found}; expected what to_json of this version wrote, or identify --json printed"
     )]
     NotAResult {
-        /// What was found.
+        /// The findings.
         found: String,
     },
     /// An option that does not fit the estimator, or has no such value.
@@ -52,7 +52,7 @@ pub enum AnalysisError {
     Option {
         /// Its name in the registry.
         name: &'static str,
-        /// What was found, what was expected, what to do.
+        /// The findings, the expected value, what to do.
         reason: String,
     },
     /// An option of other estimators.
@@ -62,7 +62,7 @@ pub enum AnalysisError {
         name: &'static str,
         /// The estimators that have it.
         of: Vec<&'static str>,
-        /// What to give in its place.
+        /// The alternative.
         instead: &'static str,
     },
     /// There is no recording.

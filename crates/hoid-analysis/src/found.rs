@@ -1,5 +1,5 @@
-//! What was found in a recording, in one form: faults that were looked for, and trouble of channels and their
-//! time. JSON and Python show this list.
+//! Findings in a recording, in one form: faults that were looked for, and trouble of channels and their time. JSON and
+//! Python show this list.
 
 use hoid_io::QualityIssue;
 use hoid_model::Fault;
@@ -10,7 +10,7 @@ use crate::recordings::Account;
 /// Something that was found in a recording.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FoundFault {
-    /// What it is, by its name.
+    /// Its definition, by its name.
     pub kind: &'static str,
     /// The channel; empty for all channels and for the time.
     pub channel: String,
@@ -26,7 +26,7 @@ pub struct FoundFault {
     pub size: f64,
     /// The size in robust standard deviations, where the kind has a statistic.
     pub deviations: Option<f64>,
-    /// What was done.
+    /// The actions taken.
     pub action: &'static str,
     /// A sentence without a full stop.
     pub words: String,

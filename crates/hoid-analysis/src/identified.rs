@@ -17,21 +17,20 @@ use crate::{
     settings::Setting,
 };
 
-/// What was identified.
+/// The identified model.
 #[derive(Debug, Clone)]
 pub struct Identified<F = FamilyFit> {
     /// The result.
     pub fit: F,
-    /// What it is worth, of all that is known.
+    /// The verdict on it, of all that is known.
     pub verdict: Verdict,
-    /// The recordings as they were fitted, without their means where these were taken out, and what was done
-    /// to them.
+    /// The recordings as they were fitted, without their means where these were taken out, and the processing of them.
     pub data: Recordings,
     /// The describing function that is next to the fit.
     pub described: Option<Description>,
     /// The settings that were used.
     pub settings: Vec<Setting>,
-    /// What the person controls, where it is known.
+    /// The controlled element, where it is known.
     pub controlled_element: Option<ContinuousTransferFunction>,
     /// The channel of the excitation, where there is one.
     pub excitation: Option<String>,
@@ -110,7 +109,7 @@ impl<E: BatchEstimator> Identification<E> {
 }
 
 impl<F: Answers> Identified<F> {
-    /// What each answer is worth.
+    /// Reliability of each answer.
     pub fn answers(&self) -> Vec<(String, Verdict)> {
         let all = self.fit.answers(self.controlled_element.as_ref());
         let one = |answer: Answered| (of_answer(&self.verdict, &answer), answer.name);

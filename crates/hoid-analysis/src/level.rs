@@ -33,7 +33,7 @@ pub(crate) fn levels_into(
 pub(crate) struct Level {
     /// The records with it, where it was taken out.
     as_read: Option<Vec<Record>>,
-    /// What was found of it next to the means.
+    /// Findings about it next to the means.
     beside_means: Vec<f64>,
 }
 
@@ -55,7 +55,7 @@ impl Level {
         self.as_read.is_none()
     }
 
-    /// What was taken out.
+    /// The trend removed.
     pub(crate) fn detrend(&self) -> Detrend {
         if self.is_kept() { Detrend::None } else { Detrend::Mean }
     }
@@ -105,7 +105,7 @@ impl Recordings {
 }
 
 impl Setting {
-    /// What the settings state about an estimated level.
+    /// Statement of the settings about an estimated level.
     pub(crate) fn level() -> Self {
         Self::new("level", "one constant of u a record, estimated")
     }

@@ -1,7 +1,7 @@
-//! From recordings to a result and what it is worth, once for all who ask.
+//! From recordings to a result and its reliability, once for all who ask.
 //!
 //! An estimator takes each sample at its word, and its error bars are those of its model. What a result is worth
-//! follows from more: what was wrong with the recording and what was done about it, what a second fit without
+//! follows from more: what was wrong with the recording and the actions taken about it, what a second fit without
 //! suspicious samples shows, whether anybody could have held the loop. These rules are here and nowhere else; command
 //! line, groups and Python parse options and show results.
 //!
@@ -12,7 +12,7 @@
 //! | step of [`Identification::run`] | rules |
 //! |---|---|
 //! | a file is looked at, before anything is chosen | `look` |
-//! | files are read (before it) | `files`, `reading`; kept with what was done to them in `recordings` |
+//! | files are read (before it) | `files`, `reading`; kept with the processing of them in `recordings` |
 //! | runs that are given twice are refused | `copies` |
 //! | faults are looked for and repaired, channels are judged | `repair`, `quality` |
 //! | a high rate is lowered | `rate` |

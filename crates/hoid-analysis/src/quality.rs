@@ -1,4 +1,4 @@
-//! What the quality of the channels shows about any result.
+//! Information of the quality of the channels about any result.
 //!
 //! | finding | where | why |
 //! |---|---|---|
@@ -32,7 +32,7 @@ pub enum Of {
     System,
 }
 
-/// What the quality of the channels shows about any result.
+/// Information of the quality of the channels about any result.
 pub(crate) fn findings_of_quality(account: &Account, record: &Record, of: Of) -> Vec<Finding> {
     let mut all = Vec::new();
     let issues = |kind: QualityIssueKind| account.quality_issues.iter().filter(move |issue| issue.kind == kind);

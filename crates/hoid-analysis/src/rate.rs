@@ -7,8 +7,8 @@ use hoid_model::{Decimation, SampleTime};
 use crate::{AnalysisError, recordings::Recordings};
 
 impl Recordings {
-    /// The recordings at the rate at which they are used, with what was done; for an estimator that counts
-    /// samples only where a factor was named, and not where the rate was named in reading.
+    /// The recordings at the rate at which they are used, with the actions taken; for an estimator that counts samples
+    /// only where a factor was named, and not where the rate was named in reading.
     ///
     /// # Errors
     /// Those of the decimation.
@@ -45,7 +45,7 @@ impl Recordings {
         lead.unwrap_or(0.0)
     }
 
-    /// What to report where a high rate was kept because samples are counted.
+    /// Message for the case that a high rate was kept because samples are counted.
     pub fn kept_rate(&self, decimation: Decimation, counts_samples: bool) -> Option<String> {
         let settled = self.settles_the_rate();
         let record = self.records.first().filter(|_| !settled)?;
@@ -53,7 +53,7 @@ impl Recordings {
     }
 }
 
-/// What to report where a high rate is kept because samples are counted.
+/// Message for the case that a high rate is kept because samples are counted.
 pub fn kept_rate(sample_time: SampleTime, decimation: Decimation, counts_samples: bool) -> Option<String> {
     let factor = decimation.factor(sample_time);
     let kept = counts_samples && decimation == Decimation::Auto && factor > 1;

@@ -15,7 +15,7 @@ pub use crate::names::{CHANGE, OPERATOR, PEM, REMNANT};
 
 use crate::estimators::{BatchEstimator, Polynomials};
 
-/// What is known of each batch estimator.
+/// Known properties of each batch estimator.
 pub fn estimators() -> Vec<MethodSpec> {
     [
         FamilyEstimator::specs(),

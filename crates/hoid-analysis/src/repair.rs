@@ -14,7 +14,7 @@ use crate::{
 const MOST_LEVELS: usize = 16;
 
 impl Recordings {
-    /// The recordings without their faults; one that is cut gives several. What was found and what it reports about any
+    /// The recordings without their faults; one that is cut gives several. Report of was found and what it on any
     /// result is in the account of the first of them.
     ///
     /// # Errors

@@ -1,4 +1,4 @@
-//! What is to be identified, as users ask for it: a structure, a method, and options by their names.
+//! Model to be identified, as users ask for it: a structure, a method, and options by their names.
 //!
 //! | structure | estimator |
 //! |---|---|
@@ -19,16 +19,16 @@ use crate::{
     registry::{CHANGE, OPERATOR, PEM, REMNANT, estimators},
 };
 
-/// What is to be identified, by names and texts.
+/// Model to be identified, by names and texts.
 #[derive(Debug, Clone, Default)]
 pub struct Request {
-    /// What is fitted.
+    /// The fitted model.
     pub structure: Option<String>,
     /// How: `pem`, or a method of instrumental variables.
     pub method: Option<String>,
     /// Options by their names in the registry.
     pub options: BTreeMap<String, String>,
-    /// What is done about faults of the recordings.
+    /// Treatment of faults of the recordings.
     pub faults: FaultHandling,
     /// Whether a high rate is lowered.
     pub rate: Decimation,
@@ -118,7 +118,7 @@ impl ResolvedRequest {
 }
 
 impl Request {
-    /// What is asked for, and remarks on names of before and on what follows from an option.
+    /// The request, and remarks on names of before and on what follows from an option.
     ///
     /// # Errors
     /// [`AnalysisError`] for options that contradict each other or have no such value.
@@ -159,7 +159,7 @@ impl Request {
         names.iter().any(|name| self.options.contains_key(*name))
     }
 
-    /// What is fitted, with its defaults.
+    /// The fitted model, with its defaults.
     fn kind(&self, notes: &mut Vec<String>) -> Result<ResolvedRequest, AnalysisError> {
         let options = |reason: String| AnalysisError::Options { reason };
         let typed = self

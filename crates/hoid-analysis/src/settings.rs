@@ -9,7 +9,7 @@ use crate::reading::Reading;
 /// A setting and its value in words.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Setting {
-    /// What it is called.
+    /// Its name.
     pub name: String,
     /// The value that was used.
     pub value: String,
@@ -91,7 +91,7 @@ impl Reading {
         list
     }
 
-    /// What was left out.
+    /// The parts left out.
     pub(crate) fn masked(&self) -> Option<Setting> {
         let kinds: Vec<&str> = self.mask.iter().map(|kind: &QualityIssueKind| kind.name()).collect();
         (!kinds.is_empty()).then(|| {

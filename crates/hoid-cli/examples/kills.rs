@@ -120,7 +120,7 @@ fn kill(mut child: Child, after: Duration) -> bool {
     !child.wait().unwrap().success()
 }
 
-/// Damages one file of a block; what was done, or none where there is no block yet.
+/// Damages one file of a block; the actions taken, or none where there is no block yet.
 fn damage(parts: &Path, draw: &mut Draw) -> Option<&'static str> {
     let mut all: Vec<PathBuf> = fs::read_dir(parts).ok()?.map(|entry| entry.unwrap().path()).collect();
     all.retain(|path| !path.file_name().unwrap().to_str().unwrap().starts_with('.') && path.is_file());

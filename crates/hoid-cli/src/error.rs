@@ -110,7 +110,7 @@ impl From<hoid_lab::LabError> for CliError {
 }
 
 impl CliError {
-    /// What is wrong with options, before anything is read.
+    /// Problems with options, before anything is read.
     pub fn of_options(error: AnalysisError) -> Self {
         match error {
             AnalysisError::Ident(IdentError::BadOption {

@@ -105,7 +105,7 @@ fn wrapped(page: &str, width: usize) -> String {
     text
 }
 
-/// What is reported after the answer: words, and what they are reported about.
+/// The report after the answer: words, and what they are reported about.
 static NOTICES: Mutex<Vec<(String, Vec<String>)>> = Mutex::new(Vec::new());
 
 /// What is before a remark that speaks of trouble.
@@ -143,7 +143,7 @@ pub fn tell_notices() {
     }
 }
 
-/// What became of something that was written to standard output.
+/// Outcome of something that was written to standard output.
 ///
 /// # Errors
 /// As [`print`].

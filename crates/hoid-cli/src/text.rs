@@ -31,12 +31,12 @@ pub fn with_uncertainty(e: &Estimate) -> (String, String) {
     numbers::with_uncertainty(e.value, e.standard_error)
 }
 
-/// What the result is worth, on top of it.
+/// Verdict on the result, on top of it.
 pub fn verdict(verdict: &Verdict) -> String {
     format!("{verdict}\n\n")
 }
 
-/// What is after the page.
+/// Content after the page.
 pub const MORE: &str = "More with -v: what else was tried, tests, every setting; --report DIR writes a page.\n";
 
 /// The same where only settings are.
@@ -45,7 +45,7 @@ pub const MORE_SETTINGS: &str = "More with -v: every setting.\n";
 /// Records that are named one by one.
 const RECORDS_SHOWN: usize = 4;
 
-/// The records in use, and what was done to them.
+/// The records in use, and the processing of them.
 pub fn records(files: &[String], records: &[Record], accounts: &[Account], verbose: bool) -> String {
     let line = |((file, record), account): ((&String, &Record), &Account)| {
         let mut lines = format!(
@@ -76,7 +76,7 @@ pub fn records(files: &[String], records: &[Record], accounts: &[Account], verbo
     };
     let mut text = String::new();
     for (k, one) in all.enumerate() {
-        // What was done to a record is always reported, of records alike once.
+        // The processing applied to a record is always reported, once for identical records.
         if verbose || k < shown || !quiet(one.1) {
             text.push_str(&line(one));
         }
@@ -167,7 +167,7 @@ pub fn search(fit: &Fit) -> String {
     )
 }
 
-/// What is wrong with the model itself; nothing mostly.
+/// Problems with the model itself; nothing mostly.
 pub fn instability(fit: &Fit) -> &'static str {
     if fit.model().is_stable() {
         ""
@@ -339,7 +339,7 @@ pub fn crossings(all: &Crossings) -> String {
     line
 }
 
-/// What there is to report about the loop of an estimate next to its lowest crossover: the others, the smallest phase
+/// Report of there is to on the loop of an estimate next to its lowest crossover: the others, the smallest phase
 /// margin, the gain margin, and that it is not stable. Nothing is reported about one that crosses once and is stable,
 /// unless it is asked for.
 pub fn loop_shape(shape: &LoopShape, always: bool) -> String {
@@ -416,7 +416,7 @@ pub fn roots(fit: &Fit) -> String {
     format!("{rows}\n")
 }
 
-/// What the residuals show, record by record.
+/// Results of the residuals, record by record.
 pub fn residual_tests(files: &[String], validations: &[Validation]) -> String {
     let mut rows = table(&["residuals of", "Ljung-Box Q", "degrees", "p", "signs"]);
     let (mut coloured, mut missed, mut feedback) = (false, false, false);

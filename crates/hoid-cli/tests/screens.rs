@@ -1,4 +1,4 @@
-//! What the screen shows: the answer first and on one page, details on demand, remarks after it and
+//! Results of the screen: the answer first and on one page, details on demand, remarks after it and
 //! once, at any width; help, completions and manual pages.
 
 #![allow(clippy::unwrap_used)]

@@ -230,8 +230,8 @@ fn neuromuscular_system_and_delay_are_found() {
 
 #[test]
 fn one_who_is_far_from_what_is_usual_is_found() {
-    // A delay 100 ms later than what is supposed, and a system of 16 rad/s that acts 60 ms earlier: from the default
-    // person the corrections end elsewhere.
+    // A delay 100 ms later than the prior, and a system of 16 rad/s that acts 60 ms earlier: from the default person
+    // the corrections end elsewhere.
     for (point, seed) in [
         (
             Point {

@@ -128,7 +128,7 @@ fn population(condition: &str, people: &[&Person], prior: &OperatorPrior) -> Pop
     found
 }
 
-/// What the data of a person report about the logarithm of a parameter.
+/// Report of the data of a person on the logarithm of a parameter.
 fn data(parameter: &Parameter, prior: &OperatorPrior) -> Option<Observation> {
     let error = parameter.standard_error_person.or(parameter.standard_error)?;
     let counts = parameter.determined && parameter.value > 0.0 && parameter.value.is_finite() && error > 0.0;

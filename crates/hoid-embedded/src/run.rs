@@ -12,7 +12,7 @@ use hoid_core::adaptive::{
 
 /// The file of the samples.
 pub const FILE: &CStr = c"run.csv";
-/// What is reported where it cannot be read.
+/// The report where it cannot be read.
 pub const UNREADABLE: &str = "run.csv cannot be read";
 /// Columns of the output.
 const HEADER: &str = "t,K_e,K_e_se,K_e_dot,K_e_dot_se,omega_nm,omega_nm_se,zeta_nm,zeta_nm_se,tau_e,tau_e_se";

@@ -16,7 +16,7 @@
 //!
 //! | module | what it holds |
 //! |---|---|
-//! | `session` | a tracker as its options ask for it, and what is known of it |
+//! | `session` | a tracker as its options ask for it, and the prior knowledge of it |
 //! | `options` | options in JSON, by the keywords of Python |
 //! | `saved`, `packed` | a tracker as bytes |
 //! | `status`, `boundary` | statuses and their texts; pointers |

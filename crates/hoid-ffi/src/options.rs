@@ -1,4 +1,4 @@
-//! What is to be tracked: method, sample time, options in JSON, a fit.
+//! Signals to be tracked: method, sample time, options in JSON, a fit.
 //!
 //! The options are one object with the keywords of `pyhoid.Tracker`: `structure`, `na` to `nk` (a
 //! number, or a pair that is searched on the warm-up), `criterion`, `start` (coefficients by name, or
@@ -24,7 +24,7 @@ const DEFAULT_WARM_UP_S: f64 = 20.0;
 /// Longest warm-up, samples.
 const LONGEST_WARM_UP: f64 = 1e7;
 
-/// What was asked for, as it is saved.
+/// The request, as it is saved.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct TrackerRequest {
     /// Name of the method; none for the default one.
@@ -36,7 +36,7 @@ pub(crate) struct TrackerRequest {
     pub fit: Option<String>,
 }
 
-/// What it means.
+/// Meaning of it.
 pub(crate) struct ResolvedTracker {
     pub plan: TrackPlan,
     pub sample_time: SampleTime,

@@ -1,4 +1,4 @@
-//! What a tracker reports.
+//! Report of a tracker.
 //!
 //! A list is asked for with its room and the place for its count; with NULL and no room only the
 //! count is reported.
@@ -157,7 +157,7 @@ pub unsafe extern "C" fn hoid_tracker_change_log_odds(tracker: *const HoidTracke
     unsafe { with_tracker(tracker, tell) }
 }
 
-/// What the estimate is worth now: HOID_TRUSTWORTHY, HOID_DOUBTFUL or HOID_NOT_DETERMINED.
+/// Verdict on the estimate now: HOID_TRUSTWORTHY, HOID_DOUBTFUL or HOID_NOT_DETERMINED.
 ///
 /// # Safety
 /// `tracker` was made here; `level` has room for a number.

@@ -1,6 +1,6 @@
 //! A tracker as bytes, to go on elsewhere with the same digits.
 //!
-//! The description is what was asked for and the orders, the bytes are the numbers of
+//! The description is the request and the orders, the bytes are the numbers of
 //! [`hoid_track::Live::saved`] (`packed`).
 
 use hoid_model::Orders;

@@ -25,7 +25,7 @@ const OPERATOR: [(&CStr, &CStr); 6] = [
 /// What a change is of.
 const SHIFTED: [&CStr; HOID_SHIFTS] = [c"K_e", c"K_e_dot", c"omega_nm", c"zeta_nm", c"remnant", c"tau_e"];
 
-/// A tracker and what is known of it.
+/// A tracker and the prior knowledge of it.
 pub(crate) struct Session {
     asked: TrackerRequest,
     plan: TrackPlan,
@@ -71,7 +71,7 @@ impl Session {
         Ok(session)
     }
 
-    /// What it was made of, and its recursion to be saved.
+    /// Components of it, and its recursion to be saved.
     pub fn parts(&mut self) -> (&TrackerRequest, &mut Live) {
         (&self.asked, &mut self.live)
     }
@@ -194,7 +194,7 @@ impl Session {
         odds.ok_or_else(|| Failure::nothing("the method tells no changes; adaptive and multiple-model do"))
     }
 
-    /// What the estimate is worth now.
+    /// Verdict on the estimate now.
     pub fn level(&self) -> VerdictLevel {
         self.tracker().map_or(VerdictLevel::NotDetermined, |tracker| {
             tracker.level(&tracker.operator())

@@ -92,7 +92,7 @@ pub(crate) fn guarded(call: impl FnOnce() -> Result<(), Failure>) -> HoidStatus 
     failure.status
 }
 
-/// What a panic reports.
+/// Report of a panic.
 pub(crate) fn panic_message(panic: &(dyn Any + Send)) -> String {
     let words = (panic.downcast_ref::<&str>().copied())
         .or_else(|| panic.downcast_ref::<String>().map(String::as_str))

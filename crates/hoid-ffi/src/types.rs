@@ -1,4 +1,4 @@
-//! What is handed over. Numbers that are not known are NaN.
+//! The data passed on. Numbers that are not known are NaN.
 
 use std::{ffi::c_char, ptr};
 

@@ -111,7 +111,7 @@ pub enum IdentError {
     /// A start that the search cannot use.
     #[error("the start cannot be used: {reason}")]
     BadStart {
-        /// What is wrong with it, and the remedy.
+        /// Problems with it, and the remedy.
         reason: String,
     },
     /// A name that is not a parameter of the model.
@@ -127,7 +127,7 @@ pub enum IdentError {
     BadOption {
         /// The option.
         option: String,
-        /// What was given.
+        /// The value given.
         found: String,
         /// What would be right.
         expected: String,
@@ -137,7 +137,7 @@ pub enum IdentError {
     Option {
         /// Its name.
         name: &'static str,
-        /// What was found, what was expected, what to do.
+        /// The findings, the expected value, what to do.
         reason: String,
     },
     /// Not one start led to a finite loss.

@@ -13,7 +13,7 @@ use crate::{
     pem::{batched, fit_settings::FitSettings, prediction_focus, simulation_focus},
 };
 
-/// What the fitted model is to be good at.
+/// Purpose of the fitted model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Focus {
     /// One-step-ahead prediction: the prediction error method, efficient where the structure is
@@ -28,7 +28,7 @@ pub enum Focus {
 
 hoid_model::named_choice!(Focus, "focus", 2, { Prediction => "prediction", Simulation => "simulation" });
 
-/// What is to be estimated, and how.
+/// Quantity to be estimated, and how.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Estimator {
     /// The structure.
@@ -53,7 +53,7 @@ pub struct Estimator {
     /// How a residual counts. Default: by its square. With a robust loss each sample of e and u is
     /// held to its neighbours beforehand ([`crate::faults::resistant`]).
     pub loss: Loss,
-    /// What the model is to be good at. Default: prediction.
+    /// Purpose of the model. Default: prediction.
     pub focus: Focus,
     /// True where u of each record has a constant that is not a response to e, an unknown as its initial states are
     /// ([`crate::level`]); not with initial states of zero. Default false.
@@ -191,7 +191,7 @@ impl Estimator {
     /// Fits a model to each record alone.
     ///
     /// Box-Jenkins models of records of one length are searched side by side, in about half of the
-    /// time of one after the other. What a fit finds does not depend on what it is searched
+    /// time of one after the other. Dependencies of a fit finds does not what it is searched
     /// alongside; it differs from that of [`Estimator::fit`] by rounding, less than 1e-7 of a
     /// standard error.
     ///
@@ -215,7 +215,7 @@ impl Estimator {
         self.focus == Focus::Simulation && self.structure != Structure::OutputError
     }
 
-    /// What the method needs of the options.
+    /// Requirements of the method on the options.
     pub(crate) fn settings(&self) -> FitSettings {
         FitSettings {
             structure: self.structure,

@@ -44,7 +44,7 @@ pub struct Fit {
 /// What a grey box fitted: theta is a function of these.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub(crate) struct Physical {
-    /// What was fitted, in a line.
+    /// The fitted model, in a line.
     pub title: String,
     /// Name and estimate of each parameter.
     pub parameters: Vec<(String, Estimate)>,
@@ -144,7 +144,7 @@ impl Fit {
         self.states
     }
 
-    /// What was assumed about the time before the records.
+    /// Assumptions about the time before the records.
     pub fn initial_state(&self) -> InitialState {
         self.initial_state
     }

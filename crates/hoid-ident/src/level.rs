@@ -8,7 +8,7 @@
 //! so that a fit to e and u without their means ([`hoid_model::Detrend::Mean`]) is the fit with c for each record (L.
 //! Ljung, *System Identification*, 1999, section 14.1), but for the ends of the record and what happens in them: over a
 //! step the mean of u is not a level. There c is an unknown of the fit, as the initial states are
-//! ([`crate::Estimator::level`]), and what is left of it in a record is
+//! ([`crate::Estimator::level`]), and the remainder of it in a record is
 //!
 //! `c = eps'z / z'z`, z the residuals of u = 1 at e = 0.
 //!

@@ -21,9 +21,8 @@
 //! and theta minimises `V = (1/N) sum eps(t, theta)^2`: the prediction error method (L. Ljung, *System Identification*,
 //! 1999, ch. 7). It is consistent where the structure holds the true dynamics, in a closed loop too if there is a delay
 //! in the loop, and it attains the Cramér-Rao bound for normal innovations. Its covariance is `sigma^2 (psi' psi)^-1`
-//! with `psi = -d eps/d theta`. What a record does not report about the time before it, the initial states, enters eps
-//! linearly and is eliminated exactly for each theta. ARX is linear in theta and solved in one step; the others by
-//! damped Gauss-Newton from several starts.
+//! with `psi = -d eps/d theta`. The unknown initial states of a record enter eps linearly and is eliminated exactly for
+//! each theta. ARX is linear in theta and solved in one step; the others by damped Gauss-Newton from several starts.
 //!
 //! ```
 //! use hoid_ident::Estimator;

@@ -187,7 +187,7 @@ impl OrderRanges {
     }
 }
 
-/// What decides between candidates; the smallest value wins.
+/// Criterion that decides between candidates; the smallest value wins.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 pub enum Criterion {
     /// The loss itself: right only for candidates with the same number of parameters.
@@ -235,7 +235,7 @@ pub struct Candidate {
     pub outcome: Result<CandidateFigures, String>,
 }
 
-/// What candidates are compared by, all on the same samples.
+/// Criterion for candidates, all on the same samples.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct CandidateFigures {
     /// Loss V.

@@ -11,10 +11,10 @@ use std::{
     },
 };
 
-/// What is being done now.
+/// Current activity.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Step {
-    /// What is counted, in the plural.
+    /// The counted items, in the plural.
     pub what: &'static str,
     /// How many are done.
     pub done: usize,

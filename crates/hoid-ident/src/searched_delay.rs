@@ -1,4 +1,4 @@
-//! What a searched delay adds to the error bars of a fit.
+//! Contribution of a searched delay to the error bars of a fit.
 //!
 //! Where nk is searched it is estimated from the data as theta is, and theta moves with it. The
 //! residual has a slope along the delay too: with `x = (D/C) w = sum_j b_j psi_bj` the response of the

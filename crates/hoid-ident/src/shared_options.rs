@@ -78,7 +78,7 @@ pub fn yes_words(yes: bool) -> String {
     if yes { "yes" } else { "no" }.to_owned()
 }
 
-/// What is known of the person before the data.
+/// Prior knowledge of the person before the data.
 pub fn prior<E: 'static>(default: &str, field: Field<E, OperatorPrior>) -> BatchOption<E> {
     let help = "What is known of the person before the data: population (published people), none, a JSON result of another fit, or \
                 NAME=CENTRE:SPREAD of omega_nm, zeta_nm, tau_e, T_L, T_I, as omega_nm=10.5:0.3 (the spread is relative)";
@@ -148,7 +148,7 @@ pub fn initial_state<E: 'static>(
     })
 }
 
-/// What is held at a value, and what within bounds; each parameter once.
+/// Parameters fixed at a value or constrained to bounds; each parameter once.
 pub fn constraints<E: 'static>(
     field: Field<E, BTreeMap<String, Constraint>>,
     of: Constraints<E>,

@@ -32,7 +32,7 @@ const LIMIT: Duration = Duration::from_secs(1);
 /// A process that does not go on for so long hangs.
 const PATIENCE: Duration = Duration::from_secs(60);
 
-/// What is asked for.
+/// The request.
 #[derive(Debug, Clone)]
 struct Task {
     inputs: u64,
@@ -110,7 +110,7 @@ fn main() -> ExitCode {
     }
 }
 
-/// What all processes report.
+/// Report of all processes.
 #[derive(Debug, Default)]
 struct Sum {
     read: u64,

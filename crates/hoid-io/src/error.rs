@@ -6,8 +6,8 @@ use thiserror::Error;
 use crate::wording::list;
 
 /// Why a file could not be read or written. Each message names the file, the place in it, what was
-/// found, what was expected and the remedy. A `place` is "line 12" where the format has lines, else
-/// "row 12".
+/// found, the expected value and the remedy. A `place` is "line 12" where the format has lines,
+/// else "row 12".
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum IoError {
@@ -34,7 +34,7 @@ pub enum IoError {
     OutputIsInput {
         /// The place of the result.
         file: String,
-        /// What is read.
+        /// The data read.
         input: String,
     },
     /// Results among what they are made of.
@@ -44,7 +44,7 @@ pub enum IoError {
     OutputAmongInputs {
         /// The directory of the results.
         directory: String,
-        /// What is read.
+        /// The data read.
         input: String,
     },
     /// A file that holds no fit.
@@ -52,7 +52,7 @@ pub enum IoError {
     NoFit {
         /// The file.
         file: String,
-        /// What is wrong.
+        /// The problem.
         reason: String,
     },
     /// A file that is not a shared library of a platform that units are made for.
@@ -214,7 +214,7 @@ pub enum IoError {
     Expression {
         /// The text as given.
         found: String,
-        /// What is wrong, and the remedy.
+        /// The problem, and the remedy.
         expected: String,
     },
     /// One column as input and as output.
@@ -236,7 +236,7 @@ pub enum IoError {
         column: String,
         /// The text found, cut to a readable length.
         found: String,
-        /// What to do.
+        /// Remedy.
         remedy: &'static str,
     },
     /// An infinite value.
@@ -326,7 +326,7 @@ pub enum IoError {
     NoSuchTrial {
         /// The file.
         file: String,
-        /// What was asked for.
+        /// The request.
         asked: String,
         /// The names that exist.
         available: String,
@@ -420,9 +420,9 @@ pub enum IoError {
         record: String,
         /// The step, as the option is called.
         step: &'static str,
-        /// What was found.
+        /// The findings.
         found: String,
-        /// What was expected, or the remedy.
+        /// The expected value, or the remedy.
         expected: String,
     },
     /// Text that is not a scale.
@@ -430,7 +430,7 @@ pub enum IoError {
     Scaling {
         /// The text, or the factor.
         found: String,
-        /// What a scale may be.
+        /// Admissible values of a scale.
         expected: String,
     },
     /// Text that is not an offset.
@@ -518,7 +518,7 @@ pub enum IoError {
     NotParquet {
         /// The file.
         file: String,
-        /// What is there instead.
+        /// The replacement.
         found: String,
     },
     /// Bytes of another format than the extension states.
@@ -530,7 +530,7 @@ pub enum IoError {
         file: String,
         /// The format of the extension.
         format: &'static str,
-        /// What is there instead.
+        /// The replacement.
         found: String,
         /// What such a file starts with.
         expected: &'static str,
@@ -548,9 +548,9 @@ pub enum IoError {
     Unsupported {
         /// The file.
         file: String,
-        /// What was found, and where.
+        /// The findings, and where.
         found: String,
-        /// What to do.
+        /// Remedy.
         remedy: &'static str,
     },
     /// What was read does not make a record.

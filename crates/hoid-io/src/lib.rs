@@ -3,7 +3,7 @@
 //! Recordings come as CSV, Parquet, NPZ, MATLAB or XDF, with columns of any name, clocks that jitter and rows that are
 //! missing. Reading takes the columns that are asked for, finds the sampling, checks every value in use, and gives an
 //! evenly sampled [`Record`](hoid_model::Record) or an error that names the place in the file. Nothing is repaired
-//! unasked; what is wrong with the data is reported next to the record.
+//! unasked; problems of the data are reported next to the record.
 //!
 //! ```
 //! use hoid_io::{ReadOptions, read_record};
@@ -29,7 +29,7 @@
 //! | `time` | [`TimeChoice`]: which column is the time; whether it is even: [`even_times`] |
 //! | `record` | [`read_record`], [`read_aligned`], [`read_segments`] by [`ReadOptions`]; [`write_record`] |
 //! | `preparation` | [`Preparation`]: scale, offset, rate, run-in and trend of channels, and the account of it |
-//! | `data_quality` | [`QualityIssue`]: what is wrong with the sampling and the values, where and how much |
+//! | `data_quality` | [`QualityIssue`]: the problems of the sampling and the values, where and how much |
 //! | `survey` | [`survey()`]: what is inside of a file |
 //! | `scenario` | [`read_scenario`]: scenarios in TOML |
 //! | [`fmu`] | functional mock-up units |

@@ -52,7 +52,7 @@ pub fn printable(message: &str) -> String {
     text
 }
 
-/// What a crate reports, short, and without anything that a terminal obeys.
+/// Report of a crate, short, and without anything that a terminal obeys.
 pub(crate) fn told(what: &str) -> String {
     let line = what.lines().next().unwrap_or_default();
     line.chars().take(200).collect::<String>().escape_debug().to_string()
@@ -87,8 +87,8 @@ pub(crate) fn did_you_mean(unknown: &[&str], names: &[&str]) -> String {
     }
 }
 
-/// The column that is what was asked for by another name: the error for `e` or `error`, the control
-/// for `u` or `stick`.
+/// The column that is the request by another name: the error for `e` or `error`, the control for
+/// `u` or `stick`.
 fn by_what_it_is(asked: &str, names: &[&str]) -> Option<String> {
     let default = match (error_among(&[asked]), control_among(&[asked])) {
         (Some(_), _) => error_among(names),

@@ -1,4 +1,4 @@
-//! What an experiment is: `lab.toml`.
+//! Definition of an experiment: `lab.toml`.
 //!
 //! ```toml
 //! name = "First try"
@@ -39,7 +39,7 @@ pub struct Config {
     pub method: String,
     /// What makes a run unverified besides a bit that differs.
     pub limits: Limits,
-    /// What is tracked, and how often.
+    /// The tracked signal, and how often.
     pub condition: Vec<Condition>,
 }
 
@@ -115,9 +115,9 @@ pub struct Condition {
     /// The text of that file, kept with the session.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub scenario_text: Option<String>,
-    /// What is controlled, in s.
+    /// The controlled element, in s.
     pub controlled_element: String,
-    /// What it becomes.
+    /// Its new form.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub last_element: Option<String>,
     /// Time of the change, s from the start of the measurement.
@@ -132,10 +132,10 @@ pub struct Condition {
     pub measurement_s: f64,
     /// Run-in before it, s.
     pub run_in_s: f64,
-    /// What the person follows.
+    /// The signal that the person tracks.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub target: Option<Signal>,
-    /// What disturbs the controlled element at its input.
+    /// Disturbance of the controlled element at its input.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub disturbance: Option<Signal>,
     /// Seed of the phases; each run draws its own from it.

@@ -1,4 +1,4 @@
-//! The task of a condition: what is controlled at each time, and what excites the loop.
+//! The task of a condition: the controlled element at each time, and what excites the loop.
 
 use hoid_model::{
     ContinuousTransferFunction, FamilyOperator, FamilyScenario, FamilyState, Form, ModelError, SampleTime,
@@ -85,7 +85,7 @@ impl Course {
         }
     }
 
-    /// What is controlled at a time from the start of the measurement.
+    /// The controlled element at a time from the start of the measurement.
     pub fn element_at(&self, t_s: f64) -> Result<ContinuousTransferFunction, ModelError> {
         match self {
             Self::Reference(course) => course.parameters_at(t_s).controlled_element.transfer_function(),
@@ -93,7 +93,7 @@ impl Course {
         }
     }
 
-    /// What is controlled all the time; nothing where that changes.
+    /// The controlled element all the time; nothing where that changes.
     ///
     /// # Errors
     /// As [`Course::element_at`].

@@ -17,7 +17,7 @@ pub enum LabError {
     Config {
         /// The file and what of it.
         place: String,
-        /// What was found, what was expected and the remedy.
+        /// The findings, the expected value and the remedy.
         reason: String,
     },
     /// A message of a page that is not one.
@@ -39,7 +39,7 @@ pub enum LabError {
     Damaged {
         /// The file.
         file: String,
-        /// What was found and expected.
+        /// The value found and the value expected.
         reason: String,
     },
     /// No port, or no random numbers.

@@ -1,4 +1,4 @@
-//! What is next to the sessions of an experiment: what it is, who took part, and the manifest of
+//! Files next to the sessions of an experiment: what it is, who took part, and the manifest of
 //! `hoid group`.
 
 use std::{collections::BTreeMap, path::Path};
@@ -140,7 +140,7 @@ pub fn manifest(out: &Path) -> Result<(), LabError> {
     write(&out.join(MANIFEST), &manifest.text())
 }
 
-/// What is known of a condition.
+/// Known properties of a condition.
 fn known(condition: &Condition) -> Result<ConditionSettings, LabError> {
     let course = condition.course()?;
     let lines = course

@@ -46,7 +46,7 @@ pub enum Outgoing {
     Binary(Vec<u8>),
 }
 
-/// What is done.
+/// The action taken.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Mode {
     /// Sessions of people.

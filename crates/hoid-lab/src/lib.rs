@@ -7,7 +7,7 @@
 //! | module | what it holds |
 //! |---|---|
 //! | [`config`] | [`Config`]: the experiment, `lab.toml` |
-//! | [`course`] | [`Course`](course::Course): what is controlled at each time |
+//! | [`course`] | [`Course`](course::Course): the controlled element at each time |
 //! | [`order`] | the order of the runs, by Latin squares |
 //! | [`task`] | [`Task`](task::Task): a run as tables, and its recomputation |
 //! | [`plant`] | the arithmetic of a tick, twin of the page's |

@@ -96,7 +96,7 @@ impl InputMap {
         }
     }
 
-    /// What is wrong with it.
+    /// Problems with it.
     pub fn fault(&self) -> Option<String> {
         let finite = [self.centre, self.span, self.dead, self.gain]
             .iter()

@@ -1,4 +1,4 @@
-//! A run as the page draws it again: its signals at 100 Hz, its live estimate, and what it is worth
+//! A run as the page draws it again: its signals at 100 Hz, its live estimate, and its reliability
 //! now.
 
 use serde_json::{Value, json};

@@ -51,7 +51,7 @@ pub struct Task {
     pub disturbance: Vec<f64>,
 }
 
-/// What the loop did.
+/// Action of the loop.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Signals {
     /// u of the hand at each tick.

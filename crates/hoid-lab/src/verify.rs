@@ -1,4 +1,4 @@
-//! What a run is worth: every tick recomputed from the logged inputs.
+//! Reliability of a run: every tick recomputed from the logged inputs.
 //!
 //! A run is *verified* when nothing of this is found, else *unverified* with the reasons:
 //!
@@ -34,12 +34,12 @@ const TABLE: f64 = 1e-9;
 /// A frame is missed when it comes this many times the typical interval after the last.
 const MISSED: f64 = 1.5;
 
-/// What was found of a run.
+/// Findings about a run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Checked {
     /// Trustworthy is verified.
     pub verdict: Verdict,
-    /// What was measured besides.
+    /// Additional measurements.
     pub measures: Measures,
 }
 

@@ -27,7 +27,7 @@ pub enum Role {
     Experimenter,
 }
 
-/// What a page states. Variants without fields have braces, so that they take no unknown ones.
+/// Content of a page. Variants without fields have braces, so that they take no unknown ones.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(tag = "type", rename_all = "kebab-case", deny_unknown_fields)]
 #[allow(missing_docs)]
@@ -67,7 +67,7 @@ pub enum FromPage {
     Reports {},
 }
 
-/// What the server reports.
+/// Report of the server.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(tag = "type", rename_all = "kebab-case")]
 #[allow(missing_docs)]
@@ -87,7 +87,7 @@ pub enum ToPage<'a> {
         tables: Vec<usize>,
         operator: Option<&'a SimulatedOperator>,
     },
-    /// What a run is worth.
+    /// Reliability of a run.
     Verdict { done: &'a Done, measures: &'a Measures },
     /// The estimate while a run goes on.
     Live { number: usize, line: &'a LiveLine },
@@ -104,7 +104,7 @@ pub struct State {
     pub phase: &'static str,
     /// Name of the experiment.
     pub name: String,
-    /// What is to be confirmed.
+    /// Items to be confirmed.
     pub consent: String,
     /// When the person sees the live estimate.
     pub live: LiveFor,

@@ -5,14 +5,14 @@ use thiserror::Error;
 use crate::UnknownName;
 
 /// Why a model, a record or a conversion could not be made. Each message names the quantity, what
-/// was found, what was expected, and where it helps, the remedy.
+/// was found, the expected value, and where it helps, the remedy.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum ModelError {
     /// A number outside the range that has a meaning.
     #[error("{quantity} is {found}, expected {expected}")]
     OutOfRange {
-        /// What the number is, with its symbol and unit.
+        /// Definition of the number, with its symbol and unit.
         quantity: &'static str,
         /// The value given.
         found: f64,
@@ -49,7 +49,7 @@ pub enum ModelError {
     /// Parameters of an operator that do not make one.
     #[error("{reason}")]
     Operator {
-        /// What is wrong.
+        /// The problem.
         reason: String,
     },
     /// A record without a sample.
@@ -77,7 +77,7 @@ pub enum ModelError {
     Decimation {
         /// Label of the record.
         label: String,
-        /// What was found.
+        /// The findings.
         found: String,
         /// What would do.
         expected: String,
@@ -87,9 +87,9 @@ pub enum ModelError {
     Joined {
         /// Label of the second record.
         label: String,
-        /// What differs.
+        /// The differences.
         found: String,
-        /// What is needed.
+        /// Requirements.
         expected: &'static str,
     },
     /// A time span that holds no samples of the record.
@@ -109,7 +109,7 @@ pub enum ModelError {
     Orders {
         /// The orders as given.
         found: String,
-        /// What is wrong, and the remedy.
+        /// The problem, and the remedy.
         expected: String,
     },
     /// A transfer function that the method cannot treat.
@@ -117,7 +117,7 @@ pub enum ModelError {
     TransferFunction {
         /// The transfer function as given.
         found: String,
-        /// What is wrong, and the remedy.
+        /// The problem, and the remedy.
         expected: String,
     },
     /// A discrete model without a continuous one.
@@ -156,7 +156,7 @@ pub enum NotConvertible {
     /// Polynomials of no operator of the family.
     #[error("the polynomials are those of no operator of the family: {reason}")]
     NotOfTheFamily {
-        /// What is wrong.
+        /// The problem.
         reason: String,
     },
     /// A pole on the closed negative real axis has no real logarithm.
@@ -210,7 +210,7 @@ pub enum NotConvertible {
     NotARemnantFilter {
         /// Order m.
         order: usize,
-        /// What is wrong.
+        /// The problem.
         reason: String,
     },
 }

@@ -1,4 +1,4 @@
-//! A fault of recorded data: what it is, where, how large, and what was done about it.
+//! A fault of recorded data: what it is, where, how large, and the actions taken about it.
 //!
 //! A [`Fault`] is a place in one channel of a record (or in all of them) where the numbers cannot be what the channel
 //! did. How faults are found is reported where that is done; here stands what is reported about one, so that a file, a
@@ -9,7 +9,7 @@ use std::fmt;
 
 use crate::Finding;
 
-/// What is wrong.
+/// The problem.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
 #[non_exhaustive]
 pub enum FaultKind {
@@ -48,7 +48,7 @@ crate::named_choice!(FaultKind, "kind of fault", 10, {
     Sign => "sign",
 });
 
-/// What is to be done about faults.
+/// How faults are handled.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 pub enum FaultHandling {
     /// They are reported, and the data stay as they are.
@@ -69,7 +69,7 @@ crate::named_choice!(FaultHandling, "handling of faults", 4, {
     Keep => "keep",
 });
 
-/// What was done about a fault.
+/// Processing applied to a fault.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum FaultAction {
     /// It is reported; the data are as they were.
@@ -89,7 +89,7 @@ crate::named_choice!(FaultAction, "action on a fault", 3, {
 /// One fault.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Fault {
-    /// What it is.
+    /// Its definition.
     pub kind: FaultKind,
     /// The channel; empty for all channels and for the time.
     pub channel: String,
@@ -105,12 +105,12 @@ pub struct Fault {
     /// The size in robust standard deviations of what the statistic of this kind leaves of good data;
     /// none where the kind has no such statistic.
     pub deviations: Option<f64>,
-    /// What was done.
+    /// The actions taken.
     pub action: FaultAction,
 }
 
 impl Fault {
-    /// What can be done about it by hand.
+    /// Remedy by hand.
     pub fn remedy(&self) -> &'static str {
         match self.kind {
             FaultKind::TimeUnit => "t must be in s: divide a t in ms by 1000, or give the sampling frequency with --fs",
@@ -186,8 +186,8 @@ const TOLD: usize = 3;
 /// Share of the samples that may be repaired before the rest is doubted.
 pub const MOST_MENDED: f64 = 0.2;
 
-/// What faults show about a result: a note where all of a kind were repaired, a doubt where they
-/// were not, and a doubt where more than [`MOST_MENDED`] of the samples are gone.
+/// Information of faults about a result: a note where all of a kind were repaired, a doubt where
+/// they were not, and a doubt where more than [`MOST_MENDED`] of the samples are gone.
 pub fn fault_findings(faults: &[Fault], samples: usize) -> Vec<Finding> {
     let mut all = Vec::new();
     for kind in FaultKind::ALL {

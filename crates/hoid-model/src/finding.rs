@@ -1,4 +1,4 @@
-//! What can make a result doubtful, in words and in a form for programs.
+//! Findings that make a result doubtful, in words and in a form for programs.
 //!
 //! A [`Finding`] is one observation about a result: how a search ended, a parameter at its bound,
 //! methods that do not agree, a quantity that the data do not determine. It has a kind (a name that
@@ -35,7 +35,7 @@ crate::named_choice!(Severity, "severity", 3, {
 /// One observation about a result.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Finding {
-    /// What was observed, as a name for programs: `not-converged`, `delay-at-bound`.
+    /// The observation, as a name for programs: `not-converged`, `delay-at-bound`.
     #[serde(deserialize_with = "crate::interned::name")]
     pub kind: crate::interned::Name,
     /// How much it weighs.
@@ -70,7 +70,7 @@ impl Finding {
     }
 }
 
-/// What a result is worth.
+/// Reliability of a result.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
 pub enum VerdictLevel {
     /// Nothing speaks against it.
@@ -90,7 +90,7 @@ crate::named_choice!(VerdictLevel, "verdict", 3, {
 /// The level, and the findings it rests on, the gravest first.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Verdict {
-    /// What the result is worth.
+    /// Verdict on the result.
     pub level: VerdictLevel,
     findings: Vec<Finding>,
 }
@@ -122,7 +122,7 @@ impl Verdict {
         &self.findings
     }
 
-    /// What speaks against the result: the findings that are more than notes.
+    /// Findings against the result: the findings that are more than notes.
     pub fn reasons(&self) -> impl Iterator<Item = &str> {
         let weighs = |finding: &&Finding| finding.severity > Severity::Note;
         self.findings
@@ -131,7 +131,7 @@ impl Verdict {
             .map(|finding| finding.message.as_str())
     }
 
-    /// What is worth knowing besides.
+    /// Additional notes.
     pub fn notes(&self) -> impl Iterator<Item = &str> {
         let light = |finding: &&Finding| finding.severity == Severity::Note;
         self.findings

@@ -104,7 +104,7 @@ impl HeldSystem {
         &self.transition
     }
 
-    /// What the input v(k) adds to the state; all of it where the input is not late.
+    /// Contribution of the input v(k) to the state; all of it where the input is not late.
     pub fn input(&self) -> &[f64] {
         &self.now
     }

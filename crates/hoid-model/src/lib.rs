@@ -59,7 +59,7 @@
 //! | [`margins`] | crossover frequency, phase and gain margin |
 //! | [`remnant_gain`] | the gain K_n that gives a demanded noise level |
 //! | [`GainUnit`] | the units of gains, of what the channels are measured in |
-//! | [`Finding`], [`Verdict`] | what makes a result doubtful, and what it is worth |
+//! | [`Finding`], [`Verdict`] | what makes a result doubtful, and its reliability |
 //! | [`named_choice!`], [`NamedChoice`] | the names that users type |
 
 mod error;

@@ -29,7 +29,7 @@ pub fn value(p: &[f64], x: Complex64) -> Complex64 {
 }
 
 /// Monic polynomial `z^n + p[1] z^{n-1} + ... + p[n]` with these roots, `p[0] = 1`. Complex roots
-/// must come in conjugate pairs; what is left of the imaginary parts by rounding is dropped.
+/// must come in conjugate pairs; the remainder of the imaginary parts by rounding is dropped.
 pub fn from_roots(roots: &[Complex64]) -> Vec<f64> {
     let mut p = vec![Complex64::new(1.0, 0.0)];
     for root in roots {

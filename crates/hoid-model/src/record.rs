@@ -29,7 +29,7 @@ impl Channel {
     }
 }
 
-/// What to take out of input and output before a fit.
+/// Trend to remove from input and output before a fit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 pub enum Detrend {
     /// Nothing: the data as they are.

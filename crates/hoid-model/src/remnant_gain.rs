@@ -28,7 +28,7 @@ use crate::{
     ContinuousTransferFunction, ModelError, SampleTime, margins::closed_loop_is_stable, remnant::RemnantFilter,
 };
 
-/// What the noise level P_n compares.
+/// Reference of the noise level P_n.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum NoiseDefinition {
     /// `var(u_n)/var(u)`: the part of the operator's output that is due to the remnant, fed back

@@ -29,7 +29,7 @@ use crate::{
 /// asks for all the memory.
 const MOST_SAMPLES: usize = 100_000_000;
 
-/// A state of adaptation: the operator and what they control.
+/// A state of adaptation: the operator and the controlled element.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OperatingState {
     /// The operator.
@@ -101,7 +101,7 @@ pub enum RemnantStrength {
     Level {
         /// Noise level P_n.
         level: f64,
-        /// What P_n is a ratio of.
+        /// Reference of P_n.
         definition: NoiseDefinition,
     },
     /// The gain K_n itself, before and after the change.

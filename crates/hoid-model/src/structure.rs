@@ -271,7 +271,7 @@ impl fmt::Display for Orders {
 /// Theta in the order of these names: every coefficient once.
 ///
 /// # Errors
-/// What is wrong, as the end of a sentence that starts with the name of the option.
+/// The problem, as the end of a sentence that starts with the name of the option.
 pub fn theta_of(names: &[String], start: &BTreeMap<String, f64>) -> Result<Vec<f64>, String> {
     if let Some(unknown) = start.keys().find(|name| !names.contains(name)) {
         return Err(format!(

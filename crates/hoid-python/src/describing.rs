@@ -80,8 +80,8 @@ impl PyDescription {
         self.0.to_json()
     }
 
-    /// The records as they were described: which of those given each is a part of, the record, and what was
-    /// done to it.
+    /// The records as they were described: which of those given each is a part of, the record, and the processing of
+    /// it.
     fn records<'py>(&self, py: Python<'py>) -> PyResult<Vec<UsedRecord<'py>>> {
         used_records(py, &self.0.data)
     }

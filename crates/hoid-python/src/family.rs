@@ -350,8 +350,7 @@ impl PyOperatorFit {
         self.0.excitation.as_deref()
     }
 
-    /// The records as they were fitted: which of those given each is a part of, the record, and what was done
-    /// to it.
+    /// The records as they were fitted: which of those given each is a part of, the record, and the processing of it.
     fn records<'py>(&self, py: Python<'py>) -> PyResult<Vec<UsedRecord<'py>>> {
         used_records(py, &self.0.data)
     }

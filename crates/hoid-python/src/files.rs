@@ -14,7 +14,8 @@ use crate::{
     names,
 };
 
-/// The parts of a record, what was done to the numbers of the file, and notes on reading it.
+/// The parts of a record, the processing applied to the numbers of the file, and notes on reading
+/// it.
 type ReadParts<'py> = (Bound<'py, PyDict>, Vec<String>, Vec<String>);
 
 /// The record of a file, or the records between what is masked.
@@ -156,7 +157,7 @@ pub fn detrended<'py>(py: Python<'py>, record: &Bound<'py, PyAny>, how: &str) ->
     Ok(parts(py, record.detrended(how))?)
 }
 
-/// The record at a lower rate, and what was done; None where nothing was.
+/// The record at a lower rate, and the actions taken; None where nothing was.
 #[pyfunction]
 #[pyo3(signature = (record, decimate))]
 pub fn decimated<'py>(

@@ -288,8 +288,7 @@ impl PyFit {
         accounts.map(|account| account.level.map(pair)).collect()
     }
 
-    /// The records as they were fitted: which of those given each is a part of, the record, and what was done
-    /// to it.
+    /// The records as they were fitted: which of those given each is a part of, the record, and the processing of it.
     fn records<'py>(&self, py: Python<'py>) -> PyResult<Vec<UsedRecord<'py>>> {
         let data = self.data().map(|data| used_records(py, data));
         data.unwrap_or_else(|| Ok(Vec::new()))
@@ -317,7 +316,7 @@ impl PyFit {
         Ok(figures::quality(py, &quality)?)
     }
 
-    /// What it is worth; of a part of another result, by these records alone.
+    /// The verdict on it; of a part of another result, by these records alone.
     fn verdict(&self, py: Python<'_>, records: Vec<Bound<'_, PyAny>>) -> Outcome<VerdictParts> {
         if let Some(whole) = &self.whole {
             return Ok(each!(whole, found => figures::verdict(&found.verdict)));

@@ -19,7 +19,7 @@ use crate::errors::{Failure, Outcome, bad_option};
 /// Time between two checks for signals.
 const LOOK: Duration = Duration::from_millis(50);
 
-/// What the work and the waiting thread share.
+/// Common parts of the work and the waiting thread.
 #[derive(Debug, Default)]
 pub struct RunStatus {
     stopped: AtomicBool,

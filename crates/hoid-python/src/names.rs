@@ -35,7 +35,7 @@ pub fn choice<T: NamedChoice>(option: &str, found: &str) -> Outcome<T> {
     word(option, found, &words)
 }
 
-/// What can be left out of a record.
+/// Parts that can be left out of a record.
 pub fn quality_issue_kind(found: &str) -> Outcome<QualityIssueKind> {
     let kinds = [
         QualityIssueKind::Missing,

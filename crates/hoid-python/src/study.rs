@@ -20,7 +20,7 @@ fn left(py: Python<'_>, outcome: StudyOutcome) -> Outcome<Left> {
     Ok((outcome.finished, outcome.estimates, outcome.tables))
 }
 
-/// What the user should know, as warnings of Python.
+/// Warnings for the user, as warnings of Python.
 pub fn warn(py: Python<'_>, notes: &[String]) -> PyResult<()> {
     for note in notes {
         let text = CString::new(note.replace('\0', " "))?;

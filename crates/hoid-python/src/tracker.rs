@@ -297,7 +297,7 @@ impl PyTracker {
         self.plan.options().at_rad_s.clone()
     }
 
-    /// What the person controls.
+    /// The controlled element.
     #[getter]
     fn controlled_element(&self) -> Option<String> {
         let element = self.plan.options().controlled_element.as_ref();

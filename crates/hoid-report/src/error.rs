@@ -47,7 +47,7 @@ pub enum ReportError {
     /// The page template could not be filled: a defect of this crate.
     #[error("the page template could not be filled: {reason}; please report this as a defect")]
     Template {
-        /// What the template engine reported.
+        /// Report of the template engine.
         reason: String,
     },
 }

@@ -1,4 +1,4 @@
-//! The head of a page: what the result is worth, what it reports in a sentence, and the parameters
+//! The head of a page: the verdict on the result, what it reports in a sentence, and the parameters
 //! with their errors. Everything else on a page explains it.
 
 use hoid_model::{Verdict, VerdictLevel, numbers::significant, uncertainty::Estimate};
@@ -6,10 +6,10 @@ use minijinja::{Value, context};
 
 use crate::cells;
 
-/// What a fit shows.
+/// Results of a fit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FitSummary {
-    /// What it is worth.
+    /// The verdict on it.
     pub verdict: Verdict,
     /// The answer in words, as [`sentence`] makes it.
     pub sentence: Option<String>,
@@ -28,7 +28,7 @@ pub struct ParameterRow {
     pub estimate: Option<Estimate>,
     /// The interval of 95 %; an end that is open is infinite.
     pub interval: Option<(f64, f64)>,
-    /// What is to be known of it, such as the share of a prior.
+    /// Notes on it, such as the share of a prior.
     pub remark: String,
 }
 

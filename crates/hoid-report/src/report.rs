@@ -17,18 +17,18 @@ use crate::{
 /// Records of a model whose time response is drawn.
 const MOST_TIME_RESPONSES: usize = 4;
 
-/// What the page is about.
+/// Subject of the page.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Report<'a> {
     /// Heading of the page.
     pub title: String,
-    /// What was done and with what, as name and value: command, versions, records, span, seed.
+    /// The processing and its inputs, as name and value: command, versions, records, span, seed.
     pub settings: Vec<(String, String)>,
     /// The models, one section each.
     pub models: Vec<ModelSection<'a>>,
     /// Remarks for the reader, such as warnings of the command.
     pub notes: Vec<String>,
-    /// What the fit shows, on top of the page.
+    /// Results of the fit, on top of the page.
     pub answer: Option<FitSummary>,
     /// Figures that answer what was asked, before all others.
     pub pictures: Vec<Picture>,

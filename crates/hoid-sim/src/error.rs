@@ -3,7 +3,7 @@
 use hoid_model::ModelError;
 use thiserror::Error;
 
-/// What can go wrong in a simulation.
+/// Errors of a simulation.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[non_exhaustive]
 pub enum SimError {

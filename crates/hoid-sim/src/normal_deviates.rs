@@ -102,7 +102,7 @@ impl Buffered {
         }
     }
 
-    /// What is left of what was drawn, in numbers.
+    /// The remainder of what was drawn, in numbers.
     #[inline(always)]
     fn drawn(&self) -> &[[u8; 8]] {
         self.bytes[self.at..].as_chunks().0

@@ -106,7 +106,7 @@ impl OperatorRun {
         true
     }
 
-    /// What is in the ring for the sample that is next.
+    /// Contents of the ring for the sample that is next.
     fn respond(&mut self) {
         let [of_output, of_rate] = self.matrices().operator_output;
         let last = self.memory.len() - 1;

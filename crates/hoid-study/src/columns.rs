@@ -2,7 +2,7 @@
 //!
 //! | table | a row is | columns |
 //! |---|---|---|
-//! | fits | one estimator on one replication | what was simulated and estimated; how it ended, what it is worth; theta, operator, remnant with standard errors; error measures |
+//! | fits | one estimator on one replication | the simulated scenario and estimated; how it ended, its reliability; theta, operator, remnant with standard errors; error measures |
 //! | traces | one kept point of a recursion | cell, replication, estimator, t; theta and operator |
 //! | cells | one scenario of the grid | its settings and its true parameters |
 //!
@@ -138,7 +138,7 @@ impl Schemas {
     }
 }
 
-/// What to know about each table of a study.
+/// Notes on each table of a study.
 pub(crate) fn comments(plan: &Plan) -> Vec<String> {
     vec![
         format!("hoid {} study {}", env!("CARGO_PKG_VERSION"), plan.name),

@@ -3,8 +3,8 @@
 use hoid_io::IoError;
 use thiserror::Error;
 
-/// What can go wrong with a study as a whole. A fit that fails is a row of the results with its
-/// reason, not an error.
+/// Errors of a study as a whole. A fit that fails is a row of the results with its reason, not an
+/// error.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum StudyError {
@@ -15,7 +15,7 @@ pub enum StudyError {
         path: String,
         /// Line, from 1, where one can be named.
         line: Option<usize>,
-        /// What is wrong and what was expected.
+        /// What is wrong and the expected value.
         reason: String,
     },
     /// A file that cannot be read or written.
@@ -24,7 +24,7 @@ pub enum StudyError {
     /// A shard that is none.
     #[error("shard {found:?}: expected I/N with 1 <= I <= N, such as 2/7")]
     BadShard {
-        /// What was given.
+        /// The value given.
         found: String,
     },
     /// A `study.json` that is not one.
@@ -34,7 +34,7 @@ pub enum StudyError {
     Manifest {
         /// The file.
         file: String,
-        /// What is wrong.
+        /// The problem.
         reason: String,
     },
     /// Results would be overwritten.
@@ -62,7 +62,7 @@ pub enum StudyError {
     OtherStudy {
         /// The directory.
         directory: String,
-        /// What differs.
+        /// The differences.
         reason: String,
     },
     /// No results where some were expected.
@@ -82,7 +82,7 @@ pub enum StudyError {
     Table {
         /// The file.
         file: String,
-        /// What is wrong.
+        /// The problem.
         reason: String,
     },
     /// A study that is already whole.
@@ -126,7 +126,7 @@ pub enum StudyError {
     Pattern {
         /// The pattern.
         pattern: String,
-        /// What is wrong.
+        /// The problem.
         reason: String,
     },
     /// A directory without runs.

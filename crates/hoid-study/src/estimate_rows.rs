@@ -242,7 +242,7 @@ impl<'a> EstimateRows<'a> {
         Ok(())
     }
 
-    /// What the estimate is worth, and the kinds of what speaks against it.
+    /// Verdict on the estimate, and the kinds of the findings against it.
     pub fn verdict(&mut self, verdict: &Verdict) {
         let against = verdict
             .findings()

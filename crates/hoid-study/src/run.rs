@@ -58,7 +58,7 @@ pub struct Outcome {
     pub estimates: u64,
     /// The tables; empty for a shard, which waits to be merged.
     pub tables: Vec<PathBuf>,
-    /// What the user should know of the directory: damaged blocks that were computed again.
+    /// Warnings about the directory: damaged blocks that were computed again.
     pub notes: Vec<String>,
 }
 

@@ -1,4 +1,4 @@
-//! What is next to the results: `study.json`.
+//! Files next to the results: `study.json`.
 //!
 //! It reports which plan and which program made the parts of a directory, and which shard of the
 //! study they are. Two directories belong together when plan, replications, seed and version are

@@ -1,4 +1,4 @@
-//! What a block on disk is: its plan, its number, and the checksum of each of its tables.
+//! Definition of a block on disk: its plan, its number, and the checksum of each of its tables.
 //!
 //! The seal of a block is written after its tables. A block is whole when its seal names this plan
 //! and this block and each table has the bytes that the seal reports; a damaged disk, a cut file

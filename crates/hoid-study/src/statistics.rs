@@ -12,7 +12,7 @@
 
 use hoid_numerics::statistics::{self, finite_sorted, mean};
 
-/// What a box plot and a table state about some values.
+/// Statement of a box plot and a table about some values.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Statistics {
     /// Values, those that are not numbers left out.

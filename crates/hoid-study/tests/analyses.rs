@@ -180,7 +180,7 @@ fn a_row_is_the_analysis_of_the_run() {
         assert_eq!(real(&fits, &name, at), estimate.value, "{name}");
     }
 
-    // The summary counts the verdicts, and takes errors against what was simulated.
+    // The summary counts the verdicts, and takes errors against the simulated scenario.
     let results = Results::read(directory.path()).unwrap();
     let one = |quantity: &str, scenario: &str, name: &str| {
         let query = Query::of(quantity).scenario(scenario).name(name);

@@ -284,7 +284,7 @@ fn a_bad_file_is_a_row_and_a_bad_manifest_an_error() {
 }
 
 /// Runs of two people who change at the seam are joined, and what is found in the frequency domain
-/// is what was simulated.
+/// is the simulated scenario.
 #[test]
 fn joined_runs_settle_and_fits_agree_with_the_describing_function() {
     let data = recorded();

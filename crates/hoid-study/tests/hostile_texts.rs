@@ -123,7 +123,7 @@ const CHARACTERS: [char; 14] = [
     '[', ']', '{', '}', '"', '\'', '=', '.', ',', '#', '\n', '\0', '\u{1b}', '\u{fffd}',
 ];
 
-/// What is done to a text.
+/// Treatment of a text.
 #[derive(Debug, Clone)]
 enum Change {
     Value(Index, Index),

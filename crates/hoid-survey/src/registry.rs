@@ -69,7 +69,7 @@ pub fn is_for_comparison(method: &Method) -> bool {
         .any(|own| own.name() == method.name())
 }
 
-/// What is known of each method: what command line, plans, Python and the book read.
+/// Known properties of each method: what command line, plans, Python and the book read.
 pub fn registry() -> Vec<MethodSpec> {
     methods().iter().map(Method::spec).collect()
 }

@@ -72,7 +72,7 @@ fn saved() -> &'static Saved {
     })
 }
 
-/// What is done to numbers.
+/// Treatment of numbers.
 #[derive(Debug, Clone)]
 enum Tampering {
     Set(Index, f64),

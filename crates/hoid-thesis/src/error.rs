@@ -34,7 +34,7 @@ pub enum ThesisError {
     Unsuited {
         /// The comparator.
         method: &'static str,
-        /// What is wrong.
+        /// The problem.
         quantity: String,
         /// As it was found.
         found: String,

@@ -34,7 +34,7 @@ use crate::{
 const MEMORY_S: f64 = 10.0;
 /// Lead of the logarithm of the evidence with which another delay is taken.
 const LEAD: f64 = 2.0;
-/// What the evidence is divided by where it shows how sure the delay is.
+/// Definition of the evidence is divided by where it shows how sure the delay.
 const TEMPER: f64 = 3.0;
 /// Standard deviations up to which an innovation counts.
 const LARGEST: f64 = 5.0;

@@ -39,7 +39,7 @@ pub fn too_many(parameters: usize) -> IdentError {
     }
 }
 
-/// What a recursion is made of.
+/// Components of a recursion.
 pub struct Plan<'a> {
     /// Structure, orders and options.
     pub setup: &'a Setup,

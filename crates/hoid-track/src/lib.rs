@@ -29,7 +29,7 @@
 //! | `methods`, `method` | [`Method`]: the recursive methods, a file or folder each; the self-description of each |
 //! | [`building`] | what a method is made of, for those in other crates |
 //! | `options`, `shared_options`, `memory`, `forgetting` | [`TrackOptions`]: what is to be tracked, and how |
-//! | `person_prior` | [`PersonPrior`]: what is known of a person before the first sample |
+//! | `person_prior` | [`PersonPrior`]: the prior knowledge of a person before the first sample |
 //! | `request`, `plan` | [`TrackRequest`]: what is asked for; [`TrackPlan`]: orders that are still open, searched on the start span |
 //! | `setup`, `start`, `start_noise`, `gain` | what a recursion is built of: structure, start, way of forgetting |
 //! | `kernel`, `recursion` | RLS and RPEM of the real-time kernel; what every recursion does |

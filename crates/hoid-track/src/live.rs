@@ -34,7 +34,7 @@ pub enum Live {
 /// What a sample led to.
 #[derive(Debug, Default)]
 pub struct LiveOutcome {
-    /// What the tracker reports, once there is one.
+    /// Report of the tracker, once there is one.
     pub outcome: Option<Outcome>,
     /// Options and search of a start fit that has just been made.
     pub started: Option<(TrackOptions, Option<Choice>)>,

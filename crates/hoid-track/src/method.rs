@@ -30,7 +30,7 @@ use crate::{
 pub struct About {
     /// Name as typed.
     pub name: &'static str,
-    /// What it is, in a line without a full stop.
+    /// Its definition, in a line without a full stop.
     pub help: &'static str,
     /// Where it comes from.
     pub source: &'static str,
@@ -220,7 +220,7 @@ pub trait RecursiveMethod: Settings + Boxed + 'static {
         None
     }
 
-    /// What is known of the person before the first sample, where that is an option.
+    /// Prior knowledge of the person before the first sample, where that is an option.
     fn person_prior(&self) -> Option<&PersonPrior> {
         None
     }
@@ -231,7 +231,7 @@ pub trait RecursiveMethod: Settings + Boxed + 'static {
         None
     }
 
-    /// Takes what is known of the person; false where that is not an option.
+    /// Takes the prior knowledge of the person; false where that is not an option.
     fn set_person_prior(&mut self, _prior: PersonPrior) -> bool {
         false
     }
@@ -243,7 +243,7 @@ pub trait RecursiveMethod: Settings + Boxed + 'static {
     fn retain(&mut self, _known: &dyn Fn(&str) -> bool) {}
 }
 
-/// What is known of a method.
+/// Known properties of a method.
 pub fn spec(method: &dyn RecursiveMethod) -> MethodSpec {
     let about = method.about();
     let own = |setting: Setting| match about.defaults.iter().find(|(name, _)| *name == setting.name) {

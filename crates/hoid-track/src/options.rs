@@ -1,4 +1,4 @@
-//! What is to be tracked, and how.
+//! Signals to be tracked, and how.
 
 use hoid_ident::{Estimator, IdentError, SearchOptions};
 use hoid_model::{ContinuousTransferFunction, Orders, Record, SampleTime, Structure};
@@ -33,7 +33,7 @@ pub struct TrackOptions {
     pub largest: f64,
     /// Frequencies at which a trace tells gain and phase, rad/s. Default none.
     pub at_rad_s: Vec<f64>,
-    /// What the person controls, for crossover and phase margin. Default none.
+    /// The controlled element, for crossover and phase margin. Default none.
     pub controlled_element: Option<ContinuousTransferFunction>,
 }
 
@@ -131,7 +131,7 @@ impl TrackOptions {
         Ok(names.iter().map(of).collect())
     }
 
-    /// What the recursion is built of.
+    /// Components of the recursion.
     ///
     /// # Errors
     /// As [`TrackOptions::memories`].

@@ -1,4 +1,4 @@
-//! What a tracker reports about its samples.
+//! Report of a tracker on its samples.
 
 /// Samples that were not as they should be.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -16,7 +16,7 @@ pub struct Counts {
     pub shortened: u64,
 }
 
-/// What a tracker reports about a sample.
+/// Report of a tracker on a sample.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Outcome {
     /// A-priori innovation; `None` at a sample that was skipped or held back.

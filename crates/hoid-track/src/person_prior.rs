@@ -1,5 +1,5 @@
-//! What is known of a person before the first sample: an option of methods that start without a fit
-//! of the record.
+//! Prior knowledge of a person before the first sample: an option of methods that start without a
+//! fit of the record.
 
 use hoid_ident::{
     IdentError,
@@ -8,7 +8,7 @@ use hoid_ident::{
 };
 use hoid_model::{FittedOperator, SampleTime};
 
-/// What is known of a person before the first sample.
+/// Prior knowledge of a person before the first sample.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub enum PersonPrior {
     /// What is usual of people.

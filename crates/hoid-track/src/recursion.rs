@@ -1,4 +1,4 @@
-//! What a recursive method is.
+//! Definition of a recursive method.
 
 use hoid_core::{recursion::Step, state::State};
 use hoid_model::uncertainty::{Estimate, OperatorEstimate};
@@ -16,7 +16,7 @@ pub struct Sample {
     pub reference: Option<f64>,
 }
 
-/// What a recursion reports about a sample that it has taken.
+/// Report of a recursion on a sample that it has taken.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StepOutcome {
     /// A-priori innovation.

@@ -16,7 +16,7 @@ use crate::{
 /// Where the recursion is to start.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub enum RequestedStart {
-    /// As the method does: from a batch fit, or from what is known of people.
+    /// As the method does: from a batch fit, or from the prior knowledge of people.
     #[default]
     Default,
     /// From nothing.
@@ -38,13 +38,13 @@ pub struct TrackRequest {
     pub delay: Option<DelayRange>,
     /// Where it starts.
     pub start: RequestedStart,
-    /// What decides between orders that are searched.
+    /// Criterion that decides between orders that are searched.
     pub criterion: Criterion,
     /// Magnitude of e or u beyond which a sample is a fault.
     pub largest: f64,
     /// Frequencies at which the response is reported, rad/s.
     pub at_rad_s: Vec<f64>,
-    /// What the person controls.
+    /// The controlled element.
     pub controlled_element: Option<ContinuousTransferFunction>,
 }
 

@@ -1,4 +1,4 @@
-//! What a recursion is built of, next to its start: structure, orders, and the options that all
+//! Components of a recursion, next to its start: structure, orders, and the options that all
 //! methods read alike.
 
 use std::collections::BTreeMap;
@@ -9,7 +9,7 @@ use hoid_model::{Orders, Structure};
 
 use crate::{forgetting::ForgettingRule, memory::Memory, shared_options::WindupGuard};
 
-/// Delay of people who track, s: what is supposed where none is given.
+/// Delay of people who track, s: the prior where none is given.
 pub(crate) const DEFAULT_DELAY_S: f64 = 0.2;
 
 /// Names of the operator's parameters in a physical recursion.
@@ -26,7 +26,7 @@ pub enum StartAt {
     Nothing,
 }
 
-/// What a recursion is built of.
+/// Components of a recursion.
 #[derive(Debug, Clone)]
 pub struct Setup {
     /// The structure.

@@ -283,7 +283,7 @@ fn physical_values(setup: &Setup, theta: &[f64], sample_time: SampleTime) -> Res
     Ok(eta)
 }
 
-/// What a fit gives: the values, their covariance, the fit, and the variance of the innovations of
+/// Result of a fit: the values, their covariance, the fit, and the variance of the innovations of
 /// the model with these values.
 struct FittedStart {
     values: Vec<f64>,

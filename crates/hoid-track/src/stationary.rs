@@ -383,7 +383,7 @@ impl StationaryWatch {
         });
     }
 
-    /// What was found or done at the last sample.
+    /// Findings and actions at the last sample.
     pub fn event(&self) -> Option<GuardEvent> {
         self.event
     }

@@ -43,7 +43,7 @@ pub struct Trace {
     /// Times at which changes were declared, s, with the changes.
     pub(crate) changes: Vec<(f64, Change)>,
     pub(crate) counts: Counts,
-    /// What the guard found.
+    /// Events found by the guard.
     pub(crate) faults: Vec<TrackFault>,
     /// Samples held back up to each row.
     pub(crate) held: Vec<u64>,
@@ -325,7 +325,7 @@ impl Trace {
         self.counts
     }
 
-    /// What the guard found, and what it did.
+    /// Events found by the guard, and what it did.
     pub fn faults(&self) -> &[TrackFault] {
         &self.faults
     }

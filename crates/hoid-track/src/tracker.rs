@@ -151,7 +151,7 @@ impl Tracker {
         }
     }
 
-    /// What became of a sample after a guard.
+    /// Outcome of a sample after a guard.
     #[inline]
     fn guarded(&mut self, guarded: Guarded, skipped: bool) -> Outcome {
         let taken = guarded.outcome.filter(|_| !guarded.held);

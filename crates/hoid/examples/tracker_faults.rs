@@ -1,4 +1,4 @@
-//! What faults in a stream do to the trackers: the numbers of the page "Faults while tracking".
+//! Effect of faults in a stream on the trackers: the numbers of the page "Faults while tracking".
 //!
 //! `cargo xtask slow tracker-faults [SEEDS] [FIRST] [--bare] [METHOD...]`: 4 seeds by default, from
 //! the first on; `--bare` without the guard, for comparison. `--cost` takes the samples of one run

@@ -83,7 +83,7 @@ pub use hoid_survey as survey;
 pub use hoid_thesis as thesis;
 pub use hoid_track as track;
 
-/// What most programs use: read, identify, validate, track, report, simulate.
+/// Functions that most programs use: read, identify, validate, track, report, simulate.
 pub mod prelude {
     #[cfg(feature = "io")]
     pub use hoid_analysis::{Identification, Identified, Recordings, identify};

@@ -335,7 +335,7 @@ fn residuals_and_simulation_of_a_fit() {
     assert_eq!(residuals.values.len(), fit.residual_count());
     let mean = residuals.values.iter().map(|e| e * e).sum::<f64>() / residuals.values.len() as f64;
     assert!((mean / fit.loss() - 1.0).abs() < 1e-9);
-    // What is left of u is the remnant.
+    // The remainder of u is the remnant.
     let simulated = fit.simulate(record).unwrap();
     let (u, n) = (
         &record.output()[simulated.first..],

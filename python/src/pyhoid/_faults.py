@@ -17,7 +17,7 @@ def used(
     native: _pyhoid.Fit | _pyhoid.OperatorFit | _pyhoid.TimeVaryingFit | _pyhoid.Trace,
     given: Sequence[Record],
 ) -> tuple[Record, ...]:
-    """The records as they were fitted, from those that were given and what was done to them."""
+    """The records as they were fitted, from those that were given and the processing of them."""
     several = []
     for origin, parts, steps in native.records():
         of = given[origin]

@@ -134,7 +134,7 @@ class MethodSettings(TypedDict, total=False):
     alarm: float | None
 
     # At each sample what all of a recorded run shows about it, by hypotheses run from both ends, in
-    # place of what the past alone shows. For multiple-model.
+    # place of the prediction from the past alone. For multiple-model.
     smooth: bool | None
 
     # False alarms in an hour that are accepted: a lower number finds fewer changes, later. For
@@ -367,7 +367,7 @@ SETTINGS = """covariance : float
             Logarithm of the odds from which a change is declared. For multiple-model.
         smooth : bool
             At each sample what all of a recorded run shows about it, by hypotheses run from both
-            ends, in place of what the past alone shows. For multiple-model.
+            ends, in place of the prediction from the past alone. For multiple-model.
         false_alarms : float
             False alarms in an hour that are accepted: a lower number finds fewer changes,
             later. For adaptive.

@@ -248,7 +248,7 @@ def describing_function(
 
 
 class Description:
-    """A describing function, its loop, and what it is worth. `describe` makes it.
+    """A describing function, its loop, and its reliability. `describe` makes it.
 
     Attributes
     ----------
@@ -264,7 +264,7 @@ class Description:
     verdict : {"trustworthy", "doubtful", "not determined"}
         What the result is worth.
     reasons, notes : list of str
-        What speaks against it, and what is worth knowing besides.
+        What speaks against it, and additional notes.
     excitation : str or None
         The channel that the average refers to.
     period : float

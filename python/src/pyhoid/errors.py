@@ -1,7 +1,7 @@
 """Exceptions of pyhoid, by kind.
 
 Each is a `pyhoid.Error`, and also a `ValueError` for a wrong value or an `OSError` for a file. The
-messages name the quantity, what was found, what was expected, and the remedy.
+messages name the quantity, what was found, the expected value, and the remedy.
 """
 
 from __future__ import annotations

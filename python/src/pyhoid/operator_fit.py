@@ -1,4 +1,4 @@
-"""The operator of a person: which form, its parameters with honest errors, and what it is worth."""
+"""The operator of a person: which form, its parameters with honest errors, and its reliability."""
 
 from __future__ import annotations
 

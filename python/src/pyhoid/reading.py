@@ -118,7 +118,7 @@ def read(
     -----
     UserWarning
         What a person should know about the file: columns left out, trouble with the sampling.
-        `Record.steps` lists what was done to the numbers.
+        `Record.steps` lists the processing applied to the numbers.
 
     Examples
     --------
@@ -157,7 +157,7 @@ def read_segments(
     shortest: float = 2.0,
     **options: Unpack[ReadOptions],
 ) -> list[Record]:
-    """Read the good segments of a file, between what is wrong with its sampling.
+    """Read the good segments of a file, between the problems of its sampling.
 
     Each segment is a record: `identify` gives each its own initial states. Leaving samples out can
     bias the result: without the samples at a rail, for example, the largest responses are gone.
@@ -323,7 +323,7 @@ def info(
     -------
     dict
         ``format``; ``columns`` with unit, type, rows and the range of their values; ``samplings``
-        with frequency, gaps and jitter; ``trouble`` with what is wrong with the sampling, where,
+        with frequency, gaps and jitter; ``trouble`` with the problems of the sampling, where,
         how much, and the remedy; ``notes``; ``look`` with the columns of error and control, the
         excitation and its longest span of whole periods, by how much the control is late, and in
         ``read`` the keywords by which `read` takes the file so (None where that is not certain).

@@ -11,7 +11,7 @@ class Verdict(NamedTuple):
     """What a result is worth, and why.
 
     `level` is ``"trustworthy"``, ``"doubtful"`` or ``"not determined"``; `reasons` report what speaks
-    against the result, `notes` what is worth knowing besides.
+    against the result, `notes` additional notes.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-//! What a case of the challenge is: data, no code.
+//! Definition of a case of the challenge: data, no code.
 
 use super::operator::{Parameter, Plant};
 
@@ -107,7 +107,7 @@ pub struct Shift {
     pub at_s: f64,
     /// How long it takes, s; the factor grows geometrically.
     pub takes_s: f64,
-    /// What changes.
+    /// The part that changes.
     pub parameter: Parameter,
     /// By which factor.
     pub factor: f64,
@@ -160,7 +160,7 @@ pub struct Case {
     pub name: String,
     /// Its theme.
     pub theme: Theme,
-    /// What it is, in a line.
+    /// Its definition, in a line.
     pub meaning: String,
     /// Samples a second.
     pub rate_hz: f64,
@@ -184,7 +184,7 @@ pub struct Case {
     pub blemish: Blemish,
     /// Changes in order of time.
     pub shifts: Vec<Shift>,
-    /// What is reported of the delay.
+    /// The report of the delay.
     pub delay: DelayKnown,
 }
 

@@ -25,7 +25,7 @@ pub struct Task {
     pub seam: Option<Seam>,
 }
 
-/// What came before the second of two recordings. A filter that has the end of the first in it would
+/// The data before the second of two recordings. A filter that has the end of the first in it would
 /// jump at the seam as no person does: it takes these samples first, and its estimate stays.
 #[derive(Debug, Clone)]
 pub struct Seam {
@@ -101,11 +101,11 @@ pub struct Alarm {
 /// What a contestant answers.
 #[derive(Debug, Clone, Default)]
 pub struct EntrantResult {
-    /// What is reported at each time that was asked for.
+    /// The report at each time that was asked for.
     pub said: Vec<ReportedResponse>,
     /// The changes that were declared; none for one that declares none.
     pub alarms: Option<Vec<Alarm>>,
-    /// Names of what speaks against the result.
+    /// Names of the findings against the result.
     pub findings: Vec<String>,
 }
 

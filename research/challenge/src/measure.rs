@@ -1,4 +1,4 @@
-//! What an answer is worth: the line of a contestant in a run.
+//! Reliability of an answer: the line of a contestant in a run.
 //!
 //! The response is asked for at seven lines from .5 to 6 rad/s, at +2, +4, +8, +13, +18 and +28 s after each change,
 //! once before the first, and every 10 s where nobody changes. The error is the mean of `|dH|/|H|` over the lines; who
@@ -60,11 +60,11 @@ pub struct Line {
     pub exposed_s: f64,
     /// The changes.
     pub changes: Vec<ChangeOutcome>,
-    /// What speaks against the result.
+    /// Findings against the result.
     pub findings: Vec<String>,
 }
 
-/// What was reported at a time.
+/// The report at a time.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Moment {
     /// `+8` after a change, `before`, `steady`, or the time of the long case.

@@ -133,7 +133,7 @@ impl Operator {
     }
 }
 
-/// What is controlled.
+/// The controlled element.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Plant {
     /// `1/s`.

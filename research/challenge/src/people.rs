@@ -37,7 +37,7 @@ const SINGLE_START_S: (f64, f64) = (5.0, 20.0);
 /// The change of the plant is known: its evidence is not computed.
 const SURE: f64 = 1e9;
 
-/// What is to be run.
+/// Tasks to run.
 #[derive(Debug, Clone)]
 pub struct PeopleOptions {
     /// Directory of the recordings.

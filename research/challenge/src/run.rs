@@ -19,7 +19,7 @@ use super::{
 };
 use crate::ChallengeError;
 
-/// What is to be run.
+/// Tasks to run.
 #[derive(Debug, Clone)]
 pub struct ChallengeOptions {
     /// Directory of the lines.

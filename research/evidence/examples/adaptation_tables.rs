@@ -19,7 +19,7 @@ const OTHERS: [(&str, &str); 4] = [
     ("again and again", "C4, C6, and back every 10.24 s"),
     ("neuromuscular", "ω_nm to 8 rad/s, ζ_nm to .5"),
 ];
-/// Delays that are not what is supposed.
+/// Delays that are not the prior.
 const DELAYS: [(&str, &str); 3] = [
     ("delay alone", "C1, C2, τ_e to .34 s"),
     ("delay too", "C4, C6, τ_e to .34 s"),

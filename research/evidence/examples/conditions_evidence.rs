@@ -44,7 +44,7 @@ impl Cell {
     }
 }
 
-/// What a run of a method gave: RMS relative errors from 30.72 s and from 10 s on in per cent, coverage of 1.96
+/// Result of a run of a method: RMS relative errors from 30.72 s and from 10 s on in per cent, coverage of 1.96
 /// standard errors in each span, changes declared where there is none, and the delay of the first one from where the
 /// change starts to 10 s after its middle, after the middle.
 struct RunResult {

@@ -44,7 +44,7 @@ fn bare(record: &Record) -> Record {
     with_output(record, record.output().to_vec())
 }
 
-/// What was fitted, what was done to it, and whether it was called not constant.
+/// The fitted model, the processing of it, and whether it was called not constant.
 type Row = (String, String, Option<bool>);
 
 fn told(verdict: &Verdict) -> bool {

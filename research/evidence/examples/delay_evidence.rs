@@ -142,7 +142,7 @@ fn with_delay(condition: Condition, order: usize, level: f64, [before, after]: [
     scenario
 }
 
-/// What one run of one method gave, over t in [30.72, 81.92] s.
+/// Result of one run of one method, over t in [30.72, 81.92] s.
 struct RunResult {
     errors: [f64; 6],
     covered: [f64; 6],

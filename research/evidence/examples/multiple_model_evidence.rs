@@ -49,7 +49,7 @@ fn run(simulator: &Simulator, condition: Condition, order: usize, level: usize, 
     simulator.run(run_seed, false).unwrap()
 }
 
-/// What one run of one method gave.
+/// Result of one run of one method.
 struct RunResult {
     /// RMS of the relative error over t in [10, 81.92] s, per cent.
     errors: [f64; 5],

@@ -105,7 +105,7 @@ struct Run {
     /// K_e, T_L, K_e_dot and tau_e before and at the end.
     operator: [[f64; 4]; 2],
     restarts: u64,
-    /// What the guard reported, by kind.
+    /// Report of the guard, by kind.
     faults: BTreeMap<&'static str, usize>,
 }
 
@@ -225,7 +225,7 @@ fn alarms(run: &Run, from: f64, to: f64) -> usize {
     count
 }
 
-/// What the guard reported, by kind, and in how many recordings it told anything.
+/// Report of the guard, by kind, and in how many recordings it told anything.
 fn told(all: &[Run]) -> String {
     let mut kinds = BTreeMap::<&str, usize>::new();
     for (kind, count) in all.iter().flat_map(|r| &r.faults) {

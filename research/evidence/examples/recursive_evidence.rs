@@ -133,7 +133,7 @@ fn table(runs: usize) {
         (4, 0.1),
         (4, 0.2),
     ];
-    // What the order of the filters of the gradient does.
+    // Behaviour of the order of the filters of the gradient.
     let cascade = of_the_text(Method::rpem()).with(&[("regressor", "cascade")]).unwrap();
     let methods: [(&str, TrackOptions); 5] = [
         ("RLS, text", of_the_text(Method::rls())),

@@ -1,4 +1,4 @@
-//! What the verdict of a trace reports about runs that are not what they claim, and of clean ones.
+//! Verdicts of traces on runs with faults and on clean runs.
 //!
 //! `cargo run --release -p hoid-evidence --example verdict_evidence -- [--runs N] [--seed S] [--method M] [--element]
 //! [--kinds]`
@@ -53,7 +53,7 @@ impl Operator {
     }
 }
 
-/// What is controlled, as its denominator; the numerator is one.
+/// The controlled element, as its denominator; the numerator is one.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Element {
     Gain,
@@ -237,7 +237,7 @@ fn rms(values: &[f64]) -> f64 {
     (values.iter().map(|v| v * v).sum::<f64>() / values.len() as f64).sqrt()
 }
 
-/// What is done to a run.
+/// Treatment of a run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Attack {
     Clean,
@@ -460,7 +460,7 @@ fn main() {
     if let Some(folder) = &folder {
         let all_of = recordings(folder);
         let of_people = all_of.par_iter().map(|(name, record)| {
-            // Persons apart, and what they control.
+            // Persons apart, and the controlled element.
             let group: Vec<&str> = name
                 .split('_')
                 .skip(1)

@@ -1,5 +1,5 @@
-//! What the studies of this crate share. A study is a file in `examples/`; its head states what it
-//! counts and what its arguments are.
+//! Common parts of the studies of this crate. A study is a file in `examples/`; its head states
+//! what it counts and what its arguments are.
 //!
 //! | module | what it holds |
 //! |---|---|

@@ -2,7 +2,7 @@
 
 use serde_json::Value;
 
-/// What one peer reports about one task.
+/// Report of one peer on one task.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Line {
     pub task: String,

@@ -53,7 +53,7 @@ pub trait BatchEstimator: Sized + 'static {
     /// The same estimator with its defaults.
     fn by_default(&self) -> Self;
 
-    /// What it is called among the printed settings.
+    /// Its name among the printed settings.
     fn structure(&self) -> Setting {
         Setting::new("structure", OPERATOR)
     }
@@ -73,7 +73,7 @@ pub trait BatchEstimator: Sized + 'static {
     fn judged(_fit: &mut Self::Fit, _verdict: &Verdict) {}
 }
 
-/// A fit, and what is known of it before the recordings are asked.
+/// A fit, and the prior knowledge of it before the recordings are asked.
 #[derive(Debug, Clone)]
 pub struct Fitted<F> {
     /// The fit.
@@ -82,11 +82,11 @@ pub struct Fitted<F> {
     pub verdict: Verdict,
     /// The describing function that is next to it.
     pub described: Option<Description>,
-    /// What was taken out of e and u for it.
+    /// Trend removed from e and u for it.
     pub taken_out: Detrend,
     /// The settings of the estimator as it was used.
     pub used: Vec<Setting>,
-    /// What was found of what was left open.
+    /// Findings about what was left open.
     pub found: Vec<Setting>,
 }
 

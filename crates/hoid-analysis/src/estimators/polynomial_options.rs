@@ -24,13 +24,13 @@ pub struct Polynomials {
     pub orders: NamedOrders,
     /// Shortest and longest dead time in s, in place of an order nk.
     pub delay_s: Option<(f64, f64)>,
-    /// What chooses between candidates.
+    /// Criterion that chooses between candidates.
     pub criterion: Criterion,
     /// Where the search starts: all coefficients, by name.
     pub start: Option<BTreeMap<String, f64>>,
     /// Instrumental variables in place of the prediction error method, at the orders that this one chose.
     pub method: Option<IvMethod>,
-    /// What the instruments are made of; by default the forcing function where it is recorded.
+    /// Components of the instruments; by default the forcing function where it is recorded.
     pub instruments: Option<Instruments>,
 }
 

@@ -1,9 +1,9 @@
 //! Results as JSON objects, the contract with other programs, and back.
 //!
-//! Every result has the same envelope: `hoid` (the version), `kind`, `records`, `data` (what was done to the
-//! records), `settings` (each with its value, given or not) and `verdict`; the rest is of its kind. What a batch
-//! fit is, so that it can predict again without its recordings, is in `state` ([`state`]). Values are those of
-//! `serde_json`, which keeps the order of keys.
+//! Every result has the same envelope: `hoid` (the version), `kind`, `records`, `data` (the processing of the records),
+//! `settings` (each with its value, given or not) and `verdict`; the rest is of its kind. Definition of a batch fit, so
+//! that it can predict again without its recordings, is in `state` ([`state`]). Values are those of `serde_json`, which
+//! keeps the order of keys.
 //!
 //! | file | kind |
 //! |---|---|
@@ -41,7 +41,7 @@ pub use trace::{change, open_loop, responses, track_fault, tracked_operator};
 
 use crate::{found::FoundFault, recordings::Account, settings::Setting};
 
-/// The envelope of a result: version, kind, records, what was done to them, settings, verdict.
+/// The envelope of a result: version, kind, records, the processing of them, settings, verdict.
 pub fn envelope(
     kind: &str,
     files: &[String],
@@ -98,8 +98,8 @@ pub fn estimate_within(e: &Estimate, interval: Option<(f64, f64)>) -> Value {
     })
 }
 
-/// What a result is worth: the level, what speaks against it, what is worth knowing besides, and
-/// all of it with its names for programs.
+/// Reliability of a result: the level, the findings against it, additional notes, and all of it
+/// with its names for programs.
 pub fn verdict(v: &Verdict) -> Value {
     json!({
         "level": v.level.name(),
@@ -109,7 +109,7 @@ pub fn verdict(v: &Verdict) -> Value {
     })
 }
 
-/// What each answer is worth, by its name.
+/// Reliability of each answer, by its name.
 pub fn answers(all: &[(String, Verdict)]) -> Map<String, Value> {
     let one = |v: &Verdict| {
         let reasons = v.findings().iter().filter(|finding| finding.severity > Severity::Note);
@@ -118,7 +118,7 @@ pub fn answers(all: &[(String, Verdict)]) -> Map<String, Value> {
     all.iter().map(|(name, verdict)| (name.clone(), one(verdict))).collect()
 }
 
-/// What makes a result doubtful, or is worth knowing.
+/// Findings that make a result doubtful, or is worth knowing.
 pub fn finding(f: &Finding) -> Value {
     json!({"kind": f.kind, "severity": f.severity.name(), "message": f.message, "words": f.message})
 }
@@ -237,7 +237,7 @@ pub fn named(name: &str, e: &Estimate) -> Value {
     json!({"name": name, "value": number(e.value), "standard_error": optional(e.standard_error)})
 }
 
-/// Files and sampling of the records, and what was done to them.
+/// Files and sampling of the records, and the processing of them.
 pub fn records(files: &[String], records: &[Record], accounts: &[Account]) -> Value {
     let record = |((file, r), account): ((&String, &Record), &Account)| {
         let mut one = json!({
@@ -259,7 +259,7 @@ pub fn records(files: &[String], records: &[Record], accounts: &[Account]) -> Va
     files.iter().zip(records).zip(accounts).map(record).collect()
 }
 
-/// What is wrong with the sampling, in words.
+/// Problems with the sampling, in words.
 pub fn warnings(files: &[String], accounts: &[Account]) -> Value {
     let all = files.iter().zip(accounts);
     all.flat_map(|(file, account)| {
@@ -271,7 +271,7 @@ pub fn warnings(files: &[String], accounts: &[Account]) -> Value {
     .collect()
 }
 
-/// All faults of the records, and what is wrong with their files, one object each.
+/// All faults of the records, and the problems of their files, one object each.
 pub fn faults(files: &[String], accounts: &[Account]) -> Value {
     let all = files.iter().zip(accounts);
     all.flat_map(|(file, account)| account.found().into_iter().map(move |found| fault(file, &found)))

@@ -63,13 +63,13 @@ fn quality(q: &GoodnessOfFit, fit: &Fit) -> Value {
 
 /// A fit of polynomials, and what follows from it and its records.
 pub struct PolynomialAnswer<'a> {
-    /// What it is worth.
+    /// The verdict on it.
     pub verdict: &'a Verdict,
     /// Names of the records.
     pub files: &'a [String],
     /// The records as they were fitted.
     pub records: &'a [Record],
-    /// What was done to them.
+    /// Processing applied to them.
     pub accounts: &'a [Account],
     /// The settings that were used.
     pub settings: &'a [Setting],

@@ -65,7 +65,7 @@ impl BatchResult {
     }
 }
 
-/// What is kept of the account of a record.
+/// Stored data of the account of a record.
 #[derive(Serialize, Deserialize)]
 struct FoundIn {
     faults: Vec<Fault>,

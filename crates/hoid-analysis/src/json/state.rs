@@ -1,4 +1,4 @@
-//! What a result is, as text: so that it comes back as it was and predicts again.
+//! Definition of a result, as text: so that it comes back as it was and predicts again.
 //!
 //! The numbers of the contract are for people and other programs; a model has more (covariances of what is not printed,
 //! states, what was held). All of it is written as TOML, which has what JSON lacks, infinite numbers and NaN, and is in

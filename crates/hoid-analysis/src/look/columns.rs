@@ -38,8 +38,8 @@ impl Role {
 }
 
 impl Roles {
-    /// Input and output among columns; what was asked for is taken as it is. Where nothing is known the common names
-    /// are kept, to be replaced by hand.
+    /// Input and output among columns; the request is taken as it is. Where nothing is known the common names are kept,
+    /// to be replaced by hand.
     pub fn of(columns: &[&str], input: Option<&str>, output: Option<&str>) -> Self {
         let known = |names: &[&str]| -> Vec<&str> {
             let all = names.iter();

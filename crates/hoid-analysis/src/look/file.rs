@@ -1,4 +1,4 @@
-//! What a file holds, and what it looks like.
+//! Contents of a file, and what it looks like.
 
 use std::path::Path;
 
@@ -12,14 +12,14 @@ use super::{
     periods::{self, Periods},
 };
 
-/// What a look at a file has found.
+/// Result of a look at a file.
 #[derive(Debug)]
 pub struct Look {
     /// Its columns, sampling and trouble.
     pub survey: FileSurvey,
     /// Error and control.
     pub roles: Roles,
-    /// What these columns hold; why they make no record where they make none.
+    /// Contents of these columns; why they make no record where they make none.
     pub seen: Result<RecordSummary, IoError>,
     pub(super) known: LookOptions,
 }

@@ -1,9 +1,9 @@
-//! What is known of a file before it is looked at.
+//! Prior knowledge of a file before it is looked at.
 
 use hoid_io::{TimeChoice, TrialChoice};
 use hoid_model::ContinuousTransferFunction;
 
-/// What is known already, and therefore not looked for.
+/// Options given by the user, which are therefore not searched for.
 #[derive(Debug, Clone, Default)]
 pub struct LookOptions {
     /// Column of the input, or a difference.

@@ -25,7 +25,7 @@ pub struct OtherColumns {
 }
 
 impl OtherColumns {
-    /// What was asked for, what there is, and what it looks like.
+    /// The request, what there is, and what it looks like.
     pub fn found(&self) -> String {
         let Self {
             file,

@@ -1,4 +1,4 @@
-//! From a recording to a trace and what it is worth: what is done, in its order.
+//! From a recording to a trace and its reliability: what is done, in its order.
 //!
 //! ```text
 //! file -- Reading --> Recordings -- Tracking { options }.run --> Tracked { trace, verdict, data, settings }

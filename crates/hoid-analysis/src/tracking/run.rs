@@ -1,4 +1,4 @@
-//! The run: from a recording to a trace and what it is worth.
+//! The run: from a recording to a trace and its reliability.
 
 use hoid_ident::IdentError;
 use hoid_model::{Decimation, Record, SampleTime};
@@ -200,7 +200,7 @@ impl Tracking {
     }
 }
 
-/// The plan of a recursion; what is wrong with it is wrong with its options.
+/// The plan of a recursion; its errors are reported as errors of its options.
 ///
 /// # Errors
 /// [`AnalysisError::Options`].

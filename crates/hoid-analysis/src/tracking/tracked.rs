@@ -1,4 +1,4 @@
-//! What a recursion over a record found, and the trace as a table.
+//! Result of a recursion over a record, and the trace as a table.
 
 use std::collections::BTreeMap;
 
@@ -27,9 +27,9 @@ pub enum Covariance {
 pub struct Tracked {
     /// The estimate over the record.
     pub trace: Trace,
-    /// What it is worth, of all that is known.
+    /// The verdict on it, of all that is known.
     pub verdict: Verdict,
-    /// The one recording as it was tracked, and what was done to it.
+    /// The one recording as it was tracked, and the processing of it.
     pub data: Recordings,
     /// The span of the start fit, where there was one.
     pub span: Option<Record>,
@@ -58,7 +58,7 @@ impl Tracked {
         &self.data.records[0]
     }
 
-    /// What was done to it.
+    /// Processing applied to it.
     pub fn account(&self) -> &Account {
         &self.data.accounts[0]
     }

@@ -38,7 +38,7 @@ pub enum Command {
     Simulate(SimulateArgs),
     /// Gain, lead, delay ... of the person, from whole records
     ///
-    /// Fits a model to one or several records, and reports what the result is worth.
+    /// Fits a model to one or several records, and reports the verdict on the result.
     Identify(Box<IdentifyArgs>),
     /// Gain and phase at the lines of the excitation, without a model
     ///
@@ -58,7 +58,7 @@ pub enum Command {
     /// Writes a functional mock-up unit: the tracker, or with --operator a simulated person. It takes the
     /// shared library that `cargo xtask ffi` builds.
     Fmu(FmuArgs),
-    /// What is inside of a file, and what is wrong with it
+    /// What is inside of a file, and the problems of it
     ///
     /// Shows columns, sampling, ranges, what is suspicious, and a sketch of each column.
     Info(InfoArgs),

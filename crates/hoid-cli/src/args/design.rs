@@ -13,11 +13,11 @@ pub struct DesignArgs {
     /// The person: a scenario of the family (.toml), or a fit that `hoid identify --json` printed
     #[arg(long, value_name = "PERSON.toml|FIT.json")]
     pub people: PathBuf,
-    /// What they control, as 90/(s(s+6)) or 90/1,6,0 [default: that of the scenario]
+    /// The controlled element, as 90/(s(s+6)) or 90/1,6,0 [default: that of the scenario]
     #[arg(long, value_name = "TF")]
     pub controlled_element: Option<ContinuousTransferFunction>,
-    /// What is wanted, with the standard error that is accepted: crossover=3%,tau_e=5%,phase_margin=2 (deg) [default: all
-    /// parameters alike]
+    /// The quantities requested, with the standard error that is accepted: crossover=3%,tau_e=5%,phase_margin=2 (deg)
+    /// [default: all parameters alike]
     #[arg(long = "for", value_name = "LIST", value_delimiter = ',', value_parser = parse_wanted)]
     pub wanted: Vec<Wanted>,
     /// The forcing function is a disturbance at the input of the controlled element, not a target

@@ -33,8 +33,8 @@ pub struct FmuArgs {
     #[arg(long, value_name = "NAME", default_value_t = Method::default().name().to_owned(),
           value_parser = method_names(), conflicts_with = "operator")]
     pub method: String,
-    /// What is known of the person: population, none, NAME=CENTRE:SPREAD..., or the file of a fit that
-    /// hoid identify --json has printed, which goes into the unit [default: population]
+    /// Known properties of the person: population, none, NAME=CENTRE:SPREAD..., or the file of a fit that hoid identify
+    /// --json has printed, which goes into the unit [default: population]
     #[arg(long, value_name = "PRIOR", conflicts_with = "operator")]
     pub prior: Option<String>,
     /// Controlled element in s, as 90/(s(s+6)): crossover and phase margin are reported

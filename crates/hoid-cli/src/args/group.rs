@@ -111,8 +111,8 @@ pub struct SimulateGroupArgs {
     /// Seed of the random streams
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub seed: u64,
-    /// What is wrong with the sampling: jitter, missing, repeated, slow-clock, saturated,
-    /// quantised, stalled
+    /// Problems with the sampling: jitter, missing, repeated, slow-clock, saturated, quantised,
+    /// stalled
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = parse_trouble)]
     pub trouble: Vec<SamplingDefect>,
 }

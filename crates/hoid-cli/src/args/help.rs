@@ -8,7 +8,7 @@ use clap::{Arg, Command, CommandFactory};
 
 use super::Cli;
 
-/// What help reports about a command besides its options.
+/// Report of help on a command besides its options.
 struct Help {
     command: &'static str,
     examples: &'static [&'static str],

@@ -33,8 +33,8 @@ pub struct IdentifyArgs {
     pub mask: MaskArgs,
     #[command(flatten)]
     pub faults: FaultArgs,
-    /// What is fitted: operator (the operator of a person), or a polynomial structure [default: operator;
-    /// that of --method; bj with options that polynomials alone have, as --nk]
+    /// The fitted model: operator (the operator of a person), or a polynomial structure [default: operator; that of
+    /// --method; bj with options that polynomials alone have, as --nk]
     #[arg(long, value_name = "NAME", value_parser = structures(), ignore_case = true)]
     pub structure: Option<String>,
     /// How polynomials are fitted: pem the prediction error method; iv4 (for arx), sriv (for oe), rivbj (for

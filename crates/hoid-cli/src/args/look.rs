@@ -1,4 +1,4 @@
-//! What is known of a file before it is looked at, as `hoid info` and `hoid group init` take it.
+//! Prior knowledge of a file before it is looked at, as `hoid info` and `hoid group init` take it.
 
 use clap::Args;
 use hoid::analysis::LookOptions;
@@ -7,7 +7,7 @@ use hoid::model::ContinuousTransferFunction;
 
 use super::reading::{parse_time, parse_trial};
 
-/// What is known already, and therefore not looked for.
+/// Options given by the user, which are therefore not searched for.
 #[derive(Debug, Args)]
 pub struct LookArgs {
     /// Column of the input (tracking error), or a difference such as r-y [default: by its name]
@@ -43,7 +43,7 @@ pub struct LookArgs {
 }
 
 impl LookArgs {
-    /// What was typed.
+    /// The text as typed.
     pub fn known(&self) -> LookOptions {
         LookOptions {
             input: self.input.clone(),

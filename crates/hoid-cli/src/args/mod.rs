@@ -1,4 +1,4 @@
-//! What can be typed. The texts here are the help pages; each option states its default and unit.
+//! Accepted input. The texts here are the help pages; each option states its default and unit.
 //!
 //! | module | options of |
 //! |---|---|

@@ -45,7 +45,7 @@ pub struct ReadArgs {
     pub detrend: Detrend,
 }
 
-/// What is done to a record before it is used, in this order.
+/// Treatment of a record before it is used, in this order.
 #[derive(Debug, Clone, Args)]
 pub struct PrepareArgs {
     /// Units that the file does not report, as e=deg,u=deg: units are printed only where they are
@@ -85,7 +85,7 @@ pub struct DecimateArgs {
 }
 
 impl DecimateArgs {
-    /// What is done for an estimator; what counts samples is not decimated by itself.
+    /// Processing for an estimator; what counts samples is not decimated by itself.
     pub fn of(self, counts_samples: bool) -> Decimation {
         if counts_samples {
             self.decimate.when_named()
@@ -95,11 +95,11 @@ impl DecimateArgs {
     }
 }
 
-/// What is left out of a record.
+/// Parts left out of a record.
 #[derive(Debug, Args)]
 pub struct MaskArgs {
-    /// Leave out what is wrong with the sampling (see `hoid info`): the record is cut there, and
-    /// each segment has initial states of its own
+    /// Leave out the problems of the sampling (see `hoid info`): the record is cut there, and each
+    /// segment has initial states of its own
     #[arg(long, value_name = "KINDS", value_delimiter = ',', value_parser = choice_of(&QualityIssueKind::MASKABLE))]
     pub mask: Vec<QualityIssueKind>,
     /// Shortest segment between masked samples that is used, s
@@ -107,7 +107,7 @@ pub struct MaskArgs {
     pub shortest: f64,
 }
 
-/// What is done about faults of a recording.
+/// Treatment of faults of a recording.
 #[derive(Debug, Clone, Copy, Args)]
 pub struct FaultArgs {
     /// Faults of the recording (spikes, dropouts, frozen and idle stretches, wraps, steps): bridge what

@@ -20,7 +20,7 @@ use super::{
     show::ShowArgs, udp::UdpPlaces,
 };
 
-/// What is tracked, and how.
+/// The tracked signal, and how.
 #[derive(Debug, Args)]
 pub struct RecursionArgs {
     /// The recursion
@@ -42,7 +42,7 @@ pub struct RecursionArgs {
     /// Dead time tau_e in s in place of --nk: .28, or a range (0.1..0.4) to search on the start span
     #[arg(long, value_name = "S|LO..HI", conflicts_with = "nk")]
     pub delay: Option<OneOrSpan>,
-    /// What decides between candidates when something is searched
+    /// Criterion that decides between candidates when something is searched
     #[arg(long, value_name = "NAME", default_value = "bic", value_parser = choice_of(&Criterion::ALL))]
     pub criterion: Criterion,
     /// Where the recursion starts: all coefficients as f1=-1.9,f2=.92,b0=.04,... or `nothing`

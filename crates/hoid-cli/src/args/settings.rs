@@ -23,7 +23,7 @@ pub struct Batch;
 
 /// Who has options.
 pub trait Registry {
-    /// What there is, in the order of help.
+    /// The available items, in the order of help.
     fn specs() -> Vec<MethodSpec>;
 }
 
@@ -39,7 +39,7 @@ impl Registry for Batch {
     }
 }
 
-/// What was typed: name and text, in the order of the registry.
+/// The text as typed: name and text, in the order of the registry.
 #[derive(Debug, Clone, Default)]
 pub struct SettingArgs<R = Recursive> {
     given: Vec<(&'static str, String)>,

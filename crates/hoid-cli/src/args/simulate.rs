@@ -43,8 +43,8 @@ pub struct SimulateArgs {
     /// Noise level P_n; 0 is a run without remnant [default: 0.1, or the scenario's]
     #[arg(long, value_name = "P_N")]
     pub noise_level: Option<f64>,
-    /// What the noise level is a share of: var(u_n)/var(u) or var(n)/var(u)
-    /// [default: response, or the scenario's]
+    /// Reference of the noise level: var(u_n)/var(u) or var(n)/var(u) [default: response, or the
+    /// scenario's]
     #[arg(long, value_name = "WHICH", value_parser = choice_of(&NoiseDefinition::ALL))]
     pub noise_definition: Option<NoiseDefinition>,
     /// Remnant time constant T_n in s [default: 0.06, or the scenario's]
@@ -86,7 +86,7 @@ pub struct MarginsArgs {
     /// Noise levels P_n for the remnant gains
     #[arg(long, value_name = "LIST", value_delimiter = ',', default_values_t = [0.01, 0.1, 0.2, 0.3])]
     pub noise_levels: Vec<f64>,
-    /// What the noise level is a share of: var(u_n)/var(u) or var(n)/var(u)
+    /// Reference of the noise level: var(u_n)/var(u) or var(n)/var(u)
     #[arg(long, value_name = "WHICH", default_value = "response", value_parser = choice_of(&NoiseDefinition::ALL))]
     pub noise_definition: NoiseDefinition,
     /// Print one JSON object instead of tables

@@ -77,7 +77,7 @@ fn person(args: &DesignArgs) -> Result<FamilyState, CliError> {
     let element = || -> Result<ContinuousTransferFunction, CliError> {
         let missing = || {
             CliError::Usage(
-                "a fit does not report what was controlled: add --controlled-element '90/(s(s+6))'".to_owned(),
+                "a fit does not report the controlled element: add --controlled-element '90/(s(s+6))'".to_owned(),
             )
         };
         args.controlled_element.clone().ok_or_else(missing)

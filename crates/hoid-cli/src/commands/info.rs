@@ -200,7 +200,7 @@ fn sampled(s: &SamplingSurvey) -> String {
     line
 }
 
-/// What is suspicious in a column.
+/// Suspicious values in a column.
 fn remarks(v: &ValueSurvey) -> String {
     let mut remarks = Vec::new();
     if v.missing > 0 {

@@ -22,7 +22,7 @@ pub fn of(args: &ReadArgs, mask: Option<&MaskArgs>, with_input: bool) -> Result<
     })
 }
 
-/// Tells what was left out of a file and what is wrong with it.
+/// Tells what was left out of a file and the problems of it.
 pub fn told(path: &Path, read: &ReadRecord) {
     let file = path.display().to_string();
     for note in &read.notes {
@@ -70,7 +70,7 @@ fn preparation(args: &ReadArgs) -> Result<Preparation, CliError> {
     })
 }
 
-/// What was typed for each channel; one that is named twice contradicts itself.
+/// The text typed for each channel; one that is named twice contradicts itself.
 pub fn by_channel<T: Clone>(option: &str, typed: &[(String, T)]) -> Result<BTreeMap<String, T>, CliError> {
     let mut all = BTreeMap::new();
     for (name, value) in typed {

@@ -15,7 +15,7 @@ pub fn run(args: &ReproduceArgs) -> Result<(), CliError> {
         let items = items().into_iter().map(|item| (item.name, item.title));
         let claims = (
             CLAIMS.to_owned(),
-            "Statements of the text, and what the data show of them".to_owned(),
+            "Statements of the text, and the evidence of the data on them".to_owned(),
         );
         let lines = items
             .chain([claims])

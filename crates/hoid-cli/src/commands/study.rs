@@ -111,7 +111,7 @@ pub fn with_progress(
     }
 }
 
-/// What the user should know of a directory, as warnings.
+/// Warnings about a directory, as warnings.
 fn say(directory: &Path, notes: &[String]) {
     for note in notes {
         output::warning(&directory.display().to_string(), note);

@@ -1,4 +1,4 @@
-//! What a study reports about the operator's parameters: their relative bias, as a table of one screen.
+//! Report of a study on the operator's parameters: their relative bias, as a table of one screen.
 //!
 //! A row is an estimator in a cell: how many of its estimates are an operator, and for each parameter the
 //! median of `100 (estimate - true) / true` with its Monte Carlo error. The median, since single

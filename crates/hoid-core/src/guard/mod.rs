@@ -11,7 +11,7 @@
 //! | [`resting`] | a stick that rests, told from a channel that is frozen |
 //! | [`mod@reference`] | the model of the start next to the estimate: an estimate that has gone diverged |
 //!
-//! What is done with such samples and spans is where the recursion is at hand, in the crate `hoid-track`.
+//! Such samples and spans are handled where the recursion is available, in the crate `hoid-track`.
 
 pub mod channel;
 pub mod profile;

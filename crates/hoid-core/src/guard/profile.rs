@@ -145,7 +145,7 @@ impl Block {
     }
 }
 
-/// What is wrong with a block.
+/// Problems with a block.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Trouble {
     /// e stays constant.
@@ -325,8 +325,8 @@ impl Profile {
         }
     }
 
-    /// What is wrong with the means of a block, in the light of those before it; `rests` where u stays constant at its
-    /// end as the person rests.
+    /// Problems with the means of a block, in the light of those before it; `rests` where u stays constant at its end
+    /// as the person rests.
     pub fn judge(&mut self, block: &Block, rests: bool) -> Option<Trouble> {
         if !self.is_known() {
             return None;

@@ -17,7 +17,7 @@ use super::{
     sentence::sentence,
 };
 
-/// What is done about many tests.
+/// Treatment of many tests.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Adjustment {
     /// Holm's, over all differences of the comparison.
@@ -50,11 +50,11 @@ pub struct Comparing {
     pub factors: Vec<Factor>,
     /// Where they vary; found from the group where it is not specified.
     pub variation: Option<Variation>,
-    /// What is compared; [`Quantity::defaults`], as far as it is there, where there is nothing.
+    /// Quantities compared; [`Quantity::defaults`], as far as it is there, where there is nothing.
     pub of: Vec<Quantity>,
-    /// What is taken out of the estimates.
+    /// Trend removed from the estimates.
     pub covariate: Option<Covariate>,
-    /// What is done about many tests.
+    /// Treatment of many tests.
     pub adjustment: Adjustment,
     /// How people are weighted.
     pub weights: Weights,
@@ -134,7 +134,7 @@ impl Comparing {
         if result.differences.is_empty() {
             findings.push(Finding::undetermined(
                 "nothing-compared",
-                "there is no difference: too few people have what was asked for in all of its levels",
+                "there is no difference: too few people have the request in all of its levels",
             ));
         }
         findings.extend(missing(&result));

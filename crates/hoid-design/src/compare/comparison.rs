@@ -126,7 +126,7 @@ pub struct Comparison {
     pub left_out: Vec<LeftOut>,
     /// The settings.
     pub settings: Vec<Setting>,
-    /// What it is worth.
+    /// The verdict on it.
     pub verdict: Verdict,
 }
 

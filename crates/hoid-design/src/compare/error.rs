@@ -29,7 +29,7 @@ pub enum CompareError {
         "there is no quantity {found:?} to compare; expected crossover, phase_margin, tau_e, gain_db@W or phase_deg@W with W in rad/s, rms_e, rms_u, or a parameter of the operator such as K, T_L, omega_nm"
     )]
     Quantity {
-        /// What was asked for.
+        /// The request.
         found: String,
     },
     /// A factor without meaning.
@@ -37,9 +37,9 @@ pub enum CompareError {
         "factor {name:?}: {reason}; expected NAME, or NAME:LEVEL=A,B;LEVEL=C with conditions or people of the group"
     )]
     Factor {
-        /// What was asked for.
+        /// The request.
         name: String,
-        /// What is wrong.
+        /// The problem.
         reason: String,
     },
     /// A place that holds no group.
@@ -49,13 +49,13 @@ pub enum CompareError {
     NoGroup {
         /// The place.
         place: String,
-        /// What is wrong.
+        /// The problem.
         reason: String,
     },
-    /// What the JSON of a group does not hold.
+    /// Contents of the JSON of a group does not.
     #[error("{what} is not in the JSON of a group: name the directory that `hoid group DIR --out` wrote")]
     NotInJson {
-        /// What was asked for.
+        /// The request.
         what: String,
     },
     /// Tables that cannot be read.

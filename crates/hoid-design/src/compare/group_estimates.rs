@@ -1,4 +1,4 @@
-//! What a group reports about each person in each condition: from the directory of its results, or from the JSON that
+//! Report of a group on each person in each condition: from the directory of its results, or from the JSON that
 //! `hoid group` printed.
 //!
 //! A person in a condition is a cell. Crossover, margin and parameters are those of all runs together with
@@ -18,7 +18,7 @@ use serde_json::Value;
 
 use super::{CompareError, Observation, Quantity};
 
-/// What is known of a number.
+/// Known properties of a number.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct EstimatedValue {
     pub value: f64,
@@ -53,7 +53,7 @@ impl GroupEstimates {
     /// Reads a directory with the results of a group, or the JSON of one.
     ///
     /// # Errors
-    /// [`CompareError::NoGroup`] with what was found; those of tables that cannot be read.
+    /// [`CompareError::NoGroup`] with the findings; those of tables that cannot be read.
     pub fn read(place: &Path) -> Result<Self, CompareError> {
         let none = |reason: String| CompareError::NoGroup {
             place: place.display().to_string(),

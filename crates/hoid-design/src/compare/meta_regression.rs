@@ -70,7 +70,7 @@ pub struct Coefficient {
     pub interval: (f64, f64),
 }
 
-/// What is found.
+/// The findings.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MetaRegression {
     /// By the columns of X.

@@ -1,4 +1,4 @@
-//! What is compared: quantities that mean the same for every person, and parameters of one form.
+//! Quantities compared: quantities that mean the same for every person, and parameters of one form.
 
 use std::{fmt, str::FromStr};
 

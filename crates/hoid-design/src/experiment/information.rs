@@ -1,4 +1,4 @@
-//! What an experiment will report about a person: standard errors before it is done.
+//! Report of an experiment will on a person: standard errors before it is done.
 //!
 //! A person H(s; theta) answers the error of a loop with the controlled element P, `u = H e + n`, and a line of the forcing function of
 //! amplitude A at omega makes one of e of amplitude `a = A |S|` (a target), or `A |P S|` (a disturbance at the input of P), with `S = 1/(1 + H P)`.
@@ -67,11 +67,11 @@ impl Default for Remnant {
 /// Who does what.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Task {
-    /// The person and what they control.
+    /// The person and the controlled element.
     pub state: FamilyState,
     /// Where the forcing function enters.
     pub enters: Enters,
-    /// What the person does besides.
+    /// Additional activity of the person.
     pub remnant: Remnant,
 }
 
@@ -90,7 +90,7 @@ pub struct Expected {
     pub rms_u: f64,
 }
 
-/// What a line is worth, before its amplitude.
+/// Reliability of a line, before its amplitude.
 struct Worth {
     /// `|e|^2` by `A^2`.
     error: f64,
@@ -240,8 +240,8 @@ impl<'a> Loop<'a> {
         self.worth(omega).control
     }
 
-    /// What can be wanted: its name, its gradient along the coordinates, and what its error is reported by: 1 deg, or
-    /// the value.
+    /// Quantities that can be requested: its name, its gradient along the coordinates, and what its error is reported
+    /// by: 1 deg, or the value.
     pub fn gradients(&self) -> Vec<(&'static str, DVector<f64>, f64)> {
         let [(crossover, of_crossover), (_, of_margin)] = self.margin_gradients(&self.task.state.operator);
         let parameters = self.task.state.operator.named_gradients().into_iter();

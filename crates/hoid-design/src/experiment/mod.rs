@@ -1,4 +1,4 @@
-//! What an experiment will report, before it is done.
+//! Report of an experiment will, before it is done.
 //!
 //! | module | what it holds |
 //! |---|---|
@@ -26,9 +26,9 @@ pub enum DesignError {
     OutOfRange {
         /// What.
         quantity: &'static str,
-        /// What it is.
+        /// Its definition.
         found: f64,
-        /// What it may be.
+        /// Its admissible values.
         expected: &'static str,
     },
     /// A loop of which there is no crossover.
@@ -49,9 +49,9 @@ pub enum DesignError {
     /// What is wanted and is not a parameter of the person.
     #[error("{name} is nothing that this person has; expected one of {expected}")]
     NotThere {
-        /// What was wanted.
+        /// The requested item.
         name: String,
-        /// What there is.
+        /// The available items.
         expected: String,
     },
     /// An operator or element without meaning, or a loop that is not stable.

@@ -14,7 +14,7 @@ use crate::{
     session::Session,
 };
 
-/// What a unit is made of.
+/// Components of a unit.
 pub(super) enum Model {
     Tracker(Box<TrackerModel>),
     Operator(Box<OperatorModel>),

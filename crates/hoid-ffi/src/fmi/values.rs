@@ -2,7 +2,7 @@
 
 use hoid_io::fmu::{FmuStart, FmuVariable};
 
-/// What is done, or why not.
+/// The action taken, or why not.
 pub(super) type Done<T = ()> = Result<T, String>;
 
 /// Values by the names of their variables.

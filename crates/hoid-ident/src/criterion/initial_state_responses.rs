@@ -1,10 +1,10 @@
 //! Initial states of a record, eliminated exactly.
 //!
-//! What a record does not report about its own past enters the residuals linearly: the nf past values of w through the
-//! free responses of `1/F` (as `-(D/C) h`, h the impulse response of `1/F`), the nc past innovations through those of
-//! `1/C`. With G the matrix of these responses and `G = Q R`, the states of least squares are `x = -R^-1 Q' eps_0` and
-//! the residuals `eps = (I - Q Q') eps_0`. The responses die away, so that Q is short compared with the record. Source:
-//! G. H. Golub and V. Pereyra, *SIAM J. Numer. Anal.* 10 (1973) 413-432.
+//! The unknown past of a record enters the residuals linearly: the nf past values of w through the free responses of
+//! `1/F` (as `-(D/C) h`, h the impulse response of `1/F`), the nc past innovations through those of `1/C`. With G the
+//! matrix of these responses and `G = Q R`, the states of least squares are `x = -R^-1 Q' eps_0` and the residuals
+//! `eps = (I - Q Q') eps_0`. The responses die away, so that Q is short compared with the record. Source: G. H. Golub
+//! and V. Pereyra, *SIAM J. Numer. Anal.* 10 (1973) 413-432.
 //!
 //! With a stationary past ([`crate::criterion::stationary_noise`]) the states of the noise model
 //! have a known covariance `sigma^2 L L'`: they are `L z` with z of variance sigma^2, and z counts

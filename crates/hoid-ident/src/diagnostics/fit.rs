@@ -22,8 +22,8 @@ const FEWEST_RESIDUALS: usize = 5;
 const LEVEL: f64 = 0.05;
 
 impl Fit {
-    /// What the fit is worth, on the records that it was fitted to and with the search that chose
-    /// its orders, where there was one. The kinds of findings are those of the [module](super).
+    /// Verdict on the fit, on the records that it was fitted to and with the search that chose its
+    /// orders, where there was one. The kinds of findings are those of the [module](super).
     ///
     /// # Errors
     /// As [`Fit::residuals`].
@@ -69,7 +69,7 @@ impl Fit {
         })
     }
 
-    /// What the system from e to u shows, without a record.
+    /// Results of the system from e to u, without a record.
     fn system_findings(&self) -> Vec<Finding> {
         let mut all = Vec::new();
         if !self.model.is_stable() {

@@ -17,7 +17,7 @@ use crate::{
 };
 
 impl GreyBoxFit {
-    /// What the fit is worth, on the records that it was fitted to, in their order. The kinds of
+    /// Verdict on the fit, on the records that it was fitted to, in their order. The kinds of
     /// findings are those of the [module](super).
     ///
     /// # Errors

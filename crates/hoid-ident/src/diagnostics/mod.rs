@@ -1,4 +1,4 @@
-//! What speaks for and against a result.
+//! Findings for and against a result.
 //!
 //! Each rule is one observation with its own kind ([`hoid_model::Finding`]), and the [`hoid_model::Verdict`] follows
 //! from them. The limits are where they are used.

@@ -1,5 +1,5 @@
-//! What speaks against an operator: gains that are not distinguished from zero, poles of no person,
-//! a delay at the end of its range.
+//! Findings against an operator: gains that are not distinguished from zero, poles of no person, a
+//! delay at the end of its range.
 
 use std::f64::consts::PI;
 

@@ -1,4 +1,4 @@
-//! What a stretch of data shows against an operator that was found otherwise: one step towards its own fit.
+//! Evidence of a stretch of data against an operator that was found otherwise: one step towards its own fit.
 //!
 //! The operator stays constant, a noise model `D v = eps` of order [`NOISE`] is fitted to what it leaves of u, and with
 //! `psi = -d eps/d eta` for `eta = [K_e, K_e_dot, omega_nm, zeta_nm, tau_e]`

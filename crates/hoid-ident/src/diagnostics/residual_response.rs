@@ -1,13 +1,13 @@
 //! Whether a response to the error is left that a model does not have.
 //!
 //! Of a model that is linear in what it has to estimate, `u = X b + v`, the columns X are known: responses of a basis,
-//! their derivatives by what is held, a level. With an autoregression `D v = eps` of order [`NOISE`] the question is
-//! whether further taps on e carry information about eps, Z in place of the impulse response that X cannot have: means
-//! of e over [`TAPS`] spans of [`TAP_S`] one after another. By the statistic of the Lagrange multiplier (T. S. Breusch
-//! and A. R. Pagan, *Review of Economic Studies* 47 (1980) 239-253; L. Ljung, *System Identification*, 1999, section
-//! 16.6, for the residuals of a model)
+//! their derivatives by the fixed dynamics, a level. With an autoregression `D v = eps` of order [`NOISE`] the question
+//! is whether further taps on e carry information about eps, Z in place of the impulse response that X cannot have:
+//! means of e over [`TAPS`] spans of [`TAP_S`] one after another. By the statistic of the Lagrange multiplier (T. S.
+//! Breusch and A. R. Pagan, *Review of Economic Studies* 47 (1980) 239-253; L. Ljung, *System Identification*, 1999,
+//! section 16.6, for the residuals of a model)
 //!
-//! `s(t) = z(t) eps(t)`, z what is left of D Z when D X and the lags of v are taken out,
+//! `s(t) = z(t) eps(t)`, z the remainder of D Z when D X and the lags of v are taken out,
 //!
 //! so that what the estimate of b and of D takes away is taken away here too: in a closed loop past e and
 //! past v are correlated. Two variances: that of the model, with
@@ -30,7 +30,7 @@ pub(crate) const TAP_S: f64 = 0.15;
 const BLOCK_S: f64 = 2.0;
 const FEWEST: usize = 10;
 
-/// What a test of a model has found.
+/// Result of a test of a model.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ResidualResponse {
     /// Probability of so much where nothing is left.

@@ -33,7 +33,7 @@ const LEVEL: f64 = 2.0;
 /// Name of a quantity, and its estimates by the first fit and by the other.
 type Beside = (String, Estimate, Estimate);
 
-/// What is taken out of the records.
+/// Trend removed from the records.
 #[derive(Debug, Clone, Copy)]
 enum Without {
     SamplesThatStandOut,

@@ -12,8 +12,8 @@ use crate::{
 };
 
 impl SigmoidFit {
-    /// What the fit is worth, on the records that it was fitted to. Where the records show no
-    /// change, the operator without one is judged.
+    /// Verdict on the fit, on the records that it was fitted to. Where the records show no change,
+    /// the operator without one is judged.
     ///
     /// # Errors
     /// As [`SigmoidFit::residuals`].

@@ -25,7 +25,7 @@ pub(super) fn thinning(sample_time_s: f64) -> usize {
 pub(super) struct Whitened {
     /// Of the columns, the level last.
     pub b: DVector<f64>,
-    /// What the columns leave of u.
+    /// The part of u that the columns leave unexplained.
     pub v: DVector<f64>,
     /// `d_1 ..` of its noise model.
     pub d: Vec<f64>,

@@ -115,7 +115,7 @@ impl Agreement {
     }
 }
 
-/// What a method found.
+/// Result of a method.
 #[derive(Debug, Clone)]
 pub(super) struct Side {
     pub method: AgreementMethod,

@@ -8,7 +8,7 @@
 
 use hoid_model::Form;
 
-/// What a form is judged by.
+/// Criterion for a form.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct FormFigures {
     /// The form.

@@ -36,7 +36,7 @@ pub(super) fn quantile(clusters: usize) -> f64 {
     StudentsT::new(0.0, 1.0, freedom(clusters)).map_or(1.96, |t| t.inverse_cdf(0.975))
 }
 
-/// What the clusters are.
+/// Definition of the clusters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum ClusterKind {
     /// Each record is one.

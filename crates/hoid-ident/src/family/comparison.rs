@@ -1,4 +1,4 @@
-//! What the forms that were tried are worth: what [`super::choice`] weighs them by.
+//! Reliability of the forms that were tried: what [`super::choice`] weighs them by.
 //!
 //! Where an excitation was recorded, forms are compared at its lines; else by their prediction
 //! errors, all in units of one inflation kappa, so that a form does not look well by its own large
@@ -25,14 +25,14 @@ const NO_BETTER: f64 = 1.1;
 /// Standard errors from zero of a gain that is known.
 const LEAST_ERRORS: f64 = 2.0;
 
-/// A form with what was found of it.
+/// A form with the findings of it.
 pub(super) struct Tried<'a> {
     pub form: Form,
     pub lines: Option<LineFit>,
     pub fit: Result<PredictionFit<'a>, IdentError>,
 }
 
-/// What all forms are worth, and which of them is in front.
+/// Reliability of all forms, and which of them is in front.
 pub(super) struct Comparison {
     /// Place of the form in front; `None` where none could be fitted.
     pub front: Option<usize>,

@@ -1,4 +1,4 @@
-//! What speaks for and against a fit of the family.
+//! Findings for and against a fit of the family.
 //!
 //! Each rule is one observation with its own kind ([`hoid_model::Finding`]); the limits are stated
 //! where they are used; those on residuals are shared with all fits.
@@ -35,7 +35,7 @@ const NOTED_ERROR_RATIO: f64 = 1.5;
 /// Standard errors from which on what a prior moves a parameter by is reported.
 const NOTED_PULL: f64 = 0.5;
 
-/// What is judged.
+/// Inputs of the diagnostics.
 pub(super) struct DiagnosticInputs<'a> {
     pub termination: Termination,
     pub delay: (f64, (f64, f64)),

@@ -1,4 +1,4 @@
-//! The operator of a record with its errors, out of eta and what is known of it.
+//! The operator of a record with its errors, out of eta and the prior knowledge of it.
 
 use hoid_model::{FamilyOperator, NotConvertible, PolynomialModel, Structure, operator_family::Coordinate};
 
@@ -25,7 +25,7 @@ pub(super) struct Errors {
     pub profiles: Vec<Option<(f64, f64)>>,
     /// Quantile of Student's distribution for 95 %.
     quantile: f64,
-    /// What the gain of the person varies by beyond the runs, as a part of it.
+    /// Variation of the gain of the person beyond the runs, as a part of it.
     pub run_to_run: f64,
 }
 

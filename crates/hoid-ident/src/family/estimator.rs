@@ -46,7 +46,7 @@ impl FamilyEstimator {
     ///
     /// # Errors
     /// [`IdentError`] for records or options without meaning, and where no form could be fitted.
-    /// What makes a result doubtful is part of it ([`FamilyFit::verdict`]).
+    /// Findings that make a result doubtful is part of it ([`FamilyFit::verdict`]).
     pub fn fit(&self, records: &[Record]) -> Result<FamilyFit, IdentError> {
         let described = self.excitation.as_ref().map(|channel| {
             let options = DescriptionOptions {

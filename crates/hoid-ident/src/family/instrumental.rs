@@ -504,7 +504,7 @@ mod tests {
         let (_, z) = method.equation(&minimum, &d, &mut workspace).unwrap();
         let products = z.iter().flat_map(|a| z.iter().map(move |b| dot(a, b))).collect();
         let of_held = method.held(&minimum, &mut workspace).unwrap();
-        // The autoregression of what is left of u is that of the fit but for what the prior moves,
+        // The autoregression of the remainder of u is that of the fit but for what the prior moves,
         // the instruments Psi but for the states before the record.
         for (own, of_fit) in of_held.d.iter().zip(&d) {
             assert!((own - of_fit).abs() < 2e-3, "{:?} {d:?}", of_held.d);

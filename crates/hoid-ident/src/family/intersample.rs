@@ -1,4 +1,4 @@
-//! What the error does between its samples, which no sample shows and the delay depends on.
+//! Intersample behaviour of the error, which no sample shows and the delay depends on.
 //!
 //! | name | the error | response of the samples to the operator's | tau_e |
 //! |---|---|---|---|
@@ -13,7 +13,7 @@
 
 use hoid_model::{Complex64, FamilyOperator, ModelError, SampleTime, named_choice, operator_family::HeldFamily};
 
-/// What the error does between its samples.
+/// Intersample behaviour of the error.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Intersample {

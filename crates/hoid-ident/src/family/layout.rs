@@ -23,7 +23,7 @@ pub(super) struct FamilyLayout {
     pub nc: usize,
     pub nd: usize,
     pub sample_time: SampleTime,
-    /// What the error does between its samples.
+    /// Intersample behaviour of the error.
     pub intersample: Intersample,
     /// Place in eta of each slot, for each record.
     positions: Vec<Vec<usize>>,

@@ -29,7 +29,7 @@ const CHI_SQUARED: f64 = 5.991_464_547_107_979;
 /// Points at which the distance from -1 is looked for.
 const POINTS: usize = 400;
 
-/// What is known of an operator at a frequency: its sampled response, and the covariance of real and imaginary part
+/// Known properties of an operator at a frequency: its sampled response, and the covariance of real and imaginary part
 /// of its relative change.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct KnownResponse {
@@ -118,7 +118,7 @@ impl LoopShape {
         self.unstable_poles.map(|count| count == 0)
     }
 
-    /// What the loop shows against the assumed operator: a record that stays bounded was made in a stable loop, which
+    /// Evidence of the loop against the assumed operator: a record that stays bounded was made in a stable loop, which
     /// has a crossover and no phase margin below zero, and a person's has none above 120 deg. `reach_deg` is half of
     /// the 95 % interval of the margin at the lowest crossover. `None` where nothing is against it.
     pub fn doubt(&self, reach_deg: f64) -> Option<Finding> {

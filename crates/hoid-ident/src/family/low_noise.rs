@@ -49,7 +49,7 @@ pub(super) struct End {
     share: f64,
 }
 
-/// What was found of all forms where there is little noise.
+/// Findings about all forms where there is little noise.
 #[derive(Debug, Clone)]
 pub(super) struct LittleNoise {
     /// The end of each form; `None` where its search came to none.

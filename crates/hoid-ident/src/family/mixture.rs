@@ -24,7 +24,7 @@ const FAR: f64 = 50.0;
 /// Probability in each tail.
 const TAIL: f64 = 0.025;
 
-/// What a form states about a quantity.
+/// Statement of a form about a quantity.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Component {
     /// Weight of the form.
@@ -35,7 +35,7 @@ pub(super) struct Component {
     pub interval: Option<(f64, f64)>,
 }
 
-/// What all of them report.
+/// Report of all of them.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Mixture {
     pub estimate: Estimate,

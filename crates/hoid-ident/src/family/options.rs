@@ -16,18 +16,18 @@ pub const HIGHEST_NOISE_ORDER: usize = 24;
 /// Highest nd that is searched next to an nc: an ARMA model needs few.
 const HIGHEST_BESIDE_NC: usize = 8;
 
-/// What is to be estimated of a person, and how.
+/// Quantities to be estimated of a person, and how.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FamilyEstimator {
     /// The forms to choose from; one alone is fitted without a choice. Default all that are proper.
     pub forms: Vec<Form>,
     /// With the neuromuscular part. Default true.
     pub neuromuscular: bool,
-    /// What is known before the data. Default [`OperatorPrior::population`].
+    /// Prior knowledge before the data. Default [`OperatorPrior::population`].
     pub prior: OperatorPrior,
     /// Shortest and longest delay tau_e in s. Default 0.02 to 0.8.
     pub delay_range_s: (f64, f64),
-    /// What the error does between its samples. Default [`Intersample::Auto`].
+    /// Intersample behaviour of the error. Default [`Intersample::Auto`].
     pub intersample: Intersample,
     /// Orders nc of the noise model to choose from. Default 0.
     pub nc: std::ops::RangeInclusive<usize>,
@@ -39,11 +39,11 @@ pub struct FamilyEstimator {
     pub period_s: Option<f64>,
     /// Coordinates that each record has for itself; all others are common to the records.
     pub individual: Vec<Coordinate>,
-    /// What the gain of a person varies by from one run to the next, as a part of it: it is in the
+    /// Variation of the gain of a person from one run to the next, as a part of it: it is in the
     /// error bars of fewer than five records, whose blocks cannot show it. Default 0.06: between 4
     /// and 9 % in repeated runs of three people, each left out in turn.
     pub run_to_run: f64,
-    /// What is taken out of e and u of each record beforehand: an operator with a lag integrates an
+    /// Trend removed from e and u of each record beforehand: an operator with a lag integrates an
     /// offset. Default their mean.
     pub detrend: Detrend,
     /// Initial states of each record. Default: estimated.

@@ -124,7 +124,7 @@ impl Parameter {
     }
 }
 
-/// What is known of the coordinates of one operator.
+/// Known properties of the coordinates of one operator.
 pub(super) struct CoordinateEstimate<'a> {
     pub operator: &'a FamilyOperator,
     pub covariance: Option<&'a [f64]>,
@@ -136,7 +136,7 @@ pub(super) struct CoordinateEstimate<'a> {
     pub profile: &'a [Option<(f64, f64)>],
     /// Quantile of Student's distribution for 95 %.
     pub quantile: f64,
-    /// What the gain of the person varies by beyond these runs, as a part of it.
+    /// Variation of the gain of the person beyond these runs, as a part of it.
     pub run_to_run: f64,
 }
 

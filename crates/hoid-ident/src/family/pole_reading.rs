@@ -20,7 +20,7 @@ pub enum PoleRole {
 pub struct RealPole {
     /// Its rate, 1/s.
     pub rate: f64,
-    /// What it is.
+    /// Its definition.
     pub role: PoleRole,
 }
 

@@ -48,7 +48,7 @@ const SETTLED: f64 = 0.05;
 pub(super) struct Prediction<'a> {
     pub data: Vec<Data<'a>>,
     pub sample_time: SampleTime,
-    /// What the error does between its samples.
+    /// Intersample behaviour of the error.
     pub intersample: Intersample,
     /// Whether the data show that, or somebody has reported it.
     pub course_is_known: bool,
@@ -102,7 +102,8 @@ impl<'a> Prediction<'a> {
         PhysicalCriterion::new(self.layout(form, noise), self.data.clone(), self.initial, self.first)
     }
 
-    /// What an operator leaves of u in each record: `v = u - Y e`, the states of Y estimated.
+    /// The part of u that an operator leaves unexplained in each record: `v = u - Y e`, the states
+    /// of Y estimated.
     pub fn unexplained(
         &self,
         form: (Form, bool),

@@ -1,4 +1,4 @@
-//! What the prediction error search of one form found.
+//! Result of the prediction error search of one form.
 
 use super::{clusters::Clusters, layout::FamilyLayout};
 use crate::{

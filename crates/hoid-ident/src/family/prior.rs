@@ -1,4 +1,4 @@
-//! What is known of people before they are measured.
+//! Prior knowledge of people before they are measured.
 //!
 //! Some seconds of tracking carry little information about the neuromuscular system: its resonance
 //! lies above the frequencies at which people are excited. A weak prior keeps its parameters where
@@ -25,7 +25,7 @@ use crate::{IdentError, grey_box::objective::Penalty};
 /// another fit knows better is taken to be known so well.
 const LEAST_SPREAD: f64 = 1e-3;
 
-/// What is known of one parameter.
+/// Known properties of one parameter.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct ParameterPrior {
     /// `omega_nm`, `zeta_nm`, `tau_e`, `T_L` or `T_I`.
@@ -38,7 +38,7 @@ pub struct ParameterPrior {
     pub source: String,
 }
 
-/// What is known of the parameters of an operator before the data.
+/// Prior knowledge of the parameters of an operator before the data.
 #[derive(Debug, Clone, PartialEq, Default, serde::Serialize, serde::Deserialize)]
 pub struct OperatorPrior {
     entries: Vec<ParameterPrior>,
@@ -146,7 +146,7 @@ impl OperatorPrior {
         Self::new(found.into_iter().filter_map(entry).collect())
     }
 
-    /// What is known of each parameter.
+    /// Known properties of each parameter.
     pub fn entries(&self) -> &[ParameterPrior] {
         &self.entries
     }

@@ -52,7 +52,7 @@ pub(super) struct ResponseCriterion<'p> {
     pub form: Form,
     pub neuromuscular: bool,
     pub sample_time: SampleTime,
-    /// What the error does between its samples.
+    /// Intersample behaviour of the error.
     pub intersample: Intersample,
     pub points: Cow<'p, [MeasuredResponse]>,
     pub limits: Vec<(f64, f64)>,

@@ -1,4 +1,4 @@
-//! What a fit of the family found.
+//! Result of a fit of the family.
 
 use std::f64::consts::{LN_10, PI};
 
@@ -92,8 +92,8 @@ pub struct FamilyFit {
     pub forms: Vec<FormFigures>,
     /// Those that the data leave, over which estimates are averaged: the one in front first.
     pub weighed: Vec<WeighedForm>,
-    /// What the gain of the person varies by beyond these runs, as a part of it: standard deviation of their
-    /// mean. Zero where errors are those of the scatter between runs, which hold it.
+    /// Variation of the gain of the person beyond these runs, as a part of it: standard deviation of their mean. Zero
+    /// where errors are those of the scatter between runs, which hold it.
     pub run_to_run: f64,
     /// The fit at the lines of the excitation, of the same form.
     pub lines: Option<LineFit>,
@@ -126,7 +126,7 @@ pub struct FamilyFit {
     pub coherent_share: Option<f64>,
     /// How the search ended.
     pub termination: Termination,
-    /// What the error does between its samples, as it was fitted.
+    /// Intersample behaviour of the error, as it was fitted.
     #[serde(default)]
     pub intersample: Intersample,
     /// Whether the data show that, or it was reported; else the delay may be half a sample longer
@@ -141,7 +141,7 @@ pub struct FamilyFit {
     pub noise_free: Option<f64>,
     /// Time between two samples.
     pub sample_time: SampleTime,
-    /// What the result is worth.
+    /// Verdict on the result.
     pub verdict: Verdict,
 }
 

@@ -1,4 +1,4 @@
-//! What a channel shows about its own next sample, by a fit that faults cannot carry.
+//! Information of a channel about its own next sample, by a fit that faults cannot carry.
 //!
 //! `x(t) = -a_1 x(t-1) - ... - a_p x(t-p) + eps(t)` by least squares with bounded influence: a row
 //! counts only where neither x(t) nor any of its p past values lies beyond [`FAR`] robust deviations

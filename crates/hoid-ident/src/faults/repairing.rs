@@ -1,4 +1,4 @@
-//! What becomes of a record with faults: segments, what was done, and what it reports about a
+//! Treatment of a record with faults: segments, the actions taken, and what it reports about a
 //! result.
 
 use std::ops::Range;
@@ -16,14 +16,14 @@ use crate::frequency::COMMON_EXCITATIONS;
 /// Sample time in s that no person is recorded with.
 pub const SLOWEST_S: f64 = 0.5;
 
-/// A record without its faults, in one or more segments, and what was done.
+/// A record without its faults, in one or more segments, and the actions taken.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RepairedRecord {
-    /// What is left, in its order; the record as it was where nothing usable would be.
+    /// The remainder, in its order; the record as it was where nothing usable would be.
     pub segments: Vec<Record>,
-    /// What was found, in the order of time.
+    /// The findings, in the order of time.
     pub faults: Vec<Fault>,
-    /// What that reports about any result.
+    /// Report of that on any result.
     pub findings: Vec<Finding>,
 }
 

@@ -35,7 +35,7 @@ const RUNS_ENOUGH: usize = 3;
 /// Delays beyond that of a person are what noise makes of the phase.
 const LONGEST_DELAY_S: f64 = 0.6;
 
-/// What is asked for. By default all is found in the records.
+/// The request. By default all is found in the records.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct DescriptionOptions {
     /// Channel of the recorded disturbance or target.
@@ -52,11 +52,11 @@ pub struct DescriptionOptions {
     pub to_s: Option<f64>,
     /// `e[k]` belongs to `u[k + offset_samples]`, a whole number or not.
     pub offset_samples: f64,
-    /// What is taken out of e and u of each run beforehand.
+    /// Trend removed from e and u of each run beforehand.
     pub detrend: Detrend,
 }
 
-/// A describing function, and what it is worth.
+/// A describing function, and its reliability.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Description {
     /// Lines, runs, remnant.
@@ -65,13 +65,13 @@ pub struct Description {
     pub excitation: Excitation,
     /// The channel that the average refers to.
     pub channel: Option<String>,
-    /// What counted as a run.
+    /// Definition of a run.
     pub realisation: Realisation,
     /// Delay that is taken out where phases are unwrapped and interpolated, s.
     pub delay_s: f64,
     /// Crossover and margins, with a controlled element.
     pub margins: Option<DescribingMargins>,
-    /// What speaks for and against it.
+    /// Findings for and against it.
     pub verdict: Verdict,
 }
 

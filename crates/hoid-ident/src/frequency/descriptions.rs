@@ -271,7 +271,7 @@ fn what_cannot_be_described_is_refused() {
         ..DescriptionOptions::default()
     };
     assert!(message(&[bare], &named).contains("one of e, u"));
-    // Not whole periods: what is wrong with the channel that is there is reported.
+    // Not whole periods: the problem is reported for the channel that exists.
     let half = record(PERIOD * 5 / 4, excitation, excitation);
     assert!(message(&[half], &options).contains("whole periods"));
     let twice = record(PERIOD, excitation, |k| 2.0 * excitation(k));

@@ -1,4 +1,4 @@
-//! What makes a describing function doubtful.
+//! Findings that make a describing function doubtful.
 //!
 //! Of n runs with a u that is not related to the excitation, the squared coherence `gamma^2` at a line exceeds x with
 //! the probability `(1 - x)^{n-1}` (N. R. Goodman, 1957, in J. S. Bendat and A. G. Piersol, *Random Data*, 2010,
@@ -39,7 +39,7 @@ const MUCH_LEAKAGE: f64 = 1e-2;
 /// Distance from a whole number of samples, from rounding to what is meant.
 const NEARLY_WHOLE: (f64, f64) = (1e-6, 0.05);
 
-/// What is judged.
+/// Inputs of the diagnostics.
 pub(super) struct DiagnosticInputs<'a> {
     pub function: &'a DescribingFunction,
     pub excitation: &'a Excitation,

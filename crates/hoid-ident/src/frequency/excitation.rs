@@ -30,7 +30,7 @@ pub struct Excitation {
     period_s: f64,
 }
 
-/// What counts as a line of a channel.
+/// Definition of a line of a channel.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LineSearch {
     /// Period T in s; the longest that all lines found are harmonics of where it is `None`.

@@ -28,9 +28,9 @@ pub(crate) struct PhysicalCriterion<'a, P> {
     /// none.
     pub samples: Option<Vec<usize>>,
     pub limits: Vec<(f64, f64)>,
-    /// What is known before the data, in units of the residuals; none where there is nothing.
+    /// Prior knowledge before the data, in units of the residuals; none where there is nothing.
     pub penalty: Vec<Penalty>,
-    /// What else was measured of the operator that all records share.
+    /// Common parts of else was measured of the operator that all records.
     pub beside: Option<Beside<'a>>,
 }
 
@@ -138,7 +138,7 @@ impl<'a, P: Parametrisation> PhysicalCriterion<'a, P> {
         }
     }
 
-    /// What was measured besides, at eta: its part of the criterion; zeros where there is nothing.
+    /// Additional measurements, at eta: its part of the criterion; zeros where there is nothing.
     pub fn beside_at(&self, eta: &[f64], workspace: &mut Workspace) -> Linearisation {
         let mut own = Linearisation::empty(eta.len());
         if let Some(beside) = &self.beside {

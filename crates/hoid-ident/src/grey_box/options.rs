@@ -12,7 +12,7 @@ use crate::{
 /// Orders m of the remnant that are tried where none is given.
 const DEFAULT_ORDERS: RangeInclusive<usize> = 1..=4;
 
-/// What is to be estimated in physical parameters, and how.
+/// Quantities to be estimated in physical parameters, and how.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GreyBox {
     /// Orders m of the remnant filter to choose from, 0 (white) to 4.

@@ -1,4 +1,4 @@
-//! What the criterion needs to know of physical parameters: which polynomials they give.
+//! Requirements of the criterion on physical parameters: which polynomials they give.
 
 use std::ops::Range;
 

@@ -1,4 +1,4 @@
-//! What a grey-box fit found.
+//! Result of a grey-box fit.
 
 use hoid_model::{
     NotConvertible, OperatorParameters,
@@ -20,7 +20,7 @@ pub struct OrderCandidate {
     pub outcome: Result<OrderFigures, String>,
 }
 
-/// What orders are compared by.
+/// Criterion for orders.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct OrderFigures {
     /// Loss V.

@@ -1,4 +1,4 @@
-//! What the instruments are made of.
+//! Components of the instruments.
 
 use std::fmt;
 
@@ -7,7 +7,7 @@ use hoid_model::Record;
 /// Channel of the forcing function in a record that has one.
 pub const FORCING_CHANNEL: &str = "f_t";
 
-/// What the instruments are made of.
+/// Components of the instruments.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub enum Instruments {
     /// The input itself and the output that the model simulates from it. For an open loop: in a

@@ -68,7 +68,7 @@ struct GivenInstruments<'p, 'a> {
     problem: &'p IvProblem<'a>,
     noise: &'p NoiseModel,
     q: Columns,
-    /// What counts as the sum of squares of the output: smaller values than 1e-26 of it are zero.
+    /// Definition of the sum of squares of the output: smaller values than 1e-26 of it are zero.
     power: f64,
 }
 

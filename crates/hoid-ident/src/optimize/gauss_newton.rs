@@ -38,7 +38,7 @@ pub(crate) struct GaussNewton<'s> {
     evaluation_point: Vec<f64>,
 }
 
-/// What the next linearisation decides.
+/// Quantities decided by the next linearisation.
 enum Trial {
     /// Whether the start is any good.
     Start,

@@ -1,4 +1,4 @@
-//! What a search needs to know of a model, and what it finds.
+//! Requirements of a search on a model, and what it finds.
 
 use std::ops::Range;
 

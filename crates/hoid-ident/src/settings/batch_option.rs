@@ -1,4 +1,4 @@
-//! An option of a batch estimator, declared once: what is known of it, what its text sets, what is printed of it.
+//! An option of a batch estimator, declared once: the prior knowledge of it, what its text sets, what is printed of it.
 
 use hoid_model::SampleTime;
 

@@ -107,7 +107,7 @@ mod tests {
             pub delay_s: (f64, f64) = (0.05, 0.6),
         }
         groups {
-            /// What is shared.
+            /// Shared data.
             pub shared: Shared,
         }
     }

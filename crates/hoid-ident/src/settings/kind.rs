@@ -37,7 +37,8 @@ pub enum Kind {
     Channel,
     /// Names, as `K,T_L`.
     Names,
-    /// What is known of a person: `population`, `none`, `NAME=CENTRE:SPREAD,..`, or a file of a fit.
+    /// Known properties of a person: `population`, `none`, `NAME=CENTRE:SPREAD,..`, or a file of a
+    /// fit.
     Prior,
     /// Values of a type by name, as `b0=256,f=inf`.
     Named(&'static Kind),

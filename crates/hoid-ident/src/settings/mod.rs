@@ -48,7 +48,7 @@ use crate::IdentError;
 
 /// Options with names.
 pub trait Settings {
-    /// What there is to be set, in the order of the declaration, with the defaults.
+    /// Available settings, in the order of the declaration, with the defaults.
     fn list(&self) -> Vec<Setting>;
 
     /// Sets an option from its text; false when the name is not among them.

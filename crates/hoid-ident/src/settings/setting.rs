@@ -1,4 +1,4 @@
-//! What is known of an option.
+//! Known properties of an option.
 
 use hoid_model::{NamedChoice, Structure};
 
@@ -21,7 +21,7 @@ pub struct Setting {
     pub default: String,
     /// What its numbers may be.
     pub bounds: Bounds,
-    /// What it does, without a full stop.
+    /// Its behaviour, without a full stop.
     pub help: String,
 }
 
@@ -108,7 +108,7 @@ impl Setting {
         })
     }
 
-    /// Refuses a text, with what was expected.
+    /// Refuses a text, with the expected value.
     pub fn refused(&self, text: &str, expected: &str) -> IdentError {
         IdentError::BadOption {
             option: self.name.to_owned(),
@@ -126,12 +126,12 @@ impl Setting {
     }
 }
 
-/// What is known of an estimator or a recursive method.
+/// Known properties of an estimator or a recursive method.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MethodSpec {
     /// Name as typed.
     pub name: &'static str,
-    /// What it is, in a line without a full stop.
+    /// Its definition, in a line without a full stop.
     pub help: &'static str,
     /// Where it comes from in the literature.
     pub source: &'static str,

@@ -15,7 +15,7 @@ pub trait Value: Sized {
     /// Reads a text.
     ///
     /// # Errors
-    /// What was expected, in words.
+    /// The expected value, in words.
     fn read(text: &str) -> Result<Self, String>;
 
     /// The value as text; `None` for one that stands for nothing.
@@ -187,7 +187,7 @@ impl Value for Vec<String> {
 /// `NAME=VALUE,NAME=VALUE`, each name once.
 ///
 /// # Errors
-/// What was expected, in words.
+/// The expected value, in words.
 pub fn named_pairs(text: &str) -> Result<Vec<(String, String)>, String> {
     let mut pairs: Vec<(String, String)> = Vec::new();
     for item in text.split(',').map(str::trim).filter(|item| !item.is_empty()) {

@@ -24,7 +24,7 @@ pub struct ChangeParameter {
     pub remark: Option<Remark>,
 }
 
-/// What changes, as it is in force at one time.
+/// The part that changes, as it is in force at one time.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GainsAt {
     /// Time on the axis of the record, s.

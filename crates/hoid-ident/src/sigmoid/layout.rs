@@ -51,7 +51,7 @@ pub(crate) struct Layout {
     pub noise: usize,
 }
 
-/// What an element of theta is.
+/// Definition of an element of theta.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Element {
     /// A coordinate of the numerator, before (0) or after (1) the change.

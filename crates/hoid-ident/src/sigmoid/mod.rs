@@ -6,7 +6,7 @@
 //! coefficients of their numerator. Its parameters, the gain and T_L (or c_1 and c_2, or T_L and
 //! alpha), go from their initial to their last value as `1/(1 + e^{-G (t - t_M)})` (eq. 5); the lag,
 //! the neuromuscular part and the delay stay. Every form of [`hoid_model::operator_family`] will do;
-//! by default it is a gain and a lead, `u = K_e y_0 + K_e_dot y_1`, `K_e_dot = K_e T_L`. What is in
+//! by default it is a gain and a lead, `u = K_e y_0 + K_e_dot y_1`, `K_e_dot = K_e T_L`. Contents of
 //! the numerator at both ends, t_M, G, the poles, a real tau_e and D are found together by the
 //! prediction error method, which is maximum likelihood for normal innovations. Source: P. M. T.
 //! Zaal, *Manual control adaptation to changing vehicle dynamics in roll-pitch control tasks*, J.

@@ -63,7 +63,7 @@ pub(crate) struct ChangeCriterion<'a> {
     /// Weights of the residuals of each record, from the first residual on; none where all count
     /// the same.
     pub weights: Option<Vec<Vec<f64>>>,
-    /// What is known before the data.
+    /// Prior knowledge before the data.
     pub penalty: Vec<Penalty>,
     /// True where u of each record has a level.
     pub level: bool,
@@ -110,7 +110,7 @@ impl ChangeCriterion<'_> {
         (self.layout.order() + usize::from(self.level)) * self.data.len()
     }
 
-    /// What the prior adds to the sum of squares.
+    /// Contribution of the prior to the sum of squares.
     pub fn penalty_at(&self, theta: &[f64]) -> f64 {
         self.penalties().map(|penalty| penalty.at(theta)).sum()
     }

@@ -14,7 +14,7 @@ use crate::{
     shared_options as shared,
 };
 
-/// What is to be estimated, and how.
+/// Quantity to be estimated, and how.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SigmoidChange {
     /// Form of the operator: what changes is its numerator (K, T_L, c_1, c_2, alpha), with a lag the
@@ -24,8 +24,8 @@ pub struct SigmoidChange {
     pub neuromuscular: bool,
     /// A level of u in each record, estimated: of recorded data ([`SigmoidFit::level`](crate::SigmoidFit::level)). Default false.
     pub level: bool,
-    /// What is known of the person before the data; that of T_L counts before and after the change.
-    /// Default nothing.
+    /// Prior knowledge of the person before the data; that of T_L counts before and after the
+    /// change. Default nothing.
     pub prior: OperatorPrior,
     /// Order nd of D.
     pub nd: usize,

@@ -1,4 +1,4 @@
-//! What is known of the person before the data, next to the criterion of a change.
+//! Prior knowledge of the person before the data, next to the criterion of a change.
 //!
 //! A prior of a positive parameter x, `ln x ~ N(m, s)`, stands as `sigma^2 (ln x - m)^2/s^2` next to
 //! the squared residuals ([`crate::family::OperatorPrior`]); that of T_L counts before and after the

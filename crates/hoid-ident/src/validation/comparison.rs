@@ -11,7 +11,7 @@ use super::{
 };
 use crate::{Fit, IdentError, Series};
 
-/// What the residual tests show. A lag outside its 99 % bound is expected once in a hundred; more
+/// Results of the residual tests. A lag outside its 99 % bound is expected once in a hundred; more
 /// than [`OUTSIDE_ALLOWED`] of them is a sign.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ResidualDiagnostics {
@@ -50,7 +50,7 @@ pub struct Validation {
 }
 
 impl Validation {
-    /// What the residual tests show.
+    /// Results of the residual tests.
     pub fn diagnostics(&self) -> ResidualDiagnostics {
         let outside = |keep: fn(i64) -> bool| {
             let c = &self.cross_correlation;

@@ -1,4 +1,4 @@
-//! What is wrong with the columns of a table that a record is made of.
+//! Problems with the columns of a table that a record is made of.
 
 use std::ops::Range;
 
@@ -9,7 +9,7 @@ use crate::IoError;
 use crate::record::ReadOptions;
 use crate::table::{Table, column_expression};
 
-/// What is wrong with the columns that are asked for, within the span.
+/// Problems with the columns that are asked for, within the span.
 ///
 /// # Errors
 /// [`IoError::NoSuchColumn`] and [`IoError::Expression`].
@@ -81,7 +81,7 @@ fn span_rows(table: &Table<'_>, time: Option<usize>, options: &ReadOptions) -> R
     start..end.unwrap_or(table.rows)
 }
 
-/// What is wrong with some columns of a table.
+/// Problems with some columns of a table.
 fn of_columns(
     table: &Table<'_>,
     used: &[usize],

@@ -9,7 +9,7 @@ use crate::wording::decimal;
 /// Places of a finding that are written as JSON; all of them are counted.
 const PLACES_WRITTEN: usize = 100;
 
-/// What is wrong.
+/// The problem.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 #[non_exhaustive]
@@ -42,7 +42,7 @@ impl QualityIssueKind {
     /// Kinds that are places in a record and can be left out of it; a clock or a constant is none.
     pub const MASKABLE: [Self; 4] = [Self::Missing, Self::Gap, Self::Stalled, Self::Saturated];
 
-    /// What can be done about it.
+    /// Remedy.
     pub fn remedy(self) -> &'static str {
         match self {
             Self::Missing => "bridge empty cells with --fill, or leave out with --from and --to or --mask missing",
@@ -90,7 +90,7 @@ pub struct RowSpan {
 /// One finding.
 #[derive(Debug, Clone, PartialEq)]
 pub struct QualityIssue {
-    /// What it is.
+    /// Its definition.
     pub kind: QualityIssueKind,
     /// The channel; empty for the time and for all channels.
     pub channel: String,

@@ -1,5 +1,5 @@
-//! The quality of recorded data: what is wrong with the sampling and the values, where and how much; nothing is
-//! repaired unasked.
+//! The quality of recorded data: the problems of the sampling and the values, where and how much; nothing is repaired
+//! unasked.
 //!
 //! | module | what it holds |
 //! |---|---|

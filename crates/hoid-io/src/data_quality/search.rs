@@ -28,8 +28,8 @@ pub(crate) fn issues_of(signals: &Signals<'_>) -> Vec<QualityIssue> {
     found
 }
 
-/// What is wrong with the values of e and u: saturation, quantisation, constants. Of its time nothing is known
-/// but that it is even.
+/// Problems with the values of e and u: saturation, quantisation, constants. Of its time nothing is known but that it
+/// is even.
 pub fn quality_of_record(record: &Record) -> Vec<QualityIssue> {
     let channels = record.input_channel().into_iter().chain([record.output_channel()]);
     let columns = channels

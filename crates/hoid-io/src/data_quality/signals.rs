@@ -1,4 +1,4 @@
-//! Columns as they are looked at, and what is known of their time.
+//! Columns as they are looked at, and the prior knowledge of their time.
 
 use std::ops::Range;
 
@@ -12,7 +12,7 @@ pub(crate) struct Signal<'a> {
     pub(crate) values: &'a [f64],
 }
 
-/// Columns of one length, and what is known of their time.
+/// Columns of one length, and the prior knowledge of their time.
 #[derive(Default)]
 pub(crate) struct Signals<'a> {
     pub(crate) columns: Vec<Signal<'a>>,

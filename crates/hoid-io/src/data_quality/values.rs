@@ -25,7 +25,7 @@ const STAY: (usize, usize) = (3, 5);
 /// Rows at a rail against the average of the next steps.
 const PEAK: usize = 6;
 
-/// What a rail of a channel is.
+/// Definition of a rail of a channel.
 pub(crate) struct Rail {
     /// The value at which it stays.
     pub(crate) value: f64,

@@ -10,7 +10,7 @@ use super::variables::{FmuKind, FmuStart, FmuVariable, Role};
 /// Name of the file among the resources.
 pub const FMU_SETTINGS: &str = "hoid.json";
 
-/// What a unit is.
+/// Definition of a unit.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct FmuSettings {
     kind: String,
@@ -76,7 +76,7 @@ impl FmuSettings {
     /// From the text of the file.
     ///
     /// # Errors
-    /// What is wrong with it, in words.
+    /// Problems with it, in words.
     pub fn parse(text: &str) -> Result<Self, String> {
         let settings: Self = serde_json::from_str(text).map_err(|error| format!("{FMU_SETTINGS}: {error}"))?;
         settings.kind()?;
@@ -90,7 +90,7 @@ impl FmuSettings {
         text
     }
 
-    /// What the unit does.
+    /// Behaviour of the unit.
     ///
     /// # Errors
     /// For a kind that is none.

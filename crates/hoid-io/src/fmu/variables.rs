@@ -10,7 +10,7 @@ pub const DETERMINED: [&str; 6] = [
     "tau_e_determined",
 ];
 
-/// What a unit does.
+/// Behaviour of a unit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FmuKind {
     /// Estimates a person from e and u.
@@ -24,7 +24,7 @@ hoid_model::named_choice!(FmuKind, "kind of unit", 2, {
     Operator => "operator",
 });
 
-/// What a variable is for.
+/// Purpose of a variable.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Role {
     /// Set before the start.
@@ -56,7 +56,7 @@ pub struct FmuVariable {
     pub name: &'static str,
     /// Its unit, empty for none.
     pub unit: &'static str,
-    /// What it is for.
+    /// Its purpose.
     pub role: Role,
     /// Type and start.
     pub start: FmuStart,
@@ -108,7 +108,7 @@ fn tracker() -> Vec<FmuVariable> {
             "controlled_element",
             "",
             text(""),
-            "what the person controls, as 90/(s(s+6)); empty for none",
+            "the controlled element, as 90/(s(s+6)); empty for none",
         ),
         parameter(
             "options",

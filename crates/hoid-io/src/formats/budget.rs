@@ -6,8 +6,8 @@
 
 use crate::IoError;
 
-/// What every file may unpack to, bytes. Readers hold values up to four times on their way (as they are in the file, as
-/// numbers, as columns, in a survey): a file of a few bytes stays below 300 MB.
+/// Limit of what each file may unpack to, bytes. Readers hold values up to four times on their way (as they are in the
+/// file, as numbers, as columns, in a survey): a file of a few bytes stays below 300 MB.
 const AT_LEAST: u64 = 48 << 20;
 /// And so many times its own length.
 const FACTOR: u64 = 64;
@@ -20,7 +20,7 @@ const TEXT: u64 = 64;
 /// Structures inside of structures, at most.
 pub(super) const MOST_NESTED: usize = 32;
 
-/// What is left of the memory that a file may take.
+/// The remainder of the memory that a file may take.
 #[derive(Debug)]
 pub(super) struct Budget {
     left: u64,

@@ -41,7 +41,7 @@ type RowsStart = fn(&mut dyn Write, &TableSchema) -> io::Result<Box<dyn RowWrite
 pub(crate) type ColumnsWriter = fn(&mut dyn Write, &TableSchema, &[Values<'_>]) -> io::Result<()>;
 type RecordWriter = fn(&mut dyn Write, &Record) -> io::Result<()>;
 
-/// What a file of the format is.
+/// Definition of a file of the format.
 pub(crate) enum Reading {
     /// One flat table.
     Table {

@@ -37,7 +37,7 @@ fn endings(formats: &[&Format]) -> String {
     }
 }
 
-/// What to do about files that others read, by their ending. pyhoid reads those of `PYTHON` itself.
+/// How to handle files that others read, by their ending. pyhoid reads those of `PYTHON` itself.
 const ELSEWHERE: [(&[&str], &str); 12] = [
     (&["gz", "zip", "bz2", "xz", "zst"], "unpack it first"),
     (&["arrow", "feather", "ipc", "xlsx", "xls", "ods"], PYTHON),

@@ -42,7 +42,7 @@ pub(super) fn unpacked(bytes: &[u8], file: &str) -> Result<Vec<u8>, IoError> {
     }
 }
 
-/// What the file next to a table without a header states about it.
+/// Statement of the file next to a table without a header about it.
 #[derive(Deserialize)]
 struct Sidecar {
     #[serde(rename = "SamplingFrequency")]

@@ -39,7 +39,7 @@ fn known() -> MutexGuard<'static, PartFiles> {
 /// nothing.
 pub fn remove_unfinished_files() {
     for part in std::mem::take(&mut known().parts) {
-        // What is in its place already, or cannot be removed, is swept later.
+        // Contents of its place already, or cannot be removed, is swept later.
         let _ = fs::remove_file(part);
     }
 }

@@ -1,4 +1,4 @@
-//! What is done to a record between the file and the estimator, and the account of it.
+//! Treatment of a record between the file and the estimator, and the account of it.
 //!
 //! The steps are taken in one order, whatever the order in which they were asked for:
 //!

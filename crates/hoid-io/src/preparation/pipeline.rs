@@ -11,7 +11,7 @@ use super::scaling::Scaling;
 use super::step::Step;
 use crate::IoError;
 
-/// What is to be done to a record. By default nothing is.
+/// Repairs that are applied to a record. By default nothing is.
 ///
 /// A channel is meant by its name; `e` and `u` are the input and the output, whatever their columns
 /// are called.
@@ -27,18 +27,18 @@ pub struct Preparation {
     pub rate: NewRate,
     /// Time from the first sample that is dropped, s. What the filters cut lies within it.
     pub run_in_s: f64,
-    /// What is taken out of input and output, last.
+    /// Trend removed from input and output, last.
     pub detrend: Detrend,
     /// Whether rows that are there twice, time included, are dropped before anything is read.
     pub drop_repeated: bool,
 }
 
 impl Preparation {
-    /// The record as it goes to the estimator, and what was done. [`Preparation::drop_repeated`]
-    /// belongs to reading and is not looked at.
+    /// The record as it goes to the estimator, and the actions taken.
+    /// [`Preparation::drop_repeated`] belongs to reading and is not looked at.
     ///
     /// # Errors
-    /// [`IoError::Preparation`] naming the step, what was found, and what was expected;
+    /// [`IoError::Preparation`] naming the step, what was found, and the expected value;
     /// [`IoError::Model`] where the numbers leave the range of floating point.
     pub fn apply(&self, record: Record) -> Result<(Record, Vec<Step>), IoError> {
         let begin_s = record.time_s(0);

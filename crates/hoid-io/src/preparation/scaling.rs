@@ -57,7 +57,7 @@ fn canonical(unit: &str) -> &str {
     other.map_or(unit, |(_, canonical)| canonical)
 }
 
-/// What a channel is multiplied by, and the unit that it has then.
+/// Factor of a channel, and the unit that it has then.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Scaling {
     /// The factor, finite and not 0.

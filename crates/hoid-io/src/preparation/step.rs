@@ -1,4 +1,5 @@
-//! The account of what was done to a record: for people in words, for programs with its numbers.
+//! The account of the processing applied to a record: for people in words, for programs with its
+//! numbers.
 
 use std::fmt;
 

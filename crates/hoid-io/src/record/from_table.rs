@@ -12,17 +12,17 @@ use crate::preparation::{Preparation, Step};
 use crate::table::{ColumnExpression, Signal, Table};
 use crate::wording::{list, named};
 
-/// A record, what was done to it, and what else a person should know about how it was read.
+/// A record, the processing of it, and what else a person should know about how it was read.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ReadRecord {
     /// The record, labelled with the name of the file without extension.
     pub record: Record,
     /// What was not read or looks odd, such as columns left out; one sentence each.
     pub notes: Vec<String>,
-    /// What was done to the numbers of the file, in this order.
+    /// Processing applied to the numbers of the file, in this order.
     pub steps: Vec<Step>,
-    /// What is wrong with the input, the output and their time in the file, before anything was
-    /// done; within the span that is read.
+    /// Problems with the input, the output and their time in the file, before anything was done;
+    /// within the span that is read.
     pub quality_issues: Vec<QualityIssue>,
 }
 
@@ -73,7 +73,7 @@ pub(super) fn record_of(
 }
 
 impl ReadRecord {
-    /// The record prepared, and what was done to it after what was done in reading.
+    /// The record prepared, and the processing of it after the actions taken in reading.
     pub(super) fn prepared(mut self, preparation: &Preparation) -> Result<Self, IoError> {
         let (record, steps) = preparation.apply(self.record)?;
         self.steps.extend(steps);

@@ -17,7 +17,7 @@ pub(super) enum OpenEnd {
     End,
 }
 
-/// What was bridged.
+/// The bridged samples.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) struct Bridged {
     /// Values in all.

@@ -20,8 +20,8 @@ use crate::preparation::{Preparation, Step};
 use crate::wording::{decimal, list};
 
 /// Reads the segments of a file between faults of these kinds that last `shortest_s` or more, in
-/// their order; the whole record where no kind is named. The first carries what is wrong with the
-/// file as a whole.
+/// their order; the whole record where no kind is named. The first carries the problems of the file
+/// as a whole.
 ///
 /// Of a file with several trials each is read so, one after the other.
 ///

@@ -11,7 +11,7 @@ use crate::preparation::Step;
 use crate::table::Table;
 use crate::wording::named;
 
-/// The table, and what was done to it.
+/// The table, and the processing of it.
 pub(super) struct TableReader<'a> {
     pub(super) table: Table<'a>,
     pub(super) options: &'a ReadOptions,

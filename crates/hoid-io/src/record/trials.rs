@@ -76,7 +76,7 @@ fn between(begins: &[usize], rows: usize) -> Vec<Range<usize>> {
     from.zip(to).map(|(from, to)| from..to).collect()
 }
 
-/// What a cell states; nothing where it is empty.
+/// Content of a cell; nothing where it is empty.
 fn cell(table: &Table<'_>, at: usize, row: usize) -> Option<String> {
     let value = table.columns[at].values[row];
     if value.is_finite() {
@@ -162,7 +162,7 @@ fn restarts(table: &Table<'_>) -> Option<(String, Parts)> {
     })
 }
 
-/// The trial of an array of structures, `trial(3).e`, and whether that was what was asked for.
+/// The trial of an array of structures, `trial(3).e`, and whether that was the request.
 pub(crate) fn of_contents(
     mut contents: Contents,
     choice: Option<&TrialChoice>,

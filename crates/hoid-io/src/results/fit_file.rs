@@ -21,7 +21,7 @@ pub struct FitParameter {
     pub determined: bool,
 }
 
-/// What a file of a fit holds.
+/// Contents of a file of a fit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FitFile {
     /// The parameters that have a value.

@@ -22,7 +22,7 @@ pub enum ScenarioFileError {
         path: String,
         /// Line, from 1.
         line: usize,
-        /// What is wrong.
+        /// The problem.
         reason: String,
     },
     /// A value without meaning.
@@ -44,7 +44,7 @@ pub enum ScenarioFileError {
     Keys {
         /// The file.
         path: String,
-        /// What is missing or too much, and the remedy.
+        /// Missing or surplus parts, and the remedy.
         reason: String,
     },
     /// Values that have a meaning each, but not together.
@@ -52,7 +52,7 @@ pub enum ScenarioFileError {
     Model {
         /// The file.
         path: String,
-        /// What is wrong.
+        /// The problem.
         source: ModelError,
     },
 }

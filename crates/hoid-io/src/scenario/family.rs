@@ -340,7 +340,7 @@ impl Source<'_> {
     }
 }
 
-/// What a number of an operator may be.
+/// Admissible values of a number of an operator.
 fn limits_of(key: &str) -> Limits {
     match key {
         "T_L_s" | "T_I_s" | "c_1_s" | "c_2_s2" | "tau_e_s" => Limits::LEAD_S,

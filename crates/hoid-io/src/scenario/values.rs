@@ -9,7 +9,8 @@ use crate::wording::printable;
 /// Most samples of a run, so that a slip of the unit does not ask for all memory.
 const MOST_SAMPLES: f64 = 1e7;
 
-/// What a number of a scenario may be, so that a slip of the unit is reported and not simulated.
+/// Admissible values of a number of a scenario, so that a slip of the unit is reported and not
+/// simulated.
 #[derive(Clone, Copy)]
 pub(super) struct Limits(f64, f64);
 

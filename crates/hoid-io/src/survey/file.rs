@@ -16,7 +16,7 @@ use crate::formats::arrays::TIMES;
 use crate::formats::{Reading, bytes_of};
 use crate::time::with_time;
 
-/// What a file holds.
+/// Contents of a file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FileSurvey {
     /// Its format, as in "Parquet".
@@ -25,9 +25,9 @@ pub struct FileSurvey {
     pub columns: Vec<ColumnSurvey>,
     /// The sampling of each structure with a time, one for a flat table.
     pub samplings: Vec<SamplingSurvey>,
-    /// What is wrong with the sampling, structure by structure.
+    /// Problems with the sampling, structure by structure.
     pub quality_issues: Vec<QualityIssue>,
-    /// What to know about how it was read.
+    /// Notes on how it was read.
     pub notes: Vec<String>,
 }
 
@@ -87,7 +87,7 @@ fn signal(column: &RawColumn) -> Signal<'_> {
     }
 }
 
-/// What is wrong with the columns that are next to each other, by structure and length.
+/// Problems with the columns that are next to each other, by structure and length.
 fn quality_issues(columns: &[RawColumn]) -> Vec<QualityIssue> {
     let mut seen: Vec<(&str, usize)> = Vec::new();
     let mut found = Vec::new();

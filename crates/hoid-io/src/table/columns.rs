@@ -35,7 +35,7 @@ pub(crate) trait Source {
     fn file(&self) -> &str;
     /// "line 12" or "row 12".
     fn place(&self, row: usize) -> String;
-    /// What is in a cell, cut to a readable length.
+    /// Contents of a cell, cut to a readable length.
     fn cell(&self, row: usize, column: usize) -> String;
     /// Whether the file ends in the middle of this row, as far as can be seen.
     fn is_open(&self, _row: usize) -> bool {

@@ -39,7 +39,7 @@ fn parse(cell: &str) -> Option<Moment> {
     })
 }
 
-/// What the texts of a column are, row by row: moments as long as none is anything else.
+/// Definition of the texts of a column, row by row: moments as long as none is anything else.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(crate) enum Moments {
     /// Only missing values so far.
@@ -52,7 +52,7 @@ pub(crate) enum Moments {
 }
 
 impl Moments {
-    /// Takes a cell that is text, and puts what it is worth after the values of its column.
+    /// Takes a cell that is text, and puts its reliability after the values of its column.
     pub(crate) fn push(&mut self, column: &mut Column, cell: &str) {
         let moment = parse(cell).filter(|_| *self != Self::No);
         let row = column.values.len();

@@ -40,7 +40,7 @@ const WORDS: [&str; 9] = [
 /// Words for a moment, which may as well be the time of day, or a count.
 const STAMPS: [&str; 5] = ["timestamp", "stamp", "datetime", "date time", "date"];
 
-/// What a name states about a column.
+/// Statement of a name about a column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum ColumnRole {
     Time(Option<Unit>),
@@ -301,7 +301,7 @@ fn take(table: &mut Table<'_>, at: usize, unit: Option<Unit>) {
             format!("{name} is {taken}in s{origin}, from {unit}")
         }
     };
-    // What is in s, as t is, needs no unit.
+    // Contents of s, as t is, needs no unit.
     time.unit = String::from(if unit == Unit::Power(0) { "" } else { "s" });
     table
         .notes

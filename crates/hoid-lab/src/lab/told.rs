@@ -1,4 +1,4 @@
-//! What the pages are reported: how the session stands, and the live estimate.
+//! Report of the pages are: how the session stands, and the live estimate.
 
 use std::path::{Path, PathBuf};
 

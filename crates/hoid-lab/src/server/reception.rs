@@ -31,7 +31,7 @@ struct Stranger {
     came: Instant,
 }
 
-/// What is known of a stranger after a look.
+/// Known properties of a stranger after a look.
 enum Look {
     Waits,
     Gone,

@@ -34,7 +34,7 @@ pub struct Event {
     pub stamp_ms: f64,
     /// When the page had it, ms from tick 0.
     pub handled_ms: f64,
-    /// What the device reported.
+    /// Report of the device.
     pub raw: f64,
 }
 

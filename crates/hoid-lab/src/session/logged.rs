@@ -19,7 +19,7 @@ pub struct Logged {
     pub events: Vec<Event>,
     /// Frames.
     pub frames: Vec<Frame>,
-    /// What is wrong with the files.
+    /// Problems with the files.
     pub faults: Vec<String>,
 }
 
@@ -48,7 +48,7 @@ impl Logged {
     }
 }
 
-/// Calls `each` with the numbers of every whole line after the header, up to one that is none; what is wrong with the
+/// Calls `each` with the numbers of every whole line after the header, up to one that is none; the problems of the
 /// file, if something is.
 fn rows<const N: usize>(path: &Path, mut each: impl FnMut([f64; N])) -> Result<Option<String>, LabError> {
     let name = || {

@@ -1,4 +1,4 @@
-//! What is known of a run before it starts and after its end, each written at once.
+//! Prior knowledge of a run before it starts and after its end, each written at once.
 
 use std::{collections::BTreeMap, path::Path};
 
@@ -14,7 +14,7 @@ use crate::{
     task::{Phase, Task},
 };
 
-/// What is known before a run: `run.json`, and `forcing.parquet` next to it.
+/// Prior knowledge before a run: `run.json`, and `forcing.parquet` next to it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RunStart {
@@ -65,7 +65,7 @@ pub enum How {
     Interrupted,
 }
 
-/// What is known after a run: `end.json`.
+/// Results known after a run: `end.json`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Ended {

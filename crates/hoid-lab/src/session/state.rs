@@ -97,7 +97,7 @@ pub struct Done {
     pub verdict: String,
     /// Why not.
     pub reasons: String,
-    /// What is worth knowing besides.
+    /// Additional notes.
     pub notes: String,
     /// Root mean square of e.
     pub rms_e: f64,
@@ -110,7 +110,7 @@ pub struct Done {
 pub struct Session {
     /// The folder.
     pub folder: PathBuf,
-    /// What its `lab.toml` holds.
+    /// Contents of its `lab.toml`.
     pub facts: Facts,
     /// The runs that ended, in their order.
     pub done: Vec<Done>,

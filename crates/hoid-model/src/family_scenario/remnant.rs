@@ -76,7 +76,7 @@ crate::named_choice!(Followed, "signal that a remnant follows", 2, { Control => 
 /// A standard deviation that follows u.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SignalDependence {
-    /// What is followed.
+    /// The signal followed.
     pub follows: Followed,
     /// c: part of the variance that follows it, 0 to 1.
     pub part: f64,

@@ -59,7 +59,7 @@ impl FittedOperator {
     /// declared on both sides and differ. `units` are those of e and u.
     ///
     /// # Errors
-    /// [`ModelError::Operator`] with what was found and the remedy.
+    /// [`ModelError::Operator`] with the findings and the remedy.
     pub fn check_samples(&self, sample_time: SampleTime, units: [&str; 2]) -> Result<(), ModelError> {
         let wrong = |reason: String| Err(ModelError::Operator { reason });
         if !self.sample_time.matches(sample_time) {

@@ -87,7 +87,7 @@ impl fmt::Display for Decimation {
     }
 }
 
-/// What a decimation did.
+/// Action of a decimation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Decimated {
     /// New sample time by the old one.

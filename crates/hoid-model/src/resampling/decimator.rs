@@ -39,7 +39,7 @@ struct Lane {
     /// Place of the first weight next to that sample, and the weights.
     offset: i64,
     weights: Vec<f64>,
-    /// What the filter needs; the first is at `first` old samples, which the reflection of the
+    /// Requirements of the filter; the first is at `first` old samples, which the reflection of the
     /// start makes negative.
     past: VecDeque<f64>,
     first: i64,
@@ -91,7 +91,7 @@ impl<const C: usize> Decimator<C> {
         })
     }
 
-    /// What it does.
+    /// Its behaviour.
     pub fn done(&self) -> Decimated {
         self.done
     }
@@ -155,7 +155,7 @@ impl Lane {
         if value.is_finite() {
             self.last = value;
             if !self.seen {
-                // What came before is not known: as the first that is.
+                // The data before is not known: as the first that is.
                 self.past.iter_mut().for_each(|past| *past = value);
                 self.seen = true;
             }

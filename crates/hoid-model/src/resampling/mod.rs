@@ -33,7 +33,7 @@
 //! | file | what it holds |
 //! |---|---|
 //! | `kernel` | [`Kernel`]: the filter |
-//! | `decimation` | [`Decimation`]: by how much; [`Decimated`]: what was done |
+//! | `decimation` | [`Decimation`]: by how much; [`Decimated`]: the actions taken |
 //! | `of_record` | decimated records |
 //! | `decimator` | [`Decimator`]: sample by sample, with the same digits |
 

@@ -11,7 +11,7 @@ use super::style;
 /// Longest whiskers, in interquartile ranges.
 const REACH: f64 = 1.5;
 
-/// What a box shows of a sample.
+/// Content of a box for a sample.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct BoxStatistics {
     /// Number of values; zero where there is none, and a cross is drawn in the place of the box.

@@ -65,7 +65,7 @@ pub struct BoxPanel {
     /// Size up to which the ordinate is linear, and logarithmic beyond; linear throughout where it
     /// is `None`.
     pub linear_within: Option<f64>,
-    /// What is above the panel, such as the largest of its numbers; empty for nothing.
+    /// Text above the panel, such as the largest of its numbers; empty for nothing.
     pub note: String,
 }
 

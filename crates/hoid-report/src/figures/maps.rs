@@ -28,7 +28,8 @@ const APART: f64 = 5.0;
 /// One map.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct MapPanel {
-    /// What the rows of panels differ in, such as `P_n = 0.1`; that of the first of a row is shown.
+    /// Differences between the rows of panels, such as `P_n = 0.1`; that of the first of a row is
+    /// shown.
     pub name: String,
     /// Values by ordinate, the lowest first, and in each by abscissa. What is not finite or not
     /// there is hatched.
@@ -65,7 +66,7 @@ pub struct MapGrid {
     pub limits: Option<(f64, f64)>,
     /// True when each row has colours and a bar of its own.
     pub bar_per_row: bool,
-    /// What the cross means, for the legend; empty for none.
+    /// Meaning of the cross, for the legend; empty for none.
     pub mark: String,
 }
 

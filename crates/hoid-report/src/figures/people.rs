@@ -50,7 +50,7 @@ pub struct PeopleGrid {
     pub people: Vec<String>,
     /// Names of the places, such as conditions.
     pub places: Vec<String>,
-    /// What the places differ in.
+    /// Differences between the places.
     pub abscissa: String,
 }
 

@@ -1,4 +1,4 @@
-//! What all figures share: size, colours and fonts.
+//! Common parts of all figures: size, colours and fonts.
 
 use std::sync::Arc;
 

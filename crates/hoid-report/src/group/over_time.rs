@@ -32,7 +32,7 @@ const DISCRETE: [Row; 4] = [
     ("b1", "", "b1", "b1"),
 ];
 
-/// What is drawn over time.
+/// Signals drawn over time.
 #[derive(Clone, Copy, PartialEq)]
 enum Shown {
     /// Median and quartiles over the runs of all recursions.

@@ -168,8 +168,8 @@ fn page_names(subjects: &[&str]) -> Vec<String> {
     subjects.iter().map(name_of).collect()
 }
 
-/// What was done to the runs and what is wrong with their sampling: a row for all files of which the
-/// same is reported.
+/// Processing applied to the runs and the problems of their sampling: a row for all files of which
+/// the same is reported.
 fn account(preparation: &OutputTable, trouble: &OutputTable) -> Vec<(String, String)> {
     let mut rows: Vec<(String, String)> = Vec::new();
     for (table, what) in [(preparation, "preparation"), (trouble, "sampling trouble")] {

@@ -20,19 +20,19 @@ use crate::{
 /// Most traces of a page: more curves over each other cannot be distinguished.
 const MOST_TRACES: usize = 4;
 
-/// What the page is about.
+/// Subject of the page.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TrackReport<'a> {
     /// Heading of the page.
     pub title: String,
-    /// What was done and with what, as name and value: command, versions, record, seed.
+    /// The processing and its inputs, as name and value: command, versions, record, seed.
     pub settings: Vec<(String, String)>,
     /// The record that was tracked. Columns with the names of the operator's parameters (`K_e`,
     /// `T_L`, `K_e_dot`, `omega_nm`, `zeta_nm`, `tau_e`) are the truth, as in every simulation.
     pub record: &'a Record,
     /// One to four estimates of that record, drawn over each other.
     pub traces: Vec<TraceSection<'a>>,
-    /// What the traces are worth, on top of the page.
+    /// Verdict on the traces, on top of the page.
     pub verdict: Option<Verdict>,
     /// Remarks for the reader, such as warnings of the command.
     pub notes: Vec<String>,

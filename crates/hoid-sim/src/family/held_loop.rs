@@ -34,7 +34,7 @@ pub(super) struct HeldLoop {
     sample_time: SampleTime,
 }
 
-/// What enters a sample: target, disturbance, remnant.
+/// Inputs of a sample: target, disturbance, remnant.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Inputs {
     pub target: f64,
@@ -42,7 +42,7 @@ pub(super) struct Inputs {
     pub remnant: f64,
 }
 
-/// What a sample gives: error, control, output of the element.
+/// Result of a sample: error, control, output of the element.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Outputs {
     pub e: f64,
@@ -69,7 +69,7 @@ pub(super) struct OperatorState {
     k: usize,
 }
 
-/// What the operator shows about a sample before its error is known.
+/// Information of the operator about a sample before its error is known.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct OperatorOutput {
     /// The response without the error of the sample, before the delay of whole samples.
@@ -143,7 +143,7 @@ impl HeldLoop {
         self.delay == 0 && self.taps[0] != 0.0
     }
 
-    /// What the operator shows about the sample that is next.
+    /// Information of the operator about the sample that is next.
     #[inline]
     pub fn answer(&self, state: &OperatorState) -> OperatorOutput {
         let [e1, e2] = state.errors;

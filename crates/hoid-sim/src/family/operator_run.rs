@@ -2,8 +2,8 @@
 //!
 //! What [`FamilySimulator`] does of `u = r(k - l) + n`, with the same random numbers and the strength of remnant that
 //! the loop of the scenario gives: a loop that answers u as its controlled element does gives the same run to the last
-//! bit. What the recorder adds to e and u (`offset_e`, `offset_u`) is not the operator's. The control of a sample must
-//! not hang on the error of the same sample.
+//! bit. Contribution of the recorder to e and u (`offset_e`, `offset_u`) is not the operator's. The control of a sample
+//! must not hang on the error of the same sample.
 
 use super::{
     FamilySimulator,

@@ -45,7 +45,7 @@ impl Default for Task {
 /// A person with everything true of them.
 #[derive(Debug, Clone)]
 pub struct Person {
-    /// What they control.
+    /// The controlled element.
     pub plant: Plant,
     /// Their operator, and the controlled element.
     pub state: FamilyState,

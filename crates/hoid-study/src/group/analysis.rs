@@ -1,4 +1,4 @@
-//! What is done with the runs of a person in a condition, and with one run.
+//! Treatment of the runs of a person in a condition, and with one run.
 //!
 //! All runs of a person in a condition come first. Where nothing changes within them the family of operators is fitted
 //! to all of them at once ([`hoid_ident::family`]): the operator of the person. nk, and for Box-Jenkins nd and T_n, are
@@ -40,7 +40,7 @@ pub(super) const RECORD: &str = "record";
 /// Name of the table of people.
 pub(super) const PEOPLE: &str = "people";
 
-/// What all runs of a person in a condition state about each.
+/// Statement of all runs of a person in a condition about each.
 pub(super) struct FromCell {
     arx: Result<Orders, String>,
     box_jenkins: Result<Orders, String>,

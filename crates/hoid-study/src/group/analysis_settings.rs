@@ -1,4 +1,4 @@
-//! What is done with each run: the keys of `[analysis]`.
+//! Treatment of each run: the keys of `[analysis]`.
 
 use hoid_ident::family::FamilyEstimator;
 use hoid_model::{Form, Structure, operator_family::Coordinate};
@@ -6,7 +6,7 @@ use hoid_track::Method;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// What is done with each run.
+/// Treatment of each run.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct AnalysisSettings {
@@ -32,8 +32,8 @@ pub struct AnalysisSettings {
     /// Form of the operator of the family: auto, or the name of one.
     #[schemars(extend("enum" = serde_json::json!(form_names())))]
     pub form: String,
-    /// What is known of the operator before the data: population, none, or
-    /// NAME=CENTRE:SPREAD separated by commas.
+    /// Prior knowledge of the operator before the data: population, none, or NAME=CENTRE:SPREAD
+    /// separated by commas.
     pub prior: String,
     /// Parameters of the operator that each run has for itself, such as K; all others are common to
     /// the runs of a person in a condition.

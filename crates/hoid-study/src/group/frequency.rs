@@ -35,7 +35,7 @@ use super::{
 };
 use crate::{columns::Rows, statistics::median};
 
-/// What the describing functions show: a row a line, and a row a subject and condition.
+/// Results of the describing functions: a row a line, and a row a subject and condition.
 pub(super) struct Frequencies {
     pub lines: OutputTable,
     pub margins: OutputTable,

@@ -3,11 +3,11 @@
 //! | module | what it holds |
 //! |---|---|
 //! | [`Manifest`] | which file is which run of which subject, and what is done with it |
-//! | [`ReadSettings`], [`PreparationSettings`], [`AnalysisSettings`], [`ConditionSettings`] | its tables: how runs are read, prepared and analysed, and what is known of a condition |
+//! | [`ReadSettings`], [`PreparationSettings`], [`AnalysisSettings`], [`ConditionSettings`] | its tables: how runs are read, prepared and analysed, and the prior knowledge of a condition |
 //! | [`inspect`], [`commented`] | a manifest completed by what the files state, with the evidence |
 //! | [`Pattern`] | subject, condition and run from names of files |
 //! | [`run_group`] | the analysis in a directory, part by part |
-//! | `reading` | runs from files, and what was done to them |
+//! | `reading` | runs from files, and the processing of them |
 //! | `analysis` | what is done with the runs of a person in a condition (`block`) and with one run, in which `windows`, with which orders (`run_orders`), and the rows of it (`run_rows`) |
 //! | `family_fits`, [`Person`] | the operator of a person in a condition, and its row in the table of people |
 //! | [`RunEstimates`] | what was found in each run, read back from the tables |

@@ -19,7 +19,7 @@ enum Part {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Pattern(Vec<Part>);
 
-/// What the names in braces stand for in one file name.
+/// Values of the names in braces in one file name.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct FileNameParts {
     /// `{subject}`.

@@ -18,7 +18,7 @@ use crate::columns::Rows;
 /// Name of the run that is all of them.
 pub(super) const ALL: &str = "all";
 
-/// What became of a fit.
+/// Outcome of a fit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PersonStatus {
     /// It has a result.
@@ -46,7 +46,7 @@ pub struct Person {
     pub run: String,
     /// How many runs were fitted together.
     pub runs: usize,
-    /// What became of it.
+    /// Outcome of it.
     pub status: PersonStatus,
     /// Why there is no result; empty where there is one.
     pub reason: String,
@@ -68,11 +68,11 @@ pub struct Person {
     pub kappa: Option<f64>,
     /// Order nd of the noise model.
     pub noise_order: Option<usize>,
-    /// What the result is worth.
+    /// Verdict on the result.
     pub verdict: Option<VerdictLevel>,
-    /// What speaks against it.
+    /// Findings against it.
     pub reasons: Vec<String>,
-    /// What is worth knowing besides.
+    /// Additional notes.
     pub notes: Vec<String>,
 }
 

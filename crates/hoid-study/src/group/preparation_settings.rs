@@ -24,7 +24,7 @@ use hoid_model::Decimation;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// What is done to the runs before they are analysed. What is left out is not done, or as the group
+/// Treatment of the runs before they are analysed. What is left out is not done, or as the group
 /// reports.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
@@ -95,8 +95,8 @@ impl PreparationSettings {
         })
     }
 
-    /// What is done to the runs of a condition: what the condition states, and what the group
-    /// reports about the rest.
+    /// Treatment of the runs of a condition: what the condition states, and what the group reports
+    /// about the rest.
     ///
     /// # Errors
     /// The key that has no meaning, and why.

@@ -31,7 +31,7 @@ pub struct ReadSettings {
     pub resample: bool,
     /// Bridge missing values.
     pub fill: bool,
-    /// What is taken out of e and u: none, mean or linear.
+    /// Trend removed from e and u: none, mean or linear.
     pub detrend: Detrending,
     /// Faults of the recordings: bridge, report or keep. Where a fault is too long to be bridged the operator
     /// of a person is that of all parts without it, and of what is done with single runs the longest part
@@ -39,7 +39,7 @@ pub struct ReadSettings {
     pub faults: FaultTreatment,
 }
 
-/// What is done about faults of a recording.
+/// Treatment of faults of a recording.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum FaultTreatment {
@@ -63,7 +63,7 @@ impl FaultTreatment {
     }
 }
 
-/// What is taken out of e and u.
+/// Trend removed from e and u.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Detrending {

@@ -1,4 +1,4 @@
-//! Reading the runs of a group as the manifest states, and what was done to them.
+//! Reading the runs of a group as the manifest states, and the processing of them.
 
 use std::path::Path;
 
@@ -24,7 +24,7 @@ pub(super) enum Pairing {
     InTheLoop,
 }
 
-/// The record in a file, and what was done to it; the condition may have a preparation of its own.
+/// The record in a file, and the processing of it; the condition may have a preparation of its own.
 fn read_file(manifest: &Manifest, condition: &str, path: &Path, pairing: Pairing) -> Result<CheckedRecord, String> {
     let reading = &manifest.read;
     let text = |error: hoid_io::IoError| error.to_string();
@@ -99,7 +99,7 @@ fn read_file(manifest: &Manifest, condition: &str, path: &Path, pairing: Pairing
     })
 }
 
-/// What was read, without its faults, and which there were.
+/// A record that was read and repaired, with the faults found.
 pub(super) struct CheckedRecord {
     read: ReadRecord,
     faults: Vec<Fault>,
@@ -108,8 +108,8 @@ pub(super) struct CheckedRecord {
     recorded: Recorded,
 }
 
-/// The tables of the account: what was done to the runs, one step a row, and what is wrong with
-/// their sampling, one finding a row.
+/// The tables of the account: the processing of the runs, one step a row, and the problems of their
+/// sampling, one finding a row.
 pub(super) fn schemas() -> [(&'static str, TableSchema); 2] {
     let schema = |names: &[&str]| {
         let column = |name: &&str| ColumnSchema {
@@ -184,7 +184,7 @@ pub(super) struct Run {
 #[derive(Clone)]
 pub(super) struct Recorded {
     pub record: Record,
-    /// What was done to it.
+    /// Processing applied to it.
     pub account: Account,
 }
 
@@ -232,8 +232,8 @@ pub(super) fn run_of(files: Vec<ReadFile<'_>>) -> Result<Run, String> {
     run.ok_or_else(|| "no file is named".to_owned())
 }
 
-/// What was done to the files of a run and what is wrong with them; nothing for one that cannot be
-/// read, which its estimates show.
+/// Processing applied to the files of a run and the problems of them; nothing for one that cannot
+/// be read, which its estimates show.
 pub(super) fn account(entry: &RunEntry, files: &[ReadFile<'_>]) -> [(&'static str, OutputTable); 2] {
     let [(steps_name, steps), (trouble_name, trouble)] = schemas();
     let (mut steps, mut trouble) = (Rows::new(&steps), Rows::new(&trouble));

@@ -34,7 +34,7 @@ const FIGURES: [&str; 7] = [
     "noise",
 ];
 
-/// What single runs show: instants of the change, and the noise of each parameter.
+/// Results of single runs: instants of the change, and the noise of each parameter.
 #[derive(Debug, Clone, Default)]
 struct OfRuns {
     change_s: Vec<f64>,

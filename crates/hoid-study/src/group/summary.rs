@@ -1,4 +1,4 @@
-//! What a finished group reports: what failed, the people, and one verdict on all of it.
+//! Report of a finished group: what failed, the people, and one verdict on all of it.
 //!
 //! | finding | weight | when |
 //! |---|---|---|
@@ -38,7 +38,7 @@ pub struct RunFailure {
     pub reason: String,
 }
 
-/// What a finished group reports.
+/// Report of a finished group.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GroupSummary {
     /// Runs that count.
@@ -47,7 +47,7 @@ pub struct GroupSummary {
     pub failures: Vec<RunFailure>,
     /// The people, by their first runs in the manifest.
     pub people: Vec<Person>,
-    /// What all of it is worth.
+    /// Reliability of all of it.
     pub verdict: Verdict,
 }
 

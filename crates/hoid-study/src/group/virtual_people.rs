@@ -21,12 +21,12 @@ use super::{
 };
 use crate::{StudyError, columns::Rows};
 
-/// What is to be simulated.
+/// Scenario to be simulated.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PeopleExperiment {
     /// Number of subjects.
     pub subjects: u64,
-    /// What they control: a condition each.
+    /// The controlled element: a condition each.
     pub plants: Vec<Plant>,
     /// Form of their operators; `None` for those that people have on each element.
     pub form: Option<Form>,

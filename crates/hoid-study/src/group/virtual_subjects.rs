@@ -28,7 +28,7 @@ use crate::{
     columns::{OPERATOR, Rows},
 };
 
-/// What is to be simulated.
+/// Scenario to be simulated.
 #[derive(Debug, Clone, PartialEq)]
 pub struct VirtualExperiment {
     /// Number of subjects.
@@ -86,7 +86,7 @@ pub fn simulate_group(
         let change_s = scenario.schedule.change_s();
         let element = scenario.initial.controlled_element;
         let facts = ConditionSettings {
-            // What is controlled in the whole run.
+            // The controlled element in the whole run.
             controlled_element: change_s
                 .is_none()
                 .then(|| format!("{}/1,{},0", element.k_c, element.omega_b_rad_s)),

@@ -47,7 +47,7 @@ pub(super) fn methods() -> Vec<MethodSpec> {
     estimators().into_iter().filter_map(in_plan).collect()
 }
 
-/// What is run as `hoid identify` runs it, with its defaults and without a prior; `None` for another method.
+/// Estimator that runs as `hoid identify` runs it, with its defaults and without a prior; `None` for another method.
 pub(super) fn of_method(method: &str, changes: bool) -> Option<ResolvedRequest> {
     let estimator = match method {
         TIME_VARYING => CHANGE,

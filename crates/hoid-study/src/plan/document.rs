@@ -30,7 +30,7 @@ pub struct Plan {
     pub name: String,
     /// One line on what it is.
     pub title: String,
-    /// What it shows, or what to know of it.
+    /// Its content or notes on it.
     pub description: String,
     /// Seed of its random streams.
     pub seed: u64,

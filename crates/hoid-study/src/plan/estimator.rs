@@ -45,9 +45,9 @@ pub struct EstimatorCell {
     pub span_s: Option<(f64, f64)>,
     /// Every n-th sample is taken.
     pub decimate: usize,
-    /// What is taken out of e and u before.
+    /// Trend removed from e and u before.
     pub detrend: Detrend,
-    /// What it does.
+    /// Its behaviour.
     pub task: Task,
     /// Label of its start, empty for its own.
     pub start: String,
@@ -55,7 +55,7 @@ pub struct EstimatorCell {
     pub(crate) start_values: BTreeMap<String, f64>,
 }
 
-/// What is done with a record.
+/// Treatment of a record.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Task {
     /// The record itself is described: levels and noise level.
@@ -266,7 +266,7 @@ impl EstimatorCell {
         analysis::with_orders(asked.clone(), &noise, &self.orders(scenario))
     }
 
-    /// Checks orders, start and options against a scenario: the key and what is wrong with it.
+    /// Checks orders, start and options against a scenario: the key and the problems of it.
     pub(crate) fn check(&self, scenario: &ResolvedScenario) -> Result<(), (&'static str, String)> {
         let orders = self.orders(scenario);
         if let Some(structure) = self.structure() {

@@ -131,7 +131,7 @@ pub(crate) struct EstimatorTable {
     pub(super) name: String,
     /// Names of the scenarios that it takes. Default: all.
     pub(super) scenarios: Option<Vec<String>>,
-    /// What is done.
+    /// The action taken.
     #[schemars(extend("enum" = what_is_done()))]
     pub(super) method: String,
     /// Name of an estimator above, from whose VAF with the same nk on the same run that of this one
@@ -147,7 +147,7 @@ pub(crate) struct EstimatorTable {
     pub(super) span_s: Option<(f64, f64)>,
     /// Takes every so manieth sample of e and u, without a filter. Default 1.
     pub(super) decimate: Option<usize>,
-    /// What is taken out of e and u before. Default: none.
+    /// Trend removed from e and u before. Default: none.
     #[serde(default, deserialize_with = "choice")]
     #[schemars(with = "Option<String>", extend("enum" = names::<Detrend>(&[])))]
     pub(super) detrend: Option<Detrend>,
@@ -306,7 +306,7 @@ impl EstimatorTable {
         })
     }
 
-    /// What is run as `hoid identify` runs it, with the options of the table but its orders; `None` for another
+    /// Estimator that runs as `hoid identify` runs it, with the options of the table but its orders; `None` for another
     /// method.
     pub(super) fn asked(
         &self,
@@ -475,7 +475,7 @@ fn as_text(kind: Kind) -> &'static str {
     }
 }
 
-/// What is wrong with a value, after its key.
+/// Problems with a value, after its key.
 fn in_plan(error: &IdentError) -> String {
     match error {
         IdentError::BadOption { found, expected, .. } => format!("is {found}, expected {expected}"),
@@ -490,7 +490,7 @@ fn methods_with(key: &str) -> Vec<&'static str> {
     with.map(|spec| spec.name).collect()
 }
 
-/// What is wrong with a key that the method does not have.
+/// Problems with a key that the method does not have.
 fn misplaced(key: &str) -> String {
     match methods_with(key).as_slice() {
         [] => "is unknown; the book has the keys of an estimator on its page Monte Carlo studies".to_owned(),

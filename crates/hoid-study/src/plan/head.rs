@@ -12,7 +12,7 @@ pub(crate) struct Head {
     /// One line on what it is.
     #[serde(default)]
     pub title: String,
-    /// What it shows, or what to know of it.
+    /// Its content or notes on it.
     #[serde(default)]
     pub description: String,
     /// Seed of the random streams. Default 1.
@@ -24,7 +24,7 @@ pub(crate) struct Head {
     /// 50.
     #[serde(default = "default_block")]
     pub block: u64,
-    /// What is kept.
+    /// The stored data.
     #[serde(default)]
     pub keep: Keep,
 }

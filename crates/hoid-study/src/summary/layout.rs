@@ -1,4 +1,5 @@
-//! What both summaries share: the columns of the settings, and how much is in memory at a time.
+//! Common parts of both summaries: the columns of the settings, and how much is in memory at a
+//! time.
 
 use std::{collections::BTreeMap, path::Path};
 

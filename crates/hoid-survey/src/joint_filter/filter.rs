@@ -93,8 +93,8 @@ impl JointFilter {
         })
     }
 
-    /// Keeps the parameters within their bounds and what is known of them within reason; true where
-    /// that changed something.
+    /// Keeps the parameters within their bounds and the prior knowledge of them within reason; true
+    /// where that changed something.
     fn hold(&mut self) -> bool {
         let mut cut = false;
         let sound =

@@ -55,7 +55,7 @@ settings! {
         #[setting(bounds(Bounds::Positive), default("3.5"))]
         pub limit: Option<f64> = None,
         /// At each sample what all of a recorded run shows about it, by hypotheses run from both
-        /// ends, in place of what the past alone shows
+        /// ends, in place of the prediction from the past alone
         pub smooth: bool = false,
     }
     groups {

@@ -1,4 +1,4 @@
-//! What is supposed of a person and of their changes, in seconds, and the first hypothesis.
+//! Prior assumptions about a person and of their changes, in seconds, and the first hypothesis.
 
 use std::ops::RangeInclusive;
 
@@ -61,7 +61,7 @@ pub(super) fn delays(setup: &Setup, sample_time: SampleTime) -> RangeInclusive<u
     }
 }
 
-/// What is supposed of changes, in samples.
+/// Prior assumptions about changes, in samples.
 ///
 /// # Errors
 /// As [`physical_bounds`].

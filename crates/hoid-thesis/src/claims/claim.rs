@@ -7,7 +7,7 @@ use super::{evidence::Evidence, rules::Part};
 pub struct Claim {
     /// Its name, of which there is one.
     pub id: &'static str,
-    /// What it is about.
+    /// Subject of it.
     pub theme: Theme,
     /// The statement, quoted or put shortly.
     pub statement: &'static str,
@@ -20,7 +20,7 @@ pub struct Claim {
     pub(super) source: Source,
 }
 
-/// What a claim is about.
+/// Subject of a claim.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Theme {
     /// Batch fits of ARX models.

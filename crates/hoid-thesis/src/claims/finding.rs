@@ -1,4 +1,4 @@
-//! What the data show of a claim.
+//! Content of the data for a claim.
 
 use hoid_study::Statistics;
 
@@ -8,7 +8,7 @@ use super::{
     rules::{self, CellOutcome, CellTest, Part, Verdict},
 };
 
-/// What the data show of a claim.
+/// Content of the data for a claim.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Finding {
     /// Whether it holds.
@@ -25,14 +25,14 @@ pub struct Finding {
     pub failed: usize,
     /// Cells in all; the others are undecided.
     pub of: usize,
-    /// What was found, in words.
+    /// The findings, in words.
     pub text: String,
 }
 
 /// A number that was measured, over the cells of a part.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Measured {
-    /// What it is.
+    /// Its definition.
     pub label: String,
     /// Median over the cells that have a value.
     pub value: f64,
@@ -47,7 +47,7 @@ pub struct Measured {
 }
 
 impl Claim {
-    /// What the data show of it.
+    /// Content of the data for it.
     pub fn evaluate(&self, evidence: &Evidence<'_>) -> Finding {
         let found = match self.source {
             Source::Data(measure) => measure(evidence),

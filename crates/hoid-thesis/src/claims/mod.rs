@@ -75,7 +75,7 @@ pub fn claims() -> Vec<Claim> {
     .concat()
 }
 
-/// All claims with what the data show of them.
+/// All claims with the evidence of the data on them.
 pub fn findings(evidence: &Evidence<'_>) -> Vec<(Claim, Finding)> {
     let with_finding = |claim: Claim| {
         let finding = claim.evaluate(evidence);

@@ -46,7 +46,7 @@ pub(super) const ACCEPTABLE: f64 = 10.0;
 pub(super) const CLOSE: f64 = 5.0;
 /// The least difference that matters, points of % of the true value.
 pub(super) const MATTERS: f64 = 0.1;
-/// What remains of something that is heavily reduced.
+/// Remainder of something that is heavily reduced.
 pub(super) const QUARTER: f64 = 0.25;
 /// The least ratio of something that is much higher.
 pub(super) const MUCH: f64 = 1.5;
@@ -57,7 +57,7 @@ const MARGIN: f64 = 2.0;
 const HOLDS_FROM: f64 = 0.9;
 const IN_PART_FROM: f64 = 0.5;
 
-/// What the data show of a claim.
+/// Content of the data for a claim.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Verdict {
     /// It holds.
@@ -125,9 +125,9 @@ pub enum Bound {
 pub struct CellTest {
     /// Which cell.
     pub label: String,
-    /// What was measured.
+    /// The measurements.
     pub measured: Value,
-    /// What is claimed.
+    /// The claim.
     pub bound: Bound,
 }
 

@@ -1,4 +1,4 @@
-//! What a comparator is: it follows a record, and reports what the operator is at some times.
+//! Definition of a comparator: it follows a record, and reports what the operator is at some times.
 
 use hoid_ident::settings::Settings;
 use hoid_model::{OperatorParameters, Record, SampleTime, delayed_operator};
@@ -11,7 +11,7 @@ use crate::ThesisError;
 pub struct About {
     /// Its name in a plan.
     pub name: &'static str,
-    /// What it does.
+    /// Its behaviour.
     pub help: &'static str,
     /// Author, year, place.
     pub source: &'static str,
@@ -40,7 +40,7 @@ pub struct Task<'a> {
     pub change: Option<(f64, f64)>,
 }
 
-/// What a comparator found, one entry for each sample that was asked for.
+/// Result of a comparator, one entry for each sample that was asked for.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Followed {
     /// The response at each frequency.

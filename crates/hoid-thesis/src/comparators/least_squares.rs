@@ -1,8 +1,8 @@
 //! Least squares by normal equations, for regressions of some hundred coefficients over thousands
 //! of samples.
 //!
-//! `theta = (Phi' Phi + D)^-1 Phi' y`, by Cholesky's factor of the sum; D holds what is known of
-//! theta before the data (A. N. Tikhonov 1963; A. E. Hoerl and R. W. Kennard, *Technometrics* 12
+//! `theta = (Phi' Phi + D)^-1 Phi' y`, by Cholesky's factor of the sum; D holds the prior knowledge
+//! of theta before the data (A. N. Tikhonov 1963; A. E. Hoerl and R. W. Kennard, *Technometrics* 12
 //! (1970) 55-67). Squaring the condition of Phi is not a loss where D bounds it.
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};

@@ -114,7 +114,7 @@ impl LpvSubspace {
         self.of_states(z, &states)
     }
 
-    /// The main directions of what the past shows about the future, of unit power.
+    /// The main directions of the prediction of the future from the past, of unit power.
     fn states(&self, ahead: &DMatrix<f64>) -> Result<DMatrix<f64>, ThesisError> {
         let gram = (ahead * ahead.transpose()) / ahead.ncols() as f64;
         let eigen = gram.symmetric_eigen();
@@ -123,7 +123,7 @@ impl LpvSubspace {
         let n = self.order;
         let unsuited = |found: String| ThesisError::Unsuited {
             method: NAME,
-            quantity: "the rank of what the past shows about the future".to_owned(),
+            quantity: "the rank of the prediction of the future from the past".to_owned(),
             found,
             expected: format!("the order {n} at least: lower it, or lengthen future"),
         };

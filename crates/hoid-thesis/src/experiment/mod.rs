@@ -40,7 +40,7 @@ pub struct EvaluatedRun {
     pub condition: Condition,
     /// Run, from 1, of those of the subject and condition.
     pub run: u64,
-    /// What was found.
+    /// The findings.
     pub outcome: RunOutcome,
 }
 

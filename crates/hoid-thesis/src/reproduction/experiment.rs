@@ -24,7 +24,7 @@ const CAPTION: &str = "Three virtual subjects, mean (dark) and median (light) ov
 /// Runs of the experiment, made once.
 type Runs = Arc<OnceLock<Result<Vec<EvaluatedRun>, String>>>;
 
-/// What a panel shows.
+/// Results of a panel.
 #[derive(Debug, Clone, Copy)]
 enum Shown {
     Discrete(usize),

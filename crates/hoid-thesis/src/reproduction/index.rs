@@ -13,7 +13,7 @@ use crate::ThesisError;
 /// The page.
 #[derive(Debug, Default)]
 pub struct IndexPage {
-    /// What was done and with what, as name and value.
+    /// The processing and its inputs, as name and value.
     pub settings: Vec<(String, String)>,
     /// Remarks for the reader.
     pub notes: Vec<String>,
@@ -50,7 +50,7 @@ impl IndexPage {
         });
     }
 
-    /// Adds the claims of the text with what the data show of them.
+    /// Adds the claims of the text with the evidence of the data on them.
     pub fn add_claims(&mut self, findings: &[(Claim, Finding)]) {
         let mut theme = "";
         for (claim, finding) in findings {

@@ -34,9 +34,9 @@ pub(super) struct SharedRuns {
 pub struct Item {
     /// Its name, as `fig-5`, `C.1` or `table-2`.
     pub name: String,
-    /// What it is, one line.
+    /// Its definition, one line.
     pub title: String,
-    /// What to know to read it.
+    /// Notes for the reader.
     pub caption: String,
     /// The plan whose results it shows; none where nothing is simulated.
     pub plan: Option<&'static str>,

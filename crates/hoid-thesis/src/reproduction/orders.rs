@@ -14,7 +14,7 @@ use hoid_report::figures::{MapColours, MapGrid, MapPanel, maps};
 const DELAYS: [usize; 6] = [25, 26, 27, 28, 29, 30];
 const TRUE_DELAY: usize = 29;
 
-/// What a map shows.
+/// Results of a map.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Shown {
     Vaf,

@@ -27,7 +27,7 @@ use crate::{
     plans::TEXT_PLANS,
 };
 
-/// What is to be reproduced.
+/// Items to be reproduced.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Reproduction {
     /// Tables, figures, appendices, studies, or [`CLAIMS`]; all of them where nothing is named.
@@ -55,7 +55,7 @@ pub enum ReproductionEvent<'a> {
     Progress(Progress),
     /// A study has its results.
     Study(&'a StudyEntry),
-    /// What the user should know of a study: damaged blocks that were computed again.
+    /// Warnings about a study: damaged blocks that were computed again.
     Note(&'a str),
 }
 

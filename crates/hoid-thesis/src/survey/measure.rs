@@ -58,7 +58,7 @@ fn root_mean_square(squares: &[f64]) -> f64 {
     100.0 * (squares.iter().sum::<f64>() / squares.len() as f64).sqrt()
 }
 
-/// The errors of what was found after the samples `at`.
+/// The errors of the findings after the samples `at`.
 ///
 /// # Errors
 /// [`ThesisError::Model`] for a record that does not report what its operator was.

@@ -6,7 +6,7 @@ use hoid_study::{plan::Cell, statistics::median};
 
 use super::{measure::Errors, plan::SurveyPlan, run::MethodErrors};
 
-/// What is shown of one run: three spans of the response, and K_e, K_e_dot and omega_nm.
+/// Content shown for one run: three spans of the response, and K_e, K_e_dot and omega_nm.
 fn shown(errors: &Errors) -> [f64; 6] {
     let ([before, through, after], o) = (errors.response, errors.operator);
     [before, through, after, o[0], o[2], o[3]]

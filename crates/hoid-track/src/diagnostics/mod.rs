@@ -1,4 +1,4 @@
-//! What speaks for and against a trace, and what the estimate of one sample is worth.
+//! Findings for and against a trace, and what the estimate of one sample is worth.
 //!
 //! A trace is as good as its start and as its rows. Of the start fit all findings of
 //! [`hoid_ident::diagnostics`] count, none as more than a doubt: the recursion may leave it. A change
@@ -25,7 +25,7 @@
 //! | `negative-lead` | K_e and K_e_dot have significantly opposite signs in more than a tenth of the rows |
 //! | `idle-head` | a head in which neither e nor u moves: left out of the start span (a note), or in it (a doubt) |
 //! | `many-changes` | three changes or more, one in half a minute or oftener |
-//! | `supposed` | omega_nm, zeta_nm or tau_e of the last row are what was supposed before the record (a note) |
+//! | `supposed` | omega_nm, zeta_nm or tau_e of the last row are the prior before the record (a note) |
 //! | `last-row` | the estimate at the end is doubtful or no estimate, whatever the other rows are |
 //! | `not-followed` | what the last seconds of the record show against the last row |
 //! | `structure` | errors of before carry more information about u than the operator at the end does |
@@ -66,8 +66,8 @@ const FAULTS: f64 = 0.1;
 const BLOWN_UP: f64 = 30.0;
 
 impl Trace {
-    /// What the trace is worth, on the record that it was made of and with the search that chose
-    /// its orders, where there was one.
+    /// Verdict on the trace, on the record that it was made of and with the search that chose its
+    /// orders, where there was one.
     ///
     /// # Errors
     /// Those of the residuals of the start fit.
@@ -133,7 +133,7 @@ impl Trace {
         Ok(all)
     }
 
-    /// Parameters of the last row that are what was supposed before the first sample.
+    /// Parameters of the last row that are the prior before the first sample.
     fn supposed_finding(&self) -> Option<Finding> {
         let row = self.len().checked_sub(1)?;
         let operator = self
@@ -148,7 +148,7 @@ impl Trace {
             Finding::note(
                 "supposed",
                 format!(
-                    "{} at the end: not determined by the record, what is there is what was supposed before it, or one of \
+                    "{} at the end: not determined by the record, what is there is the prior before it, or one of \
                      several that predict u as well",
                     open.join(", ")
                 ),

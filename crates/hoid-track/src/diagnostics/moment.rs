@@ -1,4 +1,4 @@
-//! What the estimate of one sample is worth.
+//! Reliability of the estimate of one sample.
 
 use hoid_ident::diagnostics::{gain_findings, is_open, neuromuscular_finding};
 use hoid_model::{
@@ -13,8 +13,8 @@ use crate::tracker::Tracker;
 const UNSETTLED_S: f64 = 10.0;
 
 impl Tracker {
-    /// What the estimate of this moment is worth, for the operator that
-    /// [`Tracker::operator`] gives.
+    /// Reliability of the estimate of this moment, for the operator that [`Tracker::operator`]
+    /// gives.
     pub fn level(&self, operator: &Result<OperatorEstimate, NotConvertible>) -> VerdictLevel {
         if self.theta().iter().any(|v| !v.is_finite()) {
             return VerdictLevel::NotDetermined;

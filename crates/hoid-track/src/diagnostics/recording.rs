@@ -1,5 +1,5 @@
-//! What the recording itself shows about a trace: what the guard did, an idle head, and whether the
-//! last seconds are followed by the last row.
+//! Information of the recording itself about a trace: what the guard did, an idle head, and whether
+//! the last seconds are followed by the last row.
 
 use hoid_ident::diagnostics::{is_open, leads_backwards, operator_step};
 use hoid_model::{Finding, Record};
@@ -23,7 +23,7 @@ const FOR_EACH_S: f64 = 30.0;
 const UNLIKELY: f64 = 1e-4;
 
 impl Trace {
-    /// What the guard did.
+    /// Actions of the guard.
     pub(super) fn guard_findings(&self) -> Vec<Finding> {
         let mut all = Vec::new();
         let of = |is: &dyn Fn(&TrackFault) -> bool| -> Vec<TrackFault> {
@@ -96,9 +96,9 @@ impl Trace {
         })
     }
 
-    /// What the last seconds of the record show against the last row: a delay that is another now, or an estimate that
-    /// has not come back. A step of [`operator_step`] that is [`UNLIKELY`] next to its own error and that of the row;
-    /// of a delay that is a whole number of samples, beyond one and a half.
+    /// Evidence of the last seconds of the record against the last row: a delay that is another now, or an estimate
+    /// that has not come back. A step of [`operator_step`] that is [`UNLIKELY`] next to its own error and that of the
+    /// row; of a delay that is a whole number of samples, beyond one and a half.
     pub(super) fn not_followed(&self, record: &Record) -> Option<Finding> {
         let row = self.len().checked_sub(1)?;
         let operator = self.operator(row).ok()?;

@@ -22,7 +22,7 @@ const SETTLING_S: f64 = 10.0;
 const LAG_S: f64 = 3.0;
 
 impl Trace {
-    /// What the record shows against the structure.
+    /// Evidence of the record against the structure.
     pub(super) fn missed_structure(&self, record: &Record) -> Option<Finding> {
         let found = self.residual_response(record)?;
         (found.p_value < UNLIKELY).then(|| {

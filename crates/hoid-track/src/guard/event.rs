@@ -1,8 +1,8 @@
-//! What the guard found, and what it did.
+//! Events found by the guard, and what it did.
 
 use hoid_model::SampleTime;
 
-/// What was found.
+/// The findings.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum GuardKind {
     /// One to a few samples that the signal does not predict and that it comes back from.
@@ -37,7 +37,7 @@ hoid_model::named_choice!(GuardKind, "kind of fault", 9, {
     Diverged => "astray",
 });
 
-/// What was done.
+/// The actions taken.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum GuardAction {
     /// Predictions stood in for the samples; the estimate stayed.
@@ -80,10 +80,10 @@ hoid_model::named_choice!(GuardChannel, "channel", 3, {
     Both => "e, u",
 });
 
-/// A span that was not as it should be, and what was done, as told at one of its samples or after it.
+/// A span that was not as it should be, and the actions taken, as told at one of its samples or after it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GuardEvent {
-    /// What was found.
+    /// The findings.
     pub kind: GuardKind,
     /// In which signal.
     pub channel: GuardChannel,
@@ -94,14 +94,14 @@ pub struct GuardEvent {
     /// Largest distance from the prediction for outliers and steps, largest magnitude for levels, in
     /// the unit of the signal; zero where it has no size.
     pub size: f64,
-    /// What was done.
+    /// The actions taken.
     pub action: GuardAction,
 }
 
-/// A span of a run that was not as it should be, and what was done.
+/// A span of a run that was not as it should be, and the actions taken.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TrackFault {
-    /// What was found.
+    /// The findings.
     pub kind: GuardKind,
     /// In which signal.
     pub channel: GuardChannel,
@@ -111,7 +111,7 @@ pub struct TrackFault {
     pub to_s: f64,
     /// As [`GuardEvent::size`].
     pub size: f64,
-    /// What was done.
+    /// The actions taken.
     pub action: GuardAction,
 }
 

@@ -87,10 +87,10 @@ const PULSE: f64 = 6.0;
 /// A misfit or swapped channels of so long are the new usual, s.
 const GIVEN_UP_S: f64 = 120.0;
 
-/// What the guard made of a sample.
+/// Decision of the guard on a sample.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Guarded {
-    /// What the recursion reported; no innovation where the sample did not reach it as it came.
+    /// Report of the recursion; no innovation where the sample did not reach it as it came.
     pub outcome: Option<StepOutcome>,
     /// True where the sample was held back or the estimate is paused.
     pub held: bool,
@@ -306,7 +306,7 @@ impl Guard {
         });
     }
 
-    /// What was found or done at the last sample.
+    /// Findings and actions at the last sample.
     pub fn event(&self) -> Option<GuardEvent> {
         self.event
     }

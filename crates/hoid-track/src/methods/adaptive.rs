@@ -53,9 +53,9 @@ settings! {
         /// Time that is read again and again; 0 for a recursion that reads each sample once, as a microcontroller does
         #[setting(unit("s"), bounds(Bounds::NonNegative))]
         pub replay: f64 = defaults::REPLAYED_S,
-        /// What is known of the person before the first sample: population, none, NAME=CENTRE:SPREAD of
-        /// omega_nm, zeta_nm, tau_e, T_I (the spread is relative), or an earlier fit of them, a file that
-        /// hoid identify --json has printed
+        /// Prior knowledge of the person before the first sample: population, none, NAME=CENTRE:SPREAD of omega_nm,
+        /// zeta_nm, tau_e, T_I (the spread is relative), or an earlier fit of them, a file that hoid identify --json
+        /// has printed
         #[setting(default("population"))]
         pub prior: PersonPrior = PersonPrior::Population,
     }

@@ -72,7 +72,7 @@ impl Method {
         &mut *self.0
     }
 
-    /// What is known of it.
+    /// Known properties of it.
     pub fn spec(&self) -> MethodSpec {
         spec(&*self.0)
     }

@@ -258,7 +258,7 @@ pub fn traced(method: Method) -> TrackOptions {
         .unwrap()
 }
 
-/// What a measurement gives: median time in s, and the last answer.
+/// Result of a measurement: median time in s, and the last answer.
 trait Measured<T> {
     fn map_answer<U>(self, map: impl FnOnce(T) -> U) -> (f64, U);
 }

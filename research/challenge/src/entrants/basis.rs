@@ -300,14 +300,14 @@ fn inverse(matrix: &Square) -> Option<Square> {
     }))
 }
 
-/// What each gain is worth at a frequency, after the hold; the constant nothing.
+/// Value of each gain at a frequency, after the hold; the constant nothing.
 pub(super) fn worth(task: &Task, omega_rad_s: f64) -> [Complex64; GAINS] {
     let common = NOMINAL.response(omega_rad_s) * hold(omega_rad_s, task.sample_time);
     let s = Complex64::new(0.0, omega_rad_s);
     [common, common * s, common * s * s, Complex64::from(0.0)]
 }
 
-/// What gains show.
+/// Results of gains.
 pub(super) fn reported(task: &Task, theta: &Gains, covariance: &Square) -> ReportedResponse {
     let covariance: Vec<f64> = covariance.iter().flatten().copied().collect();
     let each: Vec<_> = task.lines_rad_s.iter().map(|omega| worth(task, *omega)).collect();

@@ -110,7 +110,7 @@ fn over_samples(task: &Task, options: &TrackOptions) -> Result<EntrantResult, St
     Ok(answer)
 }
 
-/// What is reported at a time; nothing while one of the responses is not there.
+/// The report at a time; nothing while one of the responses is not there.
 fn reported(responses: Option<Vec<Response>>, operator: Option<&OperatorEstimate>) -> ReportedResponse {
     let Some(responses) = responses else {
         return ReportedResponse::default();

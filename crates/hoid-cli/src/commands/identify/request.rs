@@ -4,7 +4,7 @@ use hoid::analysis::{Request, ResolvedRequest};
 
 use crate::{args::IdentifyArgs, error::CliError, output};
 
-/// What is asked for, the options checked against each other.
+/// The request, the options checked against each other.
 ///
 /// # Errors
 /// [`CliError::Usage`].

@@ -227,7 +227,7 @@ fn answer(found: &PolynomialAnswer<'_>) -> String {
     page
 }
 
-/// What was tried, coefficients, roots, tests of the residuals, settings.
+/// The candidates tried, coefficients, roots, tests of the residuals, settings.
 fn details(found: &PolynomialAnswer<'_>) -> String {
     let fit = found.fit;
     let mut page = "\n".to_owned();

@@ -20,7 +20,7 @@ const JUDGED: usize = 128;
 /// Share by which the rate may differ from `--fs`.
 const OFF: f64 = 0.05;
 
-/// What the time of a line states.
+/// Content of the time of a line.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Arrival {
     /// The next sample, after a number of missing ones that are to be bridged; `left_out` when the

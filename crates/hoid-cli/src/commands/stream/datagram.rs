@@ -32,7 +32,7 @@ const MAGIC: &[u8; 4] = b"hoid";
 const SAMPLE: usize = 40;
 const ESTIMATE: usize = 168;
 
-/// What a datagram is.
+/// Definition of a datagram.
 #[derive(Debug, PartialEq)]
 pub enum Datagram<'b> {
     Sample(SampleDatagram),

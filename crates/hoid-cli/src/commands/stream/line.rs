@@ -56,7 +56,7 @@ struct Line<'a> {
     warm_up: Option<WarmUp<'a>>,
 }
 
-/// What is known of a change: the odds at every line, the rest at the first line after one was
+/// Known properties of a change: the odds at every line, the rest at the first line after one was
 /// declared.
 #[derive(Serialize)]
 struct ChangeLine {
@@ -137,7 +137,7 @@ pub struct StreamStatus<'a> {
     pub fault: Option<String>,
     /// How the rate was lowered.
     pub decimated: Option<Decimated>,
-    /// What makes the whole stream doubtful.
+    /// Findings that make the whole stream doubtful.
     pub finding: Option<&'a Finding>,
 }
 

@@ -62,7 +62,7 @@ impl<R: BufRead> Lines<R> {
     }
 }
 
-/// What a line means.
+/// Meaning of a line.
 #[derive(Debug, Clone, PartialEq)]
 pub enum ParsedLine {
     /// Nothing: blank, a comment, a header.
@@ -82,7 +82,7 @@ pub struct StreamSample {
     pub u: f64,
     /// External signal, where there is a column f_t and it holds a number.
     pub reference: Option<f64>,
-    /// What is wrong with e or u.
+    /// Problems with e or u.
     pub fault: Option<String>,
 }
 
@@ -127,7 +127,7 @@ impl Columns {
         self.places.is_some()
     }
 
-    /// What a line means.
+    /// Meaning of a line.
     ///
     /// # Errors
     /// [`CliError::Stream`] for a header without the columns.

@@ -31,7 +31,7 @@ pub struct Session {
     sample_time: SampleTime,
     /// What lowers a high rate: error, control, target.
     decimator: Option<Decimator<3>>,
-    /// What e and u are multiplied by.
+    /// Factor of e and u.
     scale: (f64, f64),
     every: u64,
     /// Lines that count for `every`.
@@ -384,7 +384,7 @@ impl Session {
     }
 }
 
-/// What e and u are multiplied by.
+/// Factor of e and u.
 fn scale(args: &StreamArgs) -> Result<(f64, f64), CliError> {
     let mut all = reading::by_channel("--scale", &args.scale)?;
     let mut take = |name: &str| all.remove(name).map_or(1.0, |scaling| scaling.factor());

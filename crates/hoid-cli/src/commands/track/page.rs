@@ -57,7 +57,7 @@ pub fn page(tracked: &Tracked, out: Option<&str>, verbose: bool) -> Result<Strin
     Ok(page)
 }
 
-/// What was tried, the start fit, settings.
+/// The candidates tried, the start fit, settings.
 fn details(tracked: &Tracked) -> Result<String, CliError> {
     let mut page = String::new();
     if let Some(choice) = &tracked.choice {

@@ -65,7 +65,7 @@ pub fn signal(child: &Child, name: &str) {
     assert!(Command::new("kill").args([name, &id]).status().unwrap().success());
 }
 
-/// What a program that ends still reports; it ends well.
+/// Report of a program that ends still; it ends well.
 pub fn last_words(child: &mut Child, said: &mut BufReader<ChildStderr>) -> String {
     let mut words = String::new();
     said.read_to_string(&mut words).unwrap();

@@ -25,7 +25,7 @@ const SILENCE: Duration = Duration::from_secs(5);
 pub struct Tally {
     pub sent: usize,
     pub trips: Vec<Duration>,
-    /// What the stream reports about them.
+    /// Report of the stream on them.
     pub summary: Summary,
 }
 

@@ -4,7 +4,7 @@
 //! run to the next, they have one sign before and the other one behind (J. Nyblom, *JASA* 84 (1989) 223-230; B. E.
 //! Hansen, *J. Policy Modeling* 14 (1992) 517-533). For a direction v in the space of the parameters and a set A of
 //! samples (those of a record after an instant, or a whole run among others) the regressor of a change is `z = psi'v`
-//! in A and 0 elsewhere. What the constant parameters do not explain of it is
+//! in A and 0 elsewhere. Definition of the constant parameters do not explain of it
 //!
 //! `r(t) = psi(t)' w(t)`, `w = v - a` in A and `-a` elsewhere, `a = G^-1 G_A v`
 //!
@@ -55,7 +55,7 @@ use stretch::carrying;
 
 /// p-value below which a parameter counts as changed, for the delay and for all others.
 const LEVEL: f64 = 5e-4;
-/// What people's parameters vary by from run to run, where the estimator has no option for it.
+/// Variation of people's parameters from run to run, where the estimator has no option for it.
 pub(crate) const DEFAULT_RUN_TO_RUN: f64 = 0.06;
 
 impl Constancy<'_> {

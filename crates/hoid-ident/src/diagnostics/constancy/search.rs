@@ -20,13 +20,13 @@ const LEFT: f64 = 1e-3;
 /// is not determined.
 const SINGULAR: f64 = 1e-9;
 
-/// What is looked at.
+/// The data inspected.
 pub(crate) struct Constancy<'a> {
     pub blocks: &'a [ScoreBlock],
     pub directions: &'a [Direction],
     /// Innovation variance sigma^2.
     pub variance: f64,
-    /// What parameters vary by between runs, as a part of them.
+    /// Variation of parameters between runs, as a part of them.
     pub run_to_run: f64,
     pub sample_time_s: f64,
 }

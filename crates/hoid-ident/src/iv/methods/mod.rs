@@ -49,7 +49,7 @@ impl IvMethod {
         self.algorithm().name
     }
 
-    /// What it is, in a line without a full stop.
+    /// Its definition, in a line without a full stop.
     pub fn help(self) -> &'static str {
         self.algorithm().help
     }

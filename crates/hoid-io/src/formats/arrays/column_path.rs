@@ -23,7 +23,7 @@ pub(crate) struct ColumnPath {
     pub(crate) holds: Holds,
 }
 
-/// What a column holds.
+/// Contents of a column.
 #[derive(Debug, Clone)]
 pub(crate) enum Holds {
     Numbers(Numbers),
@@ -73,7 +73,7 @@ impl ColumnPath {
         matches!(&self.holds, Holds::Unread(what) if what.starts_with(OBJECT))
     }
 
-    /// What it holds, in words.
+    /// Contents of it, in words.
     pub(crate) fn what(&self) -> String {
         match &self.holds {
             Holds::Numbers(numbers) => numbers.kind().name().to_owned(),

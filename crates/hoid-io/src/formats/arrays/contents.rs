@@ -1,4 +1,4 @@
-//! What is in a file of named arrays: paths, each with a value.
+//! Contents of a file of named arrays: paths, each with a value.
 
 use super::array::Array;
 
@@ -15,7 +15,7 @@ pub(crate) const COMMENTS: &str = "hoid_comments";
 /// How the words on an object of MATLAB start.
 pub(crate) const OBJECT: &str = "an object of the class";
 
-/// What is under a path.
+/// Contents of a path.
 #[derive(Debug, Clone)]
 pub(crate) enum Value {
     Array(Array),
@@ -61,13 +61,13 @@ impl Entry {
     }
 }
 
-/// What is in a file.
+/// Contents of a file.
 #[derive(Debug)]
 pub(crate) struct Contents {
     pub(crate) entries: Vec<Entry>,
     /// The lines that hoid wrote next to the columns.
     pub(crate) comments: Vec<String>,
-    /// What to know about how it was read.
+    /// Notes on how it was read.
     pub(crate) notes: Vec<String>,
     /// How the lines of a matrix are named.
     pub(crate) indexing: Indexing,

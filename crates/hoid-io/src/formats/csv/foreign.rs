@@ -12,7 +12,7 @@ const LINES: usize = 60;
 /// Letters and signs of Latin 1 that units and names of columns have; other bytes are damage.
 const LATIN: &[u8] = b"\xb0\xb2\xb3\xb5\xc4\xc9\xd6\xdc\xdf\xe0\xe4\xe7\xe8\xe9\xea\xf1\xf6\xfc";
 
-/// Rewrites the bytes of a table, and reports what was done.
+/// Rewrites the bytes of a table, and reports the actions taken.
 pub(super) fn made_plain(bytes: &mut Vec<u8>) -> Vec<String> {
     let mut notes = Vec::new();
     if let Some(text) = utf16(bytes) {

@@ -40,7 +40,7 @@ struct Reader<'a> {
 }
 
 impl Reader<'_> {
-    /// What the crate reports: damage, or what it does not know.
+    /// Error of the crate: damage, or an unsupported feature.
     fn damaged(&self, place: &str, error: &Error) -> IoError {
         let what = error.to_string();
         let cut = if what.contains("unexpected EOF") {
@@ -62,7 +62,7 @@ impl Reader<'_> {
         }
     }
 
-    /// What is in a group, which is a structure or the whole file.
+    /// Contents of a group, which is a structure or the whole file.
     fn group(&mut self, group: &Group, path: &str, depth: usize) -> Result<(), IoError> {
         self.budget.take(VISIT, self.file)?;
         if depth > MOST_NESTED {

@@ -4,7 +4,7 @@
 //! The literal is read here because it is small, and because a general reader of Python literals
 //! recurses as deep as a hostile header states.
 
-/// What a header states.
+/// Content of a header.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Header {
     pub(super) descr: Descr,

@@ -15,7 +15,7 @@ const LONGEST_HEADER: usize = 1 << 20;
 /// The numbers start at a multiple of it.
 const ALIGNMENT: usize = 64;
 
-/// What is wrong with an array.
+/// Problems with an array.
 #[derive(Debug)]
 pub(super) enum NpyError {
     NoMagic(String),
@@ -117,7 +117,7 @@ impl Item {
     }
 }
 
-/// What is in an array: one entry, or one for each field, at the top level where there is no other
+/// Contents of an array: one entry, or one for each field, at the top level where there is no other
 /// array.
 pub(super) fn entries(
     bytes: Vec<u8>,

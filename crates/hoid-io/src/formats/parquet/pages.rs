@@ -35,7 +35,7 @@ const SET: u8 = 10;
 const MAP: u8 = 11;
 const STRUCT: u8 = 12;
 
-/// What the header of a page states.
+/// Content of the header of a page.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct PageHeader {
     unpacked: u64,

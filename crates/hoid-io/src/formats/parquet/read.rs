@@ -285,7 +285,7 @@ impl ColumnPath<'_> {
         taken.map_err(|error| ParquetError::External(Box::new(error)))
     }
 
-    /// What the crate reports, with the place.
+    /// Report of the crate, with the place.
     fn error(&self, group: usize, error: ParquetError) -> IoError {
         let file = self.file.to_owned();
         let place = format!("column {}, row group {}", shown(&self.name), group + 1);
@@ -348,7 +348,7 @@ fn clock_ns(column: &ColumnDescriptor) -> Option<i64> {
     })
 }
 
-/// What is correct and not read here.
+/// Valid content that is not supported here.
 fn refused(what: &str) -> ParquetError {
     ParquetError::NYI(what.to_owned())
 }

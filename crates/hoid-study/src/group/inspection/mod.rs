@@ -1,5 +1,5 @@
 //! A look at the files of a group before they are analysed ([`Look`]): what is found in them is in the manifest with
-//! the evidence next to it, to be looked through by a person; what was asked for is not looked for.
+//! the evidence next to it, to be looked through by a person; the request is not looked for.
 //!
 //! | file | what it holds |
 //! |---|---|
@@ -123,7 +123,7 @@ pub fn inspect(manifest: &mut Manifest, directory: &Path, known: &LookOptions) -
     Ok(evidence)
 }
 
-/// What the first run of a condition states about it.
+/// Statement of the first run of a condition about it.
 fn look_at(
     seen: &RecordSummary,
     condition: &str,

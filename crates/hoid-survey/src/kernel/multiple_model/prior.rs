@@ -1,5 +1,4 @@
-//! What is expected of an operator before the data: how often they change, by how much, and in
-//! what.
+//! Expectations about an operator before the data: how often they change, by how much, and in what.
 //!
 //! Times are in samples. Changes of the gains are given relative to
 //! `g = sqrt(K_e^2 + omega_c^2 K_e_dot^2)`, the gain of the operator's lead term at the crossover

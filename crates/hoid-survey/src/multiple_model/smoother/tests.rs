@@ -94,7 +94,7 @@ fn without_a_change_all_rows_say_nearly_the_same() {
     for row in &rows {
         for ((_, _, a), (_, _, b)) in row.rows()[..5].iter().zip(last.rows()) {
             let se = b.standard_error.unwrap();
-            // What drifts within half a run is less than what is known of it.
+            // What drifts within half a run is less than the prior knowledge of it.
             assert!((a.value - b.value).abs() < 2.0 * se, "{a:?} {b:?}");
         }
     }

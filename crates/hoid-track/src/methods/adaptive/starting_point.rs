@@ -25,7 +25,8 @@ use hoid_model::{Complex64, FittedOperator, SampleTime, operator_family::Coordin
 
 use crate::person_prior::PersonPrior;
 
-/// Spread of what is held where nothing is known: shares of omega and zeta, and s for the delay.
+/// Spread of the fixed dynamics where nothing is known: shares of omega and zeta, and s for the
+/// delay.
 const WIDE: [f64; DYNAMICS] = [0.45, 0.75, 0.15];
 /// Frequencies at which the gains of a fit are found, rad/s: the range, and how many.
 const FREQUENCIES: ([f64; 2], usize) = ([0.3, 8.0], 24);

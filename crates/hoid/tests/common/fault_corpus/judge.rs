@@ -1,4 +1,4 @@
-//! What a result is worth, against the truth.
+//! Reliability of a result, against the truth.
 //!
 //! The error of a parameter is its distance from the truth in its own standard errors; a delay that
 //! is found on the grid of samples alone has one sample for an error. A parameter that is reported as
@@ -24,7 +24,7 @@ const LASTING_S: f64 = 5.0;
 /// Findings that report faults of the recording, and of nothing else.
 const OF_FAULTS: [&str; 4] = ["faults", "held-back", "hostile-span", "restarted"];
 
-/// What is known of a case.
+/// Known properties of a case.
 #[derive(Debug, Clone)]
 pub struct CaseTruth {
     pub truth: Truth,
@@ -45,7 +45,7 @@ pub struct CaseOutcome {
     pub wrong: bool,
     /// The verdict in a word; "refused" where there is no result.
     pub level: String,
-    /// What speaks against the result, by kinds.
+    /// Findings against the result, by kinds.
     pub kinds: Vec<String>,
     /// Whether a finding that is more than a note reports faults.
     pub of_faults: bool,

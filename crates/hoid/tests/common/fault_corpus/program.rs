@@ -91,7 +91,7 @@ pub struct Outcome {
 /// Evaluates a fault in the runs of `who` in each of the ways that are asked for and fit.
 ///
 /// # Errors
-/// What the simulation or the file system reports.
+/// Report of the simulation or the file system.
 pub fn outcomes(
     program: &Path,
     seed: u64,
@@ -128,7 +128,7 @@ pub fn outcomes(
     all
 }
 
-/// The files of a case, the one with the fault last, and what is known of it.
+/// The files of a case, the one with the fault last, and the prior knowledge of it.
 fn write(base: &Base, fault: &Fault, folder: &Path, seed: u64, case: u64) -> Result<(Vec<PathBuf>, CaseTruth), String> {
     let injected = inject(fault, &base.runs[base.faulty()], &base.second, seed, case);
     let mut files = Vec::new();

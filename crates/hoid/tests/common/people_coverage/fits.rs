@@ -64,7 +64,7 @@ impl Quantity {
     }
 }
 
-/// What a fit found.
+/// Result of a fit.
 #[derive(Debug, Clone)]
 pub struct FitOutcome {
     pub form: Form,

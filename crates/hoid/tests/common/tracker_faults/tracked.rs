@@ -86,7 +86,7 @@ pub struct Reference {
     pub events: Vec<GuardEvent>,
 }
 
-/// What a fault did.
+/// Action of a fault.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Effect {
     /// Largest distance from the estimate without the fault that lasts for more than a second, from
