@@ -3,7 +3,7 @@
     python3 .github/packages.py target/package/*.crate python/dist/*      # both licence texts in each
     python3 .github/packages.py --install target/package/*.crate          # built of the packages alone, then tried
 
-A wheel or source distribution is installed into an environment of its own. Crates are unpacked and stand in for those
+A wheel or source distribution is installed into an environment of its own. Crates are unpacked and replace those
 of crates.io, which are not there yet. Needs Python's library alone; `--profile dev` builds faster.
 """
 

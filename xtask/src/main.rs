@@ -10,7 +10,7 @@
 //! | `cargo xtask lab` | that the page of `hoid lab` is what its sources build, and the page in a browser (module `lab`) |
 //! | `cargo xtask lab-page [--config FILE] [--out FILE]` | the page of `hoid lab` as one file that needs no program after it, into `target/lab-page/` |
 //! | `cargo xtask embedded [--all]` | the kernel on bare processors, with the digits of the host (module `embedded`) |
-//! | `cargo xtask ffi [--dev] [--out DIR]` | the libraries for C with header, pkg-config file, CMake package and examples, into `target/ffi/`; `--header` makes the header anew, `--check` builds the examples by them (module `ffi`) |
+//! | `cargo xtask ffi [--dev] [--out DIR]` | the libraries for C with header, pkg-config file, CMake package and examples, into `target/ffi/`; `--header` makes the header again, `--check` builds the examples by them (module `ffi`) |
 //! | `cargo xtask miri [ARGUMENT...]` | the boundary to C under Miri, arguments for its tests (module `miri`) |
 //! | `cargo xtask places [--dry or --dev]` | one run through every place in which hoid runs, as the table of the page "In your simulator" (module `places`) |
 //! | `cargo xtask bench [OPTION...]` | the tasks of the page "Speed next to others" next to the peers that are installed, or how cost grows (module `bench`) |

@@ -1,5 +1,5 @@
 //! The boundary to C under Miri, an interpreter that knows of every read and write whether the memory is there,
-//! initialised and not lent to somebody else, and of every allocation whether it was freed.
+//! initialised and not lent to someone else, and of every allocation whether it was freed.
 //!
 //! It runs the tests of `hoid-ffi` in which pointers are trusted, with few samples (`cfg(miri)`). It is a part of the
 //! nightly toolchain: where that has none, this reports it with what installs it.

@@ -8,7 +8,7 @@ use crate::{
 };
 
 const WASM: &str = "wasm32-unknown-unknown";
-/// Tells the places that what runs on other processors has just been built.
+/// Reports the places that what runs on other processors has just been built.
 pub const BUILT: &str = "HOID_PLACES_BUILT";
 
 /// Builds the C ABI for WebAssembly by this profile and the kernel for a Cortex-M4 by `release`, as its own chore does;

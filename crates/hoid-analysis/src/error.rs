@@ -26,7 +26,7 @@ pub enum AnalysisError {
     #[error(transparent)]
     OtherColumns(Box<OtherColumns>),
     /// An offset of a channel that is not there.
-    #[error("--offset: there is no channel {name:?}; the record has {known}, and e and u stand for input and output")]
+    #[error("--offset: there is no channel {name:?}; the record has {known}, and e and u represent input and output")]
     NoSuchChannel {
         /// The request.
         name: String,

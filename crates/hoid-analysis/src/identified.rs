@@ -41,7 +41,7 @@ pub struct Identified<F = FamilyFit> {
     pub(crate) written: Option<Map<String, Value>>,
 }
 
-/// How well a model tells a recording that it was not fitted to.
+/// How well a model predicts a recording that it was not fitted to.
 #[derive(Debug, Clone)]
 pub struct Validated {
     /// The recording.
@@ -177,7 +177,7 @@ impl fmt::Display for Identified {
 }
 
 impl<F> Identified<F> {
-    /// How well a model of the fit tells another recording of the person, prepared as those that were fitted.
+    /// How well a model of the fit predicts another recording of the person, prepared as those that were fitted.
     ///
     /// # Errors
     /// [`AnalysisError`] where there is none, of another rate, or too short.

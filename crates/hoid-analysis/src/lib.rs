@@ -2,7 +2,7 @@
 //!
 //! An estimator takes each sample at its word, and its error bars are those of its model. What a result is worth
 //! follows from more: what was wrong with the recording and the actions taken about it, what a second fit without
-//! suspicious samples shows, whether anybody could have held the loop. These rules are here and nowhere else; command
+//! suspicious samples shows, whether anyone could have held the loop. These rules are here and nowhere else; command
 //! line, groups and Python parse options and show results.
 //!
 //! ```text

@@ -2,7 +2,7 @@
 //! them: the command line, plans and Python bring what they have into that form, and none of them has a list of
 //! its own.
 //!
-//! An estimator declares its options next to its fields. Here stand those of the analysis around it: the recorded
+//! An estimator declares its options next to its fields. here are those of the analysis around it: the recorded
 //! excitation, the controlled element, what the verdict is about, and a prior that is in a file.
 
 use hoid_ident::{

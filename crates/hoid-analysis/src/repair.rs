@@ -35,7 +35,7 @@ impl Recordings {
             };
             let mut found = repair(&record, handling)?;
             if steps || (of == Of::System && record.sample_time().s() > SLOWEST_S) {
-                // No person's; of a furnace it is usual.
+                // No person's; of a furnace it is typical.
                 let note = |finding: Finding| Finding::note(finding.kind, finding.message);
                 found.findings = found.findings.into_iter().map(note).collect();
             }

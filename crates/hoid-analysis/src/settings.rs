@@ -6,14 +6,14 @@ use serde::{Deserialize, Serialize};
 
 use crate::reading::Reading;
 
-/// A setting and its value in words.
+/// A setting and its value as text.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Setting {
     /// Its name.
     pub name: String,
     /// The value that was used.
     pub value: String,
-    /// True where it is another than the default, so that somebody gave it.
+    /// True where it is another than the default, so that someone gave it.
     pub given: bool,
 }
 

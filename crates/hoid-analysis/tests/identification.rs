@@ -210,7 +210,7 @@ fn an_offset_is_a_phase_of_what_is_periodic() {
     let wrong = late_samples(&record, &of("y", Offset::Samples(1.0))).unwrap_err();
     assert_eq!(
         wrong.to_string(),
-        "--offset: there is no channel \"y\"; the record has e, u, and e and u stand for input and output"
+        "--offset: there is no channel \"y\"; the record has e, u, and e and u represent input and output"
     );
     let mut reading = Reading::default();
     reading.preparation.offset = of("u", Offset::Samples(1.0));

@@ -9,7 +9,7 @@ use hoid::survey::registry;
 
 use crate::args::as_text;
 
-/// The type of a value in words.
+/// The type of a value as text.
 fn kind_as_text(kind: Kind) -> String {
     match kind {
         Kind::Flag => "flag".to_owned(),

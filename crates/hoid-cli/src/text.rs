@@ -176,7 +176,7 @@ pub fn instability(fit: &Fit) -> &'static str {
     }
 }
 
-/// A number of something in words: "1 step", "2 steps".
+/// A number of something as text: "1 step", "2 steps".
 pub fn counted(n: u64, what: &str) -> String {
     match n {
         1 => format!("1 {what}"),
@@ -184,7 +184,7 @@ pub fn counted(n: u64, what: &str) -> String {
     }
 }
 
-/// How much of u the model tells, in a line.
+/// How much of u the model explains, in a line.
 pub fn fit_line(fit: &Fit, q: &GoodnessOfFit) -> String {
     if fit.model().structure().has_input() {
         format!(

@@ -446,7 +446,7 @@ fn a_loop_that_is_not_stable_is_a_doubt() {
     );
 }
 
-/// What anybody tries first: a simulation without noise gives its operator back, and reports that there is no noise.
+/// What anyone tries first: a simulation without noise gives its operator back, and reports that there is no noise.
 #[test]
 fn a_simulation_without_noise_gives_its_operator_back() {
     let directory = TempDir::new().unwrap();

@@ -222,7 +222,7 @@ fn a_reader_that_leaves_early_ends_nothing_else() {
         );
         let _ = fs::remove_dir_all(directory.path().join("h"));
     }
-    // The trace is there, whole, though nobody read the page.
+    // The trace is there, whole, though no one read the page.
     let rows = fs::read_to_string(directory.path().join("trace.csv")).unwrap();
     assert!(rows.lines().count() > 8192);
 }

@@ -457,7 +457,7 @@ fn a_warm_up_that_fails_goes_on_until_there_is_something_to_fit() {
     let (lines, said) = answers(&arguments, "0.1,0.2\n0.2,0.1\n");
     assert_eq!(lines.len(), 2);
     assert!(said.contains("The warm-up did not end: 2 of 600"), "{said}");
-    // Faults within the warm-up: a short one is bridged, a long one starts it anew.
+    // Faults within the warm-up: a short one is bridged, a long one starts it again.
     let mut input: String = (0..50).map(|k| format!("{},{}\n", wave(k).0, wave(k).1)).collect();
     input.push_str("nan,0\n0.1,0.2\n");
     let (lines, _) = answers(&arguments, &input);

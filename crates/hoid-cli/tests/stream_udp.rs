@@ -52,7 +52,7 @@ fn lost_samples_are_bridged_and_counted() {
         udp.send(&as_struct(k, f64::NAN, 0.0, 0.0));
         udp.estimate();
     }
-    // A line asks how it stands.
+    // A line requests its state.
     udp.send(b"2.00,0.1,0.2");
     let line = told(&udp);
     assert_eq!((&line["skipped"], &line["dropped"]), (&5.into(), &2.into()), "{line}");

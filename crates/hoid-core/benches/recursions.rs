@@ -206,7 +206,7 @@ fn bench(c: &mut Criterion) {
     let mut h5: Vec<[f64; 5]> = Vec::with_capacity(SAMPLES);
     let bj = FixedShape::<0, 2, 0, 1, 2>;
     group.bench_function("rpem 5", |b| b.iter(|| rpem::<_, 5, 2>(bj, scalar(), data, &mut h5)));
-    group.bench_function("rpem 5, usual error bars", |b| {
+    group.bench_function("rpem 5, default error bars", |b| {
         b.iter(|| rpem::<_, 5, 0>(bj, scalar(), data, &mut h5))
     });
     group.bench_function("rpem 5, no error bars", |b| b.iter(|| bare_rpem(data, &mut h5)));

@@ -22,7 +22,7 @@
 #[repr(align(64))]
 pub struct UdCovariance<const N: usize> {
     /// Column j holds `U_ij`, i < j, and `d_j` in the place of the 1; the rest is not used. The d
-    /// do not stand side by side, so that no compiler makes a vector of them, whose first element
+    /// do not are side by side, so that no compiler makes a vector of them, whose first element
     /// would wait for the last.
     u: [[f64; N]; N],
 }

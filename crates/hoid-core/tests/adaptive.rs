@@ -588,7 +588,7 @@ fn a_stick_that_ends_does_not_make_the_person_answer_less() {
             let [e, u] = person.sample(GAINS_OF_A_PERSON, 0.05);
             let stick = u.clamp(-end, end);
             knows.step(e, stick);
-            // No two samples alike: nothing shows that the stick stands.
+            // No two samples alike: nothing shows that the stick is stationary.
             does_not.step(e, stick * (1.0 + 1e-9 * f64::from(k % 2)));
         }
         let (of, _) = estimate(&free, 2.0);

@@ -144,7 +144,7 @@ pub(crate) unsafe fn with_tracker(
 ) -> HoidStatus {
     guarded(|| {
         check(tracker, "the tracker")?;
-        // SAFETY: not null, aligned; by the contract it is ours and nobody changes it.
+        // SAFETY: not null, aligned; by the contract it is ours and no one changes it.
         let tracker = unsafe { &*tracker };
         tracker.check()?;
         call(&tracker.session)
@@ -161,7 +161,7 @@ pub(crate) unsafe fn move_tracker(
 ) -> HoidStatus {
     guarded(|| {
         check(tracker, "the tracker")?;
-        // SAFETY: not null, aligned; by the contract it is ours and nobody else uses it.
+        // SAFETY: not null, aligned; by the contract it is ours and no other code uses it.
         let tracker = unsafe { &mut *tracker };
         tracker.check()?;
         let session = &mut tracker.session;

@@ -143,7 +143,7 @@ pub unsafe extern "C" fn hoid_tracker_change(tracker: *const HoidTracker, change
 }
 
 /// Logarithm of the odds that the person changed within the last four seconds; -inf before the first
-/// estimate. HOID_NOTHING for a method that tells no changes.
+/// estimate. HOID_NOTHING for a method that does not report changes.
 ///
 /// # Safety
 /// `tracker` was made here; `log_odds` has room for a number.
@@ -180,7 +180,7 @@ pub(crate) fn number_of(level: VerdictLevel) -> i32 {
     }
 }
 
-/// A level in words, as "trustworthy"; empty for what is none.
+/// A level as text, as "trustworthy"; empty for what is none.
 #[unsafe(no_mangle)]
 pub extern "C" fn hoid_level_name(level: i32) -> *const c_char {
     let name = match level {

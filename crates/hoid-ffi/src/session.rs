@@ -191,7 +191,7 @@ impl Session {
     /// Logarithm of the odds of a change within the last seconds.
     pub fn change_log_odds(&self) -> Result<f64, Failure> {
         let odds = self.tracker()?.change_odds();
-        odds.ok_or_else(|| Failure::nothing("the method tells no changes; adaptive and multiple-model do"))
+        odds.ok_or_else(|| Failure::nothing("the method does not report changes; adaptive and multiple-model do"))
     }
 
     /// Verdict on the estimate now.

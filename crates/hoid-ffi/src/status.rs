@@ -96,7 +96,7 @@ pub(crate) fn guarded(call: impl FnOnce() -> Result<(), Failure>) -> HoidStatus 
 pub(crate) fn panic_message(panic: &(dyn Any + Send)) -> String {
     let words = (panic.downcast_ref::<&str>().copied())
         .or_else(|| panic.downcast_ref::<String>().map(String::as_str))
-        .unwrap_or("a fault without words");
+        .unwrap_or("a fault without text");
     format!("a fault of hoid itself, please report it: {words}")
 }
 

@@ -267,7 +267,7 @@ impl Fit {
         }
     }
 
-    /// T_n and K_n of the remnant filter that the noise model stands for. A grey box has fitted
+    /// T_n and K_n of the remnant filter that the noise model represents. A grey box has fitted
     /// them as they are held over each sample, whatever `how`.
     ///
     /// # Errors

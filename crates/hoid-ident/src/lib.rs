@@ -63,7 +63,7 @@
 //! | [`faults`] | faults of recorded data, found and repaired before a fit |
 //! | [`frequency`] | describing function, coherence, remnant spectrum and margins by Fourier coefficients |
 //! | [`judgement`] | what speaks for and against a fit: [`Fit::verdict`] |
-//! | [`progress`] | how far a fit is, for whoever waits |
+//! | [`progress`] | how far a fit is, for the caller that waits |
 //! | [`linalg`] | sums of products, least squares by QR, the inverse of an information matrix |
 //!
 //! and inside, each using those before it:

@@ -7,7 +7,7 @@
 //!
 //! `s = d theta/d tau = -G^-1 psi' d`
 //!
-//! and what `d` has next to psi tells the delay: `var tau = sigma^2/(d'd - d' psi G^-1 psi' d) + Ts^2/12` (the corner
+//! and what `d` has next to psi reports the delay: `var tau = sigma^2/(d'd - d' psi G^-1 psi' d) + Ts^2/12` (the corner
 //! of the inverse of the information of theta and tau together: L. Ljung, *System Identification*, 1999, section 9.4;
 //! the second part is that nk is a whole number: W. F. Sheppard, *Proc. London Math. Soc.* 29 (1898) 353-380). It is no
 //! more than that of all delays that were searched being equally likely. The covariance of theta becomes
@@ -29,9 +29,8 @@ use crate::{
 };
 
 impl Fit {
-    /// The same fit with the delay counted as estimated over a range of `delays` values of nk. Models
-    /// that stand for no operator are left as they are: with many coefficients of B a shift of one
-    /// sample renames them.
+    /// The same fit with the delay counted as estimated over a range of `delays` values of nk. Models that do not
+    /// correspond to any operator are left as they are: with many coefficients of B a shift of one sample renames them.
     pub(crate) fn with_searched_delay(self, records: &[Record], delays: usize) -> Self {
         match self.delay_from(records, delays) {
             None => self,

@@ -119,7 +119,7 @@ pub fn delay_range<E: 'static>(
     .printed("delay in s", move |how, _| of(how).text())
 }
 
-/// A range of orders in words.
+/// A range of orders as text.
 pub fn range_words(range: &RangeInclusive<usize>) -> String {
     range.text().unwrap_or_default()
 }

@@ -85,7 +85,7 @@ pub enum IoError {
         /// The directory.
         file: String,
     },
-    /// An extension that stands for no format.
+    /// An extension that does not correspond to any format.
     #[error("{file}: {found}, which names no format of a record; expected {expected}{remedy}")]
     UnknownFormat {
         /// The file.
@@ -347,7 +347,7 @@ pub enum IoError {
     },
     /// Samples that are not there.
     #[error(
-        "{file}: samples missing after {place}, t = {after_s} s: {missing} (the next is at {next_s} s, the sample time is {sample_time_s:.6} s; gaps in all: {gaps}); interpolate over them with --resample, or use the part before or behind with --from and --to"
+        "{file}: samples missing after {place}, t = {after_s} s: {missing} (the next is at {next_s} s, the sample time is {sample_time_s:.6} s; gaps in all: {gaps}); interpolate over them with --resample, or use the part before or after with --from and --to"
     )]
     Gap {
         /// The file.
@@ -485,7 +485,7 @@ pub enum IoError {
         /// The file.
         file: String,
     },
-    /// A name that stands for several arrays.
+    /// A name that represents several arrays.
     #[error("{file}: \"{asked}\" may be any of {found}; give the whole path with --input and --output")]
     AmbiguousColumn {
         /// The file.
@@ -580,7 +580,7 @@ fn remedy_of_writing(source: &std::io::Error) -> &'static str {
     }
 }
 
-/// Names in words.
+/// Names as text.
 fn listed(names: &[String]) -> String {
     list(&names.iter().map(String::as_str).collect::<Vec<_>>())
 }

@@ -1,5 +1,5 @@
-//! Small files that are made to unpack to any size: refused in words, in bounded memory. The bombs of `cargo xtask slow
-//! bombs` are sampled.
+//! Small files that are made to unpack to any size: refused as text, in bounded memory. The bombs of
+//! `cargo xtask slow bombs` are sampled.
 //!
 //! One test, so that the peak of the process is that of the readers.
 #![allow(clippy::unwrap_used)]
@@ -23,7 +23,7 @@ use bombs::{
 use hoid_io::{read_any_scenario, read_fit, read_table, survey};
 use parquet::basic::{Compression, GzipLevel};
 
-/// Most memory of the process, kB, on systems that tell.
+/// Most memory of the process, kB, on systems that report it.
 const MOST_KB: u64 = 300_000;
 /// Of each format.
 const SAMPLE: u64 = 5;

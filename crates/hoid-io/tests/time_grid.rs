@@ -38,7 +38,7 @@ fn the_time_may_have_the_name_that_a_recorder_gives_it() {
         found.notes
     );
     assert!((read("time;e;u", 1.0).unwrap().record.time_s(39) - 0.65).abs() < 1e-3);
-    // Two times: nobody knows which.
+    // Two times: no one knows which.
     let path = directory.path().join("two.csv");
     std::fs::write(&path, "time,time_ms,e,u\n0,0,1,2\n0.01,10,1,2\n").unwrap();
     let message = read_record(&path, &ReadOptions::default()).unwrap_err().to_string();

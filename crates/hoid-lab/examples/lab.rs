@@ -1,12 +1,11 @@
 //! `cargo xtask slow lab [RUNS] [SEEDS]`: the page's plant against Rust over 10 000 runs, and
 //! simulated operators who track through the page's engine in injected time and are identified.
 //!
-//! Three operators: those of C1 and C2, and a gain with a lag before 4/s, each with a remnant of first
-//! order whose variance is a tenth of that of u. The operator sees e at each tick; the record has every
-//! tenth, which estimators take for held: their delay is half a sample shorter. Told: bias of each
-//! parameter in percent with its standard error, and the part of the intervals of 95 % that hold the
-//! truth. Besides, in how many runs the live estimate tells a lag, its form unknown, and how far from the
-//! truth.
+//! Three operators: those of C1 and C2, and a gain with a lag before 4/s, each with a remnant of first order whose
+//! variance is a tenth of that of u. The operator sees e at each tick; the record has every tenth, which estimators
+//! take for held: their delay is half a sample shorter. Reported: bias of each parameter in percent with its standard
+//! error, and the part of the intervals of 95 % that hold the truth. Besides, in how many runs the live estimate
+//! determines a lag, its form unknown, and how far from the truth.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 #[path = "../tests/common/page.rs"]
@@ -29,7 +28,7 @@ use hoid_model::{
 use hoid_sim::RunSeed;
 use serde_json::{Value, json};
 
-/// Wide enough that nobody reaches an end.
+/// Wide enough that no one reaches an end.
 const MAP: InputMap = InputMap {
     centre: 0.0,
     span: 1000.0,

@@ -116,7 +116,7 @@ impl Course {
         }
     }
 
-    /// Where the leading gain stands.
+    /// Position of the leading gain.
     pub fn realisation(&self) -> hoid_model::scenario::Realisation {
         match self {
             Self::Reference(course) => course.scenario().realisation,

@@ -136,7 +136,7 @@ impl Lab {
             Mode::Calibrate => calibrate::config(),
             Mode::Sessions => config,
         };
-        // Runs that no person made stand apart.
+        // Runs that no person made are separate.
         let out = if mode == Mode::Calibrate {
             out.join("calibration")
         } else {
@@ -221,7 +221,7 @@ impl Lab {
                 "This window looks on; the session runs in another one.".to_owned(),
             ));
         }
-        // Neither changes how the session stands.
+        // Neither changes the state of the session.
         let quiet = matches!(message, FromPage::Next {} | FromPage::Batch { .. });
         let obeyed = shared.obey(&mut state, id, message);
         drop(state);

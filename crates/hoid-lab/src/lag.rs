@@ -122,7 +122,7 @@ impl LagFits {
     pub fn lag(&mut self) -> Lag {
         while let Ok((from_s, lag)) = self.found.try_recv() {
             self.busy = false;
-            // One that started before a change is of nobody.
+            // One that started before a change is of no one.
             if from_s == self.from_s {
                 self.last = lag;
             }
@@ -231,7 +231,7 @@ mod tests {
         rest.iter().for_each(|sample| fits.take(*sample));
         assert_eq!(fits.lag(), Lag::Waiting);
         assert!(fits.busy);
-        // What is being fitted is of somebody else now.
+        // What is being fitted is of a person else now.
         fits.changed(50.0);
         assert_eq!((fits.e.len(), fits.from_s), (1000, 50.0));
         let answer = fits.found.recv().unwrap();

@@ -221,7 +221,7 @@ fn crossover(
     ))
 }
 
-/// Starts the thread of a run: it takes samples until its sender is dropped, tells each line and
+/// Starts the thread of a run: it takes samples until its sender is dropped, reports each line and
 /// appends it to `live.csv`.
 pub fn start(mut run: LiveRun, stem: &Stem, tell: impl Fn(&LiveLine) + Send + 'static) -> Sender<Samples> {
     let (sender, receiver): (Sender<Samples>, Receiver<Samples>) = channel();

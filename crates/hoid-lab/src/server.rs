@@ -1,8 +1,8 @@
 //! The server of the page: HTTP on 127.0.0.1, and the sockets of its pages.
 //!
-//! It serves one page, its data and the pages of results, and nothing to anybody else: the address holds a random
-//! token, and a request is refused unless its `Host` is the address of the server, its `Origin`, where it has one, is
-//! that too, and it is a GET of bounded length. A socket must have an origin. Nothing that a page states names a file.
+//! It serves one page, its data and the pages of results, and nothing to anyone else: the address holds a random token,
+//! and a request is refused unless its `Host` is the address of the server, its `Origin`, where it has one, is that
+//! too, and it is a GET of bounded length. A socket must have an origin. Nothing that a page states names a file.
 //!
 //! | refused | status |
 //! |---|---|

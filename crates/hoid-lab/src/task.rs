@@ -3,7 +3,7 @@
 //! The controlled element is held exactly over a tick of 1 ms (zero-order hold,
 //! [`hoid_model::held_system`]). Where it changes, its matrices are those of the continuous model at
 //! the middle of each block of ten ticks. Target and disturbance are sampled at every tick; over the
-//! first seconds of the run-in they are faded in linearly, so that nobody starts with a jump.
+//! first seconds of the run-in they are faded in linearly, so that no one starts with a jump.
 
 use std::{collections::BTreeMap, f64::consts::TAU};
 

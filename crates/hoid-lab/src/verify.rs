@@ -16,7 +16,7 @@
 //!
 //! u and e are compared bit for bit, but for the sign of zero, which text does not keep. e is recomputed from the u of
 //! the log, so that a false event and a false tick are distinguished; the tables are those that the page was given,
-//! which are compared with those made anew from the seed to rounding (sines may differ between computers in the last
+//! which are compared with those made again from the seed to rounding (sines may differ between computers in the last
 //! bit).
 
 use hoid_model::{Finding, Verdict, VerdictLevel};

@@ -72,7 +72,7 @@ pub enum FromPage {
 #[serde(tag = "type", rename_all = "kebab-case")]
 #[allow(missing_docs)]
 pub enum ToPage<'a> {
-    /// How the session stands.
+    /// State of the session.
     State(Box<State>),
     /// A run; its tables follow.
     Run {
@@ -97,7 +97,7 @@ pub enum ToPage<'a> {
     Yours {},
 }
 
-/// How a session stands.
+/// State of a session.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct State {
     /// `consent`, `runs`, `finished` or `replay`.

@@ -19,7 +19,7 @@ pub enum ModelError {
         /// The range that has a meaning.
         expected: &'static str,
     },
-    /// A name that stands for nothing.
+    /// A name that has no meaning.
     #[error(transparent)]
     UnknownName(#[from] UnknownName),
     /// A sample that is NaN or infinite.

@@ -1,9 +1,9 @@
 //! A fault of recorded data: what it is, where, how large, and the actions taken about it.
 //!
 //! A [`Fault`] is a place in one channel of a record (or in all of them) where the numbers cannot be what the channel
-//! did. How faults are found is reported where that is done; here stands what is reported about one, so that a file, a
-//! fit and a stream report it alike. [`fault_findings`] turns faults into what a [`Verdict`](crate::Verdict) is made
-//! of: a fault that was repaired is worth a note, one that is still in the data a doubt.
+//! did. How faults are found is reported where that is done; this text describes one, so that a file, a fit and a
+//! stream report it alike. [`fault_findings`] turns faults into what a [`Verdict`](crate::Verdict) is made of: a fault
+//! that was repaired is worth a note, one that is still in the data a doubt.
 
 use std::fmt;
 

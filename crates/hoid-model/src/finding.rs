@@ -1,4 +1,4 @@
-//! Findings that make a result doubtful, in words and in a form for programs.
+//! Findings that make a result doubtful, as text and in a form for programs.
 //!
 //! A [`Finding`] is one observation about a result: how a search ended, a parameter at its bound,
 //! methods that do not agree, a quantity that the data do not determine. It has a kind (a name that
@@ -11,14 +11,14 @@
 //! | [`Severity::Doubt`] | doubtful |
 //! | [`Severity::Undetermined`] | not determined |
 //!
-//! Whoever judges something new adds findings; nobody else decides what they amount to.
+//! Code that judges something new adds findings; no other code decides what they amount to.
 
 use std::fmt;
 
 /// How much a finding weighs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
 pub enum Severity {
-    /// Worth knowing; the result stands.
+    /// Worth knowing; the result remains valid.
     Note,
     /// The result may be wrong.
     Doubt,

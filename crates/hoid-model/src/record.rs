@@ -244,7 +244,7 @@ impl Record {
         };
         if (first - second).abs() > 1e-6 * first {
             return Err(refuse(
-                format!("a sample time of {second} s behind {first} s"),
+                format!("a sample time of {second} s after {first} s"),
                 "the same: read both at one rate",
             ));
         }

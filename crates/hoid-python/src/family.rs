@@ -361,7 +361,7 @@ impl PyOperatorFit {
         faults_of(py, &self.0.data)
     }
 
-    /// Writes the page about the operator into a directory; what comes out of a pickle has its records next to it.
+    /// Writes the page about the operator into a directory; what results of a pickle has its records next to it.
     #[pyo3(signature = (records, directory, *, title))]
     fn report(
         &self,

@@ -45,7 +45,7 @@ impl RunStatus {
     }
 }
 
-/// Does work that reports how far it is, and tells the waiting thread.
+/// Does work that reports how far it is, and informs the waiting thread.
 pub fn told<T>(status: &Arc<RunStatus>, work: impl FnOnce() -> T) -> T {
     let status = Arc::clone(status);
     progress::watched(move |step| status.set(step.done as u64, step.total as u64), work)
@@ -70,7 +70,7 @@ pub fn run<T: Send + 'static, E: Send + 'static + Into<Failure>>(
     let thread = std::thread::Builder::new().name("hoid".to_owned());
     thread
         .spawn(move || {
-            // After an interrupt nobody listens any more.
+            // After an interrupt no one listens any more.
             let _ = send.send(work(&shared));
         })
         .map_err(|error| bad_option(format!("the system cannot start a thread: {error}")))?;

@@ -1,4 +1,4 @@
-//! The words of Python, those of the command line, and what they stand for in the libraries.
+//! The words of Python, those of the command line, and what they represent in the libraries.
 
 use std::{collections::BTreeMap, ops::RangeInclusive};
 

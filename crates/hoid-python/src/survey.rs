@@ -1,4 +1,4 @@
-//! `pyhoid.info`: what is in a file, as `hoid info --json` tells it.
+//! `pyhoid.info`: what is in a file, as `hoid info --json` reports it.
 
 use std::path::PathBuf;
 

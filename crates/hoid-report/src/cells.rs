@@ -10,7 +10,7 @@ pub fn html(text: impl Into<String>) -> Value {
 }
 
 /// Name and unit of an operator parameter for the page; gains have units only where the record
-/// shows them, as [`hoid_model::GainUnit`] tells.
+/// shows them, as [`hoid_model::GainUnit`] reports.
 pub fn symbol(name: &str) -> (Value, &'static str) {
     let (symbol, unit) = match name {
         "K_e" => ("<i>K</i><sub>e</sub>", ""),

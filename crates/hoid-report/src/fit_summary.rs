@@ -11,7 +11,7 @@ use crate::cells;
 pub struct FitSummary {
     /// The verdict on it.
     pub verdict: Verdict,
-    /// The answer in words, as [`sentence`] makes it.
+    /// The answer as text, as [`sentence`] makes it.
     pub sentence: Option<String>,
     /// The parameters; none where the models of the page state them.
     pub parameters: Vec<ParameterRow>,
@@ -76,9 +76,8 @@ const WORDS: [(&str, &str, &str); 7] = [
     ("delay", "tau_e", " s"),
 ];
 
-/// The answer in words: "gain 6.1, lead 0.60 s, delay 0.15 s; crossover 2.9 ± 0.1 rad/s, phase margin
-/// 34 ± 3°". A parameter that is not there or not finite is left out, and so is the loop; `None`
-/// where nothing is left.
+/// The answer as text: "gain 6.1, lead 0.60 s, delay 0.15 s; crossover 2.9 ± 0.1 rad/s, phase margin 34 ± 3°". A
+/// parameter that is not there or not finite is left out, and so is the loop; `None` where nothing is left.
 pub fn sentence<'a>(
     parameters: impl IntoIterator<Item = (&'a str, f64)>,
     crossover_rad_s: Option<Estimate>,

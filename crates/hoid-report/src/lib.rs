@@ -37,7 +37,7 @@
 //!
 //! | module | what it holds |
 //! |---|---|
-//! | [`FitSummary`], [`sentence`] | the head of a page: verdict, the answer in words, parameters with errors |
+//! | [`FitSummary`], [`sentence`] | the head of a page: verdict, the answer as text, parameters with errors |
 //! | [`Report`], [`ModelSection`], [`model_figure`] | one self-contained HTML page about one or several fitted models |
 //! | [`Report::of_operator`], [`operator_figure`], [`sentence_of_operator`] | the page of the operator of a person |
 //! | [`TrackReport`], [`TraceSection`], [`BatchLine`], [`batch_fit`], [`default_batch_fits`] | one such page about recursive estimates over a record |

@@ -63,7 +63,7 @@ pub fn operator_figure(found: &Identified) -> String {
     }
 }
 
-/// The answer of an operator in words.
+/// The answer of an operator as text.
 pub fn sentence_of_operator(found: &Identified) -> Option<String> {
     let known = found.fit.operator(0).parameters.iter().filter(|p| p.determined);
     let element = found.controlled_element.as_ref();

@@ -77,7 +77,7 @@ impl PaperTable {
         }
     }
 
-    /// Writes it, whole or not at all, in the format that the extension stands for.
+    /// Writes it, whole or not at all, in the format that the extension represents.
     ///
     /// # Errors
     /// Those of [`PaperTable::check`] and of writing.
@@ -177,7 +177,7 @@ fn number(value: &Value) -> f64 {
     value.as_f64().unwrap_or(f64::NAN)
 }
 
-/// Parameters, those of the operator where they stand apart, and the loop.
+/// Parameters, those of the operator its position apart, and the loop.
 fn of_estimates(object: &Map<String, Value>) -> Vec<Column> {
     let none = Value::Null;
     let at = |object: &Map<String, Value>, key: &str| object.get(key).cloned().unwrap_or_default();

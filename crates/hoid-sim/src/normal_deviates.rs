@@ -63,7 +63,7 @@ fn edges() -> [f64; LAYERS + 1] {
     edges
 }
 
-/// Gives the number that stands for the middle of a layer, and then the largest.
+/// Gives the number that represents the middle of a layer, and then the largest.
 struct Middle(u64);
 
 impl TryRng for Middle {

@@ -16,7 +16,7 @@ pub(crate) fn part(directory: &Path, block: u64, table: &str) -> PathBuf {
     directory.join("parts").join(format!("{block:06}-{table}.parquet"))
 }
 
-/// Where the seal of a block stands.
+/// Position of the seal of a block.
 pub(crate) fn seal_path(directory: &Path, block: u64) -> PathBuf {
     directory.join("parts").join(format!("{block:06}-seal.json"))
 }

@@ -29,7 +29,7 @@ pub enum StudyError {
     },
     /// A `study.json` that is not one.
     #[error(
-        "{file}: {reason}; expected the file that hoid wrote: take another directory, or remove this one to start anew"
+        "{file}: {reason}; expected the file that hoid wrote: take another directory, or remove this one to start again"
     )]
     Manifest {
         /// The file.
@@ -51,7 +51,7 @@ pub enum StudyError {
     },
     /// Parts without checksums.
     #[error(
-        "the blocks of {directory} carry no checksums, an earlier hoid wrote them: run that shard again with --resume, which computes them anew"
+        "the blocks of {directory} carry no checksums, an earlier hoid wrote them: run that shard again with --resume, which computes them again"
     )]
     Unsealed {
         /// The directory.

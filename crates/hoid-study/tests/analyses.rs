@@ -190,7 +190,7 @@ fn a_row_is_the_analysis_of_the_run() {
         let levels = ["trustworthy", "doubtful", "not_determined"].map(|level| one(level, scenario, name));
         assert!((levels.iter().sum::<f64>() - 1.0).abs() < 1e-12, "{name}: {levels:?}");
     }
-    // Nobody who changes is reported as constant.
+    // No one who changes is reported as constant.
     assert_eq!(one("trustworthy", "change", "lead"), 0.0);
     assert!(one("bias_t_M", "change", "change").abs() < 2.0);
     assert!(one("bias_K_e2", "change", "change").abs() < 30.0);

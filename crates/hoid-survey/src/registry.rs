@@ -80,7 +80,7 @@ fn plain(text: &str) -> String {
 }
 
 /// The method of a name, with its defaults. An earlier name is in plans and in saved trackers, and is read as well; who
-/// can tell the user reports it ([`renamed`]).
+/// can determine the user reports it ([`renamed`]).
 ///
 /// # Errors
 /// [`IdentError::BadOption`] for a name that no method has.

@@ -218,7 +218,7 @@ fn a_long_rest_is_as_a_short_one_and_tracking_goes_on_behind_it() {
     }
 }
 
-/// A record with a rest: the trace reports when nothing arrived, and one without is not told of
+/// A record with a rest: the trace reports when nothing arrived, and one without is not informed of
 /// any.
 #[test]
 fn the_time_without_excitation_is_a_finding() {

@@ -93,8 +93,8 @@ fn a_restored_tracker_goes_on_with_the_same_digits() {
     }
 }
 
-/// Numbers that were changed and sealed anew, as nobody does by accident: the tracker is refused or goes on, and
-/// no place, length or bound out of them ends the process.
+/// Numbers that were changed and sealed again, as no one does by accident: the tracker is refused or goes on, and no
+/// place, length or bound out of them ends the process.
 #[test]
 fn numbers_that_were_changed_and_sealed_again_end_nothing() {
     let record = record();

@@ -9,7 +9,7 @@
 //! `L_k(t) = gamma L_k(t-1) - eps_k(t)^2/(2 sigma^2)`,  `gamma = 1 - Ts/T`,
 //!
 //! with T = 10 s: evidence of a delay from before a change fades as the change recedes. Another delay is reported once
-//! it leads by 2. Its recursion has run all the time, so that the estimate does not start anew. The weights `p_k` are
+//! it leads by 2. Its recursion has run all the time, so that the estimate does not start again. The weights `p_k` are
 //! those of `exp(L_k/3)`, for neighbouring innovations of a model that is not right state the same thing more than once
 //! (without the 3 bands of 95 % hold 82 % where the delay stays, with it 95); tau_e is reported as their mean, and its
 //! standard error as the root of their variance and of that of a delay that lies evenly between two samples, `Ts^2/12`.

@@ -1,6 +1,6 @@
 //! Which parameters of an operator the data determine.
 //!
-//! A parameter is determined where it stands more than two standard errors from zero and, where the
+//! A parameter is determined where it is more than two standard errors from zero and, where the
 //! method supposes something of it before the first sample, where the data have at least halved that
 //! variance: else what is there is the supposition.
 

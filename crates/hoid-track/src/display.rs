@@ -1,4 +1,4 @@
-//! Options in words, as results and reports print them.
+//! Options as text, as results and reports print them.
 
 use hoid_model::SampleTime;
 

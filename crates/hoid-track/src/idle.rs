@@ -1,6 +1,6 @@
 //! The idle head of a record: what was recorded before the run started.
 //!
-//! Somebody who waits for the run to start is not tracking. A fit of such samples takes a delay and
+//! A person who waits for the run to start is not tracking. A fit of such samples takes a delay and
 //! poles from nothing, and gives them small standard errors. The head is the longest run of first
 //! samples in which both e and u stay within [`SHARE`] of their later size about their first second,
 //! or within a step of their resolution; the size is the 90 % quantile of the distance from the

@@ -42,7 +42,7 @@
 //! | `stationary` | what a recursion without a guard does while nothing arrives |
 //! | `idle` | what was recorded before a run started |
 //! | `over_record`, `two_sided` | [`track()`]: a record; the two-sided estimate of a recorded run |
-//! | `trace`, `columns`, `summary`, `as_text` | [`Trace`]: the estimate at every sample, as columns and in words |
+//! | `trace`, `columns`, `summary`, `as_text` | [`Trace`]: the estimate at every sample, as columns and as text |
 //! | `judgement` | what a trace, and the estimate of a moment, is worth: [`Trace::verdict`] |
 //! | `determined` | which parameters the data determine |
 //! | `delay_bank` | a delay in whole samples, followed next to any recursion |

@@ -19,7 +19,7 @@ pub type Choose<'a> = &'a dyn Fn(&Record) -> Result<(TrackOptions, Option<Choice
 const QUARTER: usize = 4;
 /// Of a warm-up that goes on, so many times its length is kept.
 const KEPT: usize = 2;
-/// Longest run of faulty samples within a warm-up, s; after a longer one it starts anew.
+/// Longest run of faulty samples within a warm-up, s; after a longer one it starts again.
 const LONGEST_FAULT_S: f64 = 1.0;
 
 /// Where the recursion is.
@@ -83,7 +83,7 @@ impl Live {
         Ok(Self::Tracking(Box::new(tracker)))
     }
 
-    /// Takes a sample; NaN stands for what is faulty or missing. The fit of the warm-up is made
+    /// Takes a sample; NaN represents what is faulty or missing. The fit of the warm-up is made
     /// when its last sample comes, with the options that `choose` gives for it.
     pub fn update(&mut self, sample: Sample, choose: Choose<'_>) -> LiveOutcome {
         let warm_up = match self {
@@ -130,7 +130,7 @@ pub struct WarmUp {
     pub collected: usize,
     /// How many there are to be when the fit is tried.
     pub needed: usize,
-    /// Why the last start fit failed, or the collection started anew.
+    /// Why the last start fit failed, or the collection started again.
     pub trouble: Option<String>,
     /// Faulty samples at the end.
     faulty: usize,
@@ -198,7 +198,7 @@ impl WarmUp {
         }
     }
 
-    /// Takes a sample. The collection starts with a sound one, and starts anew after a long fault.
+    /// Takes a sample. The collection starts with a sound one, and starts again after a long fault.
     fn collect(&mut self, sample: Sample) {
         let sound = sample.e.is_finite() && sample.u.is_finite();
         self.faulty = if sound { 0 } else { self.faulty + 1 };
@@ -208,7 +208,7 @@ impl WarmUp {
         if self.faulty as f64 * self.sample_time.s() > LONGEST_FAULT_S {
             *self = Self::new(self.length, self.sample_time);
             self.trouble = Some(format!(
-                "more than {LONGEST_FAULT_S} s of faulty samples: the warm-up started anew"
+                "more than {LONGEST_FAULT_S} s of faulty samples: the warm-up started again"
             ));
             return;
         }

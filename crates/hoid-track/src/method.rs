@@ -37,7 +37,7 @@ pub struct About {
     /// The structures that it serves; the first is that of the method when none is named, but for
     /// Box-Jenkins where it is among them.
     pub structures: &'static [Structure],
-    /// Defaults, in words, of options that it shares with others.
+    /// Defaults, as text, of options that it shares with others.
     pub defaults: &'static [(&'static str, &'static str)],
 }
 
@@ -142,12 +142,12 @@ pub trait RecursiveMethod: Settings + Boxed + 'static {
         Ok(Vec::new())
     }
 
-    /// True for a method that fits what it keeps anew: it starts from no coefficients and waits for nothing.
+    /// True for a method that fits what it keeps again: it starts from no coefficients and waits for nothing.
     fn fits_anew(&self) -> bool {
         false
     }
 
-    /// What it remembers, in words, where that is not a memory of parameters.
+    /// What it remembers, as text, where that is not a memory of parameters.
     fn memory_as_text(&self) -> Option<String> {
         None
     }

@@ -31,7 +31,7 @@ pub struct TrackOptions {
     pub search: SearchOptions,
     /// Magnitude of e or u beyond which a sample is taken for a fault. Default 1e6.
     pub largest: f64,
-    /// Frequencies at which a trace tells gain and phase, rad/s. Default none.
+    /// Frequencies at which a trace reports gain and phase, rad/s. Default none.
     pub at_rad_s: Vec<f64>,
     /// The controlled element, for crossover and phase margin. Default none.
     pub controlled_element: Option<ContinuousTransferFunction>,
@@ -56,7 +56,7 @@ impl TrackOptions {
         }
     }
 
-    /// The usual ones of a method that starts itself and gets no information about the person.
+    /// The defaults of a method that starts itself and gets no information about the person.
     pub fn without_prior(method: Method, sample_time: SampleTime) -> Self {
         Self::default_for(method, sample_time.nk(DEFAULT_DELAY_S))
     }

@@ -11,10 +11,10 @@ use hoid_model::{FittedOperator, SampleTime};
 /// Prior knowledge of a person before the first sample.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub enum PersonPrior {
-    /// What is usual of people.
+    /// Default values for people.
     #[default]
     Population,
-    /// As little as can be: the usual values with wide errors.
+    /// As little as can be: the default values with wide errors.
     Nothing,
     /// The same as by default, but for what is named.
     Named(OperatorPrior),
@@ -43,7 +43,7 @@ impl PersonPrior {
             })
     }
 
-    /// Where the estimate starts, in words.
+    /// Where the estimate starts, as text.
     pub(crate) fn as_text(&self) -> String {
         match self {
             Self::Population => "the defaults for people".to_owned(),

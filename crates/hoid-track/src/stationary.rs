@@ -8,14 +8,14 @@
 //! *Adaptive Filtering Prediction and Control*, 1984, section 3.4; K. J. Åström and B. Wittenmark, *Adaptive Control*,
 //! 2nd ed. 1995, section 11.5, conditional updating). So they go into the filters alone:
 //!
-//! - A signal **stands** while it stays within [`SHARE`] of its usual size of the value at which the stand started. The
-//!   size is the geometric mean over blocks of a second of the largest distance from the value at the start of the
-//!   block; before ten blocks are known, a stand is of one value.
-//! - **Nothing arrives** where e and u stand for [`BOTH_S`], or one of them for [`ONE_S`]: a channel that is frozen, or
+//! - A signal is **stationary** while it stays within [`SHARE`] of its typical size of the value at which the stand
+//!   started. The size is the geometric mean over blocks of a second of the largest distance from the value at the
+//!   start of the block; before ten blocks are known, a stand is of one value.
+//! - **Nothing arrives** where e and u represent [`BOTH_S`], or one of them for [`ONE_S`]: a channel that is frozen, or
 //!   a hand that rests while no answer can be distinguished from none.
-//! - The recursion is then put back to the first sample of the stand, bit for bit (a jump to where it stands
-//!   is part of it): to the numbers that were kept before it, from which it takes the samples again. Value,
-//!   covariance and innovation variance stay as they are there, however long it lasts.
+//! - The recursion is then put back to the first sample of the stand, bit for bit (a jump to its position is part of
+//!   it): to the numbers that were kept before it, from which it takes the samples again. Value, covariance and
+//!   innovation variance stay as they are there, however long it lasts.
 //! - It goes on once both signals move and the filters have settled ([`crate::guard`]).
 //!
 //! A recursion that never stays constant has the same digits as without. Samples closer than 40 us are not watched.
@@ -28,7 +28,7 @@ use crate::{
     recursion::{Recursion, Sample, StepOutcome},
 };
 
-/// Share of the usual size within which a signal stands.
+/// Share of the typical size within which a signal is stationary.
 const SHARE: f64 = 0.02;
 /// Stands of both signals, and of one of them, from which nothing arrives, s, and least samples of one.
 pub(crate) const BOTH_S: f64 = 1.0;
@@ -284,7 +284,7 @@ impl StationaryWatch {
         }
     }
 
-    /// What stands for so long that nothing arrives, and how many samples are to be taken back.
+    /// What represents so long that nothing arrives, and how many samples are to be taken back.
     #[inline]
     fn stationary_channel(&self) -> Option<(GuardChannel, u64)> {
         let [e, u] = self.channels.map(|channel| channel.stands);

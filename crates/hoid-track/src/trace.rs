@@ -341,7 +341,7 @@ impl Trace {
         self.guarded
     }
 
-    /// Length of the idle head of the record, which the usual start span leaves out, s.
+    /// Length of the idle head of the record, which the default start span leaves out, s.
     pub fn idle_s(&self) -> f64 {
         self.idle_s
     }
@@ -495,7 +495,7 @@ fn causal_mean(values: &[f64], width: usize, rows: usize) -> Vec<f64> {
     for column in 0..width {
         let (mut sum, mut unknown) = (0.0, 0usize);
         for t in 0..n {
-            // The sum starts anew with each window, so that rounding does not pile up.
+            // The sum starts again with each window, so that rounding does not pile up.
             if t % rows == 0 {
                 let window = t.saturating_sub(rows - 1)..t;
                 let known = window.map(|s| values[s * width + column]).filter(|v| !v.is_nan());

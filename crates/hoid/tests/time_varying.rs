@@ -404,7 +404,7 @@ fn what_cannot_be_fitted_is_refused() {
     )
     .unwrap();
     assert!(matches!(error(quick(), one(&silent)), IdentError::NoExcitation { .. }));
-    // A few seconds only: whatever comes out, it is reported.
+    // A few seconds only: whatever results, it is reported.
     let brief = record.span(39.0, 44.0).unwrap();
     if let Ok(fit) = SigmoidChange::default().fit(one(&brief)) {
         assert!(fit.parameters().iter().all(|p| p.estimate.value.is_finite()));

@@ -62,7 +62,7 @@ class Recalled:
         if self._made is None:
             if self._call is None:
                 raise DataError(
-                    "a start fit of a tracker that comes out of a pickle has its numbers alone:"
+                    "a start fit of a tracker that results of a pickle has its numbers alone:"
                     " fit the record again by identify"
                 )
             made = self._call.native()

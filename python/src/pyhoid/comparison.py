@@ -142,7 +142,7 @@ def compare(
         ``"crossover"``, ``"phase_margin"``, ``"tau_e"`` (these three by default), ``"gain_db@2.5"``,
         ``"phase_deg@2.5"``, ``"rms_e"``, ``"rms_u"``, or parameters of one form.
     covariate : {"run"}
-        Takes learning over the runs out, and tells it.
+        Takes learning over the runs out, and reports it.
     adjust : {"holm", "none"}
         What is done about many tests.
     weights : {"penalised", "reml"}

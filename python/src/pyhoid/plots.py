@@ -1,6 +1,6 @@
 """Figures with matplotlib in the style of hoid's reports, on new axes or on yours.
 
-The hue tells the model or method (blue, vermillion, green, ... of Okabe and Ito); black is the
+The hue reports the model or method (blue, vermillion, green, ... of Okabe and Ito); black is the
 truth or the measurement. Bands are two standard errors wide on each side (`deviations`), error bars
 one. Every function returns the axes that it has drawn on.
 """

@@ -24,7 +24,7 @@ __all__ = ["Record"]
 
 
 def _is_frozen(array: FloatArray) -> bool:
-    """Whether nobody can write into an array: it owns its numbers or looks at such a one, and none
+    """Whether no one can write into an array: it owns its numbers or looks at such a one, and none
     of them is writeable."""
     at: Any = array
     while isinstance(at, np.ndarray):
@@ -35,7 +35,7 @@ def _is_frozen(array: FloatArray) -> bool:
 
 
 def _read_only(array: FloatArray) -> FloatArray:
-    """The array as nobody can change it: a copy, unless it is so already."""
+    """The array as no one can change it: a copy, unless it is so already."""
     if _is_frozen(array):
         return array
     own = np.array(array, dtype=np.float64, copy=True)
@@ -68,7 +68,7 @@ def _seconds(times: npt.NDArray[Any]) -> npt.NDArray[Any]:
 
 
 def _own(array: FloatArray) -> FloatArray:
-    """An array that nobody else holds, frozen as it is."""
+    """An array that no other code holds, frozen as it is."""
     array.flags.writeable = False
     return array.view()
 
@@ -77,7 +77,7 @@ class Record:
     """The signals of one run, with one value for each sample.
 
     The numbers are the record's own: arrays that others can write into are copied, so that nothing
-    changes behind its back; arrays that nobody can write into (such as those of another record) are
+    changes behind its back; arrays that no one can write into (such as those of another record) are
     not.
 
     Parameters

@@ -37,7 +37,7 @@ class Tracker(_pyhoid.Tracker):
     warm_up : float, default 20
         Seconds collected before the start fit.
     at : sequence of float
-        Frequencies in rad/s that `responses` tells.
+        Frequencies in rad/s that `responses` reports.
     controlled_element : str or (sequence of float, sequence of float), optional
         What the person controls, as in `track`: then `crossover` and `phase_margin` are reported.
     decimate : "auto", "off" or int

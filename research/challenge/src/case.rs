@@ -2,7 +2,7 @@
 
 use super::operator::{Parameter, Plant};
 
-/// The operator's form; its parameters are drawn anew in each run.
+/// The operator's form; its parameters are drawn again in each run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Form {
     /// Gain and lead: the operator of the thesis.
@@ -19,7 +19,7 @@ pub enum Form {
     StickDynamics,
 }
 
-/// The excitation; its phases are drawn anew in each run.
+/// The excitation; its phases are drawn again in each run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Forcing {
     /// A disturbance at the input of the plant: primes times 0.05 Hz up to 1.55 Hz, amplitudes as
@@ -35,7 +35,7 @@ pub enum Forcing {
 /// When the person looks and acts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Sight {
-    /// Error and control are held over each sample, as on a display that is drawn anew and a stick
+    /// Error and control are held over each sample, as on a display that is drawn again and a stick
     /// that is read.
     Held,
     /// All the time; the recorder samples.
@@ -94,7 +94,7 @@ pub enum Blemish {
     Missing,
     /// They are zero for 3 s from 60 s on.
     Silent,
-    /// Nobody acts and nothing moves for the first so many seconds.
+    /// No one acts and nothing moves for the first so many seconds.
     IdleStart(f64),
     /// From so many seconds on u is recorded with the wrong sign.
     Polarity(f64),
@@ -190,7 +190,7 @@ pub struct Case {
 
 impl Case {
     /// The case that all others are variants of: gain and lead on `1/s^2`, a disturbance, a steady
-    /// remnant of first order, 100 Hz, 90 s, nobody changes.
+    /// remnant of first order, 100 Hz, 90 s, no one changes.
     pub(super) fn baseline(theme: Theme, name: impl Into<String>, meaning: impl Into<String>) -> Self {
         Self {
             name: name.into(),

@@ -181,7 +181,7 @@ fn remnants() -> Vec<Case> {
         ..Case::baseline(
             Theme::Remnants,
             "none-long",
-            "nobody changes for 300 s after the start span",
+            "no one changes for 300 s after the start span",
         )
     });
     all.push(Case {

@@ -95,7 +95,7 @@ impl fmt::Display for Portion {
     }
 }
 
-/// Draws before a case counts as one that nobody bears.
+/// Draws before a case counts as one that no person can stabilise.
 const MOST_DRAWS: usize = 2000;
 const NUMBERS: usize = 10;
 /// Largest `|1/(1 + Y P)|`.

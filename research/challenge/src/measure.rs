@@ -1,7 +1,7 @@
 //! Reliability of an answer: the line of a contestant in a run.
 //!
 //! The response is asked for at seven lines from .5 to 6 rad/s, at +2, +4, +8, +13, +18 and +28 s after each change,
-//! once before the first, and every 10 s where nobody changes. The error is the mean of `|dH|/|H|` over the lines; who
+//! once before the first, and every 10 s without a change. The error is the mean of `|dH|/|H|` over the lines; who
 //! carries no information, or no number, has the error 1, that of saying zero. The band of a line covers when real and
 //! imaginary part lie within 1.96 standard errors, each counted by itself.
 
@@ -25,7 +25,7 @@ const LINES: usize = 7;
 const LINES_RAD_S: (f64, f64) = (0.5, 6.0);
 /// Seconds before the first change at which it is asked for.
 const BEFORE_S: f64 = 0.5;
-/// Seconds between two where nobody changes, and times of its own of the long case.
+/// Seconds between two without a change, and times of its own of the long case.
 const STEADY_S: f64 = 10.0;
 const LONG_S: [f64; 4] = [60.0, 120.0, 200.0, 300.0];
 /// Largest error that is kept: a response that runs away counts as this.
@@ -133,7 +133,7 @@ impl Posed {
     /// The run of a case.
     ///
     /// # Errors
-    /// Where nobody bears the case.
+    /// Where no one bears the case.
     pub fn new(case: &Case, of: RunOf) -> Result<Self, String> {
         let run = simulate(case, of).map_err(|e| e.to_string())?;
         let changes_s = if case.changes_at_once() {
@@ -176,7 +176,7 @@ impl Posed {
     pub fn line(&self, entrant: &dyn Entrant) -> Line {
         let mut line = self.measured(entrant.name(), entrant.follow(&self.task));
         if !self.case.changes_at_once() {
-            // While somebody changes slowly an alarm is neither false nor late.
+            // While someone changes slowly an alarm is neither false nor late.
             (line.false_alarms, line.exposed_s, line.of_remnant) = (None, 0.0, 0);
         }
         line

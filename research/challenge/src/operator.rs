@@ -7,9 +7,9 @@
 //! Trans. Human Factors in Electronics 8 (1967) 231-249), the neuromuscular system of third order
 //! (R. E. Magdaleno and D. T. McRuer, NASA CR-1757 (1971)), the dynamics of a stick.
 //!
-//! Between recorded samples stands what the record can tell: where the person sees each error held
-//! over a sample, the response from sampled e to sampled u at low frequencies is `Y(j omega)` times
-//! the hold `(1 - e^(-j omega Ts))/(j omega Ts)`; where they see it all the time, `Y(j omega)`.
+//! Between recorded samples, the record can determine: where the person sees each error held over a
+//! sample, the response from sampled e to sampled u at low frequencies is `Y(j omega)` times the
+//! hold `(1 - e^(-j omega Ts))/(j omega Ts)`; where they see it all the time, `Y(j omega)`.
 
 use hoid_model::{Complex64, ContinuousTransferFunction, ModelError, SampleTime, polynomial};
 

@@ -83,7 +83,7 @@ pub(super) fn refused(reason: String) -> ChallengeError {
 /// contestants. `each` is called after every run.
 ///
 /// # Errors
-/// [`ChallengeError`] for names that are none, files, and cases that nobody bears.
+/// [`ChallengeError`] for names that are none, files, and cases that no person can stabilise.
 pub fn challenge(options: &ChallengeOptions, each: &(dyn Fn(&str) + Sync)) -> Result<Vec<Line>, ChallengeError> {
     let cases = chosen_cases(&options.cases)?;
     let (entrants, batch) = chosen_contestants(&options.methods)?;

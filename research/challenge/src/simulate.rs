@@ -130,7 +130,7 @@ const WALK: u64 = 5;
 /// A run of a case.
 ///
 /// # Errors
-/// [`SimError`] where nobody bears the case.
+/// [`SimError`] that are not feasible for any person the case.
 pub fn simulate(case: &Case, run: RunOf) -> Result<Run, SimError> {
     let sample_time = SampleTime::new(1.0 / case.rate_hz)?;
     let mut outcome = Err(SimError::Diverged {

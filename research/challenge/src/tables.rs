@@ -20,14 +20,14 @@ pub fn tables(lines: &[Line]) -> String {
     let cases = in_order(lines.iter().map(|line| line.case.as_str()));
     text += &overview(lines, &methods, &cases);
 
-    text += "\n### Error of H\n\nMean of |dH|/|H| over the lines, from 8 s after a change on or where nobody changes; median over the runs.\n\n";
+    text += "\n### Error of H\n\nMean of |dH|/|H| over the lines, from 8 s after a change on or without a change; median over the runs.\n\n";
     by_case(&mut text, &cases, &methods, BESIDE, |case, method| {
         let of = own(lines, case, method).flat_map(|line| &line.moments);
         let settled = of.filter(|m| is_settled(&m.label)).map(|m| m.error);
         median(settled.collect()).map_or("–".to_owned(), |e| format!("{e:.2}"))
     });
 
-    text += "\n### Course of the error of H\n\nMedian over all runs in which somebody changes at once.\n\n";
+    text += "\n### Course of the error of H\n\nMedian over all runs in which someone changes at once.\n\n";
     let labels: Vec<String> = ["before".to_owned()]
         .into_iter()
         .chain(AFTER_S.map(|s| format!("+{s:.0}")))
@@ -113,7 +113,7 @@ pub fn tables(lines: &[Line]) -> String {
         row(&mut text, case, head.into_iter().chain(declaring.iter().map(cell)));
     }
 
-    text += "\n### Coverage\n\nBands of 1.96 standard errors of real and imaginary part of H that hold the truth, in percent; from 8 s after a change on or where nobody changes.\n\n";
+    text += "\n### Coverage\n\nBands of 1.96 standard errors of real and imaginary part of H that hold the truth, in percent; from 8 s after a change on or without a change.\n\n";
     by_case(&mut text, &cases, &methods, BESIDE, |case, method| {
         let of = own(lines, case, method)
             .flat_map(|line| &line.moments)
@@ -122,7 +122,7 @@ pub fn tables(lines: &[Line]) -> String {
         share(inside, all)
     });
 
-    text += "\n### Parameters\n\nMedian relative error in percent and coverage, in runs whose operator is that of the thesis; from 8 s after a change on or where nobody changes.\n\n";
+    text += "\n### Parameters\n\nMedian relative error in percent and coverage, in runs whose operator is that of the thesis; from 8 s after a change on or without a change.\n\n";
     let names = ["K_e", "K_e_dot", "omega_nm", "zeta_nm", "tau_e"];
     head(&mut text, "method", &names);
     let named = |m: &&&str| {
@@ -163,7 +163,7 @@ pub fn tables(lines: &[Line]) -> String {
 
 /// Each contestant in a row.
 fn overview(lines: &[Line], methods: &[&str], cases: &[&str]) -> String {
-    let mut text = "\n### In a row each\n\nError of H from 8 s after a change on or where nobody changes: median and largest of the cases. Coverage of its bands in percent. Alarms an hour in runs without a change, those of the remnant alone after the plus sign. Changes found of those that the oracle finds with certainty, within 5 and 8 s.\n\n".to_owned();
+    let mut text = "\n### In a row each\n\nError of H from 8 s after a change on or without a change: median and largest of the cases. Coverage of its bands in percent. Alarms an hour in runs without a change, those of the remnant alone after the plus sign. Changes found of those that the oracle finds with certainty, within 5 and 8 s.\n\n".to_owned();
     head(
         &mut text,
         "method",
@@ -276,7 +276,7 @@ fn commonest<'a>(lines: impl Iterator<Item = &'a Line> + Clone) -> String {
     }
 }
 
-/// True from 8 s after a change on, and where nobody changes.
+/// True from 8 s after a change on, and without a change.
 fn is_settled(label: &str) -> bool {
     !matches!(label, "+2" | "+4" | "before")
 }

@@ -225,7 +225,7 @@ fn alarms(run: &Run, from: f64, to: f64) -> usize {
     count
 }
 
-/// Report of the guard, by kind, and in how many recordings it told anything.
+/// Report of the guard, by kind, and in how many recordings it reported anything.
 fn told(all: &[Run]) -> String {
     let mut kinds = BTreeMap::<&str, usize>::new();
     for (kind, count) in all.iter().flat_map(|r| &r.faults) {

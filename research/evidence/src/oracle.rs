@@ -1,5 +1,5 @@
-//! What somebody could know at most: the likelihood ratio of the person after a change against the person
-//! before it, where both are known.
+//! What someone could know at most: the likelihood ratio of the person after a change against the person before it,
+//! where both are known.
 //!
 //! The gains s of each are those of all trials of that element (but the one that is looked at), in the basis of the
 //! default person; after the whitening filter of the first trial's remnant, with its variance,

@@ -27,7 +27,7 @@ const WORK: &str = "target/bench";
 /// Runs it.
 ///
 /// # Errors
-/// What cannot be run or written, in words.
+/// What cannot be run or written, as text.
 pub fn bench(arguments: &[String]) -> Result<(), String> {
     let options = Options::read(arguments)?;
     if options.instructions {

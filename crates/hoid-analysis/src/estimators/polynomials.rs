@@ -145,7 +145,7 @@ impl BatchEstimator for Polynomials {
     }
 
     fn structure(&self) -> Setting {
-        // The default is not a polynomial structure: whoever has one asked for it.
+        // The default is not a polynomial structure: the caller that has one asked for it.
         Setting::new("structure", self.template.structure.name()).given(true)
     }
 

@@ -204,7 +204,7 @@ pub fn ljung_box(test: Option<&LjungBox>) -> Value {
     })
 }
 
-/// How well a model tells the records that it was fitted to, or others.
+/// How well a model predicts the records that it was fitted to, or others.
 pub fn goodness(q: &GoodnessOfFit) -> Map<String, Value> {
     let rows = [
         ("vaf_simulation", q.vaf_simulation),
@@ -259,7 +259,7 @@ pub fn records(files: &[String], records: &[Record], accounts: &[Account]) -> Va
     files.iter().zip(records).zip(accounts).map(record).collect()
 }
 
-/// Problems with the sampling, in words.
+/// Problems with the sampling, as text.
 pub fn warnings(files: &[String], accounts: &[Account]) -> Value {
     let all = files.iter().zip(accounts);
     all.flat_map(|(file, account)| {

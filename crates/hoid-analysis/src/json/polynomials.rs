@@ -83,7 +83,7 @@ pub struct PolynomialAnswer<'a> {
     pub quality: GoodnessOfFit,
     /// Its parameters as an operator with a gain and a lead.
     pub operator: Result<OperatorEstimate, NotConvertible>,
-    /// Of polynomials of other orders: the operator of the family that they stand for.
+    /// Of polynomials of other orders: the operator of the family that they represent.
     pub family: Option<Result<FamilyConversion, NotConvertible>>,
     /// Its noise model as a remnant filter.
     pub remnant: Option<Result<RemnantEstimate, NotConvertible>>,
@@ -93,7 +93,7 @@ pub struct PolynomialAnswer<'a> {
     pub validations: Vec<Validation>,
     /// Horizon, VAF and NRMSE of the prediction that far ahead.
     pub ahead: Option<(usize, f64, f64)>,
-    /// How well it tells another file.
+    /// How well it predicts another file.
     pub validation: Option<(&'a str, GoodnessOfFit)>,
 }
 
@@ -289,8 +289,8 @@ fn remnant(found: &Result<RemnantEstimate, NotConvertible>) -> Value {
     }
 }
 
-/// The operator of the family that polynomials stand for: form, parameters by name, what the real poles are,
-/// how well it is met.
+/// The operator of the family that polynomials represent: form, parameters by name, what the real poles are, how well
+/// it is met.
 pub fn of_family(found: &Result<FamilyConversion, NotConvertible>) -> Value {
     let found = match found {
         Ok(found) => found,

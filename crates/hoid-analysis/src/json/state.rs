@@ -3,8 +3,8 @@
 //! The numbers of the contract are for people and other programs; a model has more (covariances of what is not printed,
 //! states, what was held). All of it is written as TOML, which has what JSON lacks, infinite numbers and NaN, and is in
 //! JSON as one text; floats are written with as many digits as give back every bit. The first eight bytes of its
-//! SHA-256 are before it: a file that was cut or changed by hand is refused. They guard against damage, not against
-//! somebody who means to deceive.
+//! SHA-256 are before it: a file that was cut or changed by hand is refused. They guard against damage, not against a
+//! person who means to deceive.
 
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use sha2::{Digest, Sha256};

@@ -1,4 +1,4 @@
-//! How a file is to be read, and the command to type: in words, since nothing is chosen silently.
+//! How a file is to be read, and the command to type: as text, since nothing is chosen silently.
 
 use hoid_ident::frequency::COMMON_EXCITATIONS;
 use hoid_io::{TimeChoice, TrialChoice};
@@ -37,7 +37,7 @@ impl Look {
         if !self.roles.are_certain() {
             return None;
         }
-        // Both where one is not the usual: a command is easier to read with both.
+        // Both where one is not the default: a command is easier to read with both.
         let (input, output) = (&self.roles.input, &self.roles.output);
         let default = input.column == "e" && output.column == "u";
         let named = |role: &Role| (!default).then(|| role.column.clone());

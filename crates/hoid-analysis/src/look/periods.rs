@@ -33,12 +33,12 @@ pub struct Periods {
     pub span_s: (f64, f64),
     /// Its lines.
     pub excitation: Excitation,
-    /// All of this in words.
+    /// All of this as text.
     pub words: String,
 }
 
-/// The excitation in the channel that was named, else in the first of the usual ones that has lines,
-/// else in any other.
+/// The excitation in the channel that was named, else in the first of the common ones that has
+/// lines, else in any other.
 pub(super) fn search(record: &Record, known: &LookOptions) -> Result<Periods, String> {
     let channels: Vec<&str> = record.channels().map(|channel| channel.name.as_str()).collect();
     let candidates: Vec<&str> = match known.excitation.as_deref() {

@@ -56,7 +56,7 @@ pub struct GroupInitArgs {
     /// Directory with one file a run
     #[arg(value_name = "DIR")]
     pub directory: PathBuf,
-    /// Names of the files: {subject}, {condition} and {run} stand for what is taken from them, *
+    /// Names of the files: {subject}, {condition} and {run} represent what is taken from them, *
     /// for anything
     #[arg(long, value_name = "PATTERN", default_value = "{subject}_{condition}_{run}.csv")]
     pub pattern: String,

@@ -53,7 +53,7 @@ pub struct SimulateArgs {
     /// Sample time Ts in s [default: 0.01, or the scenario's]
     #[arg(long, value_name = "S")]
     pub sample_time: Option<f64>,
-    /// Where K_c stands when it changes: in the input matrix (x stays continuous) or in the output
+    /// Position of K_c when it changes: in the input matrix (x stays continuous) or in the output
     /// matrix (as in the thesis) [default: input, or the scenario's]
     #[arg(long, value_name = "WHERE", value_parser = choice_of(&Realisation::ALL))]
     pub realisation: Option<Realisation>,

@@ -43,10 +43,10 @@ impl FromStr for UdpPlaces {
         };
         if output.port() == 0 {
             return Err(format!(
-                "{text:?}: nobody listens on port 0; name the port of the answers"
+                "{text:?}: no one listens on port 0; name the port of the answers"
             ));
         }
-        // Whoever listens on 0.0.0.0 listens on every address of this computer, and 0.0.0.0 leads there too.
+        // Code that listens on 0.0.0.0 listens on every address of this computer, and 0.0.0.0 leads there too.
         let is_here = |ip: IpAddr| ip.is_loopback() || ip.is_unspecified();
         let heard = input.ip() == output.ip()
             || (input.ip().is_unspecified() || output.ip().is_unspecified())

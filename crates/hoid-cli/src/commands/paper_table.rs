@@ -9,7 +9,7 @@ use crate::{args::ShowArgs, error::CliError, output};
 /// Whether it can be written: known before anything is read.
 ///
 /// # Errors
-/// [`CliError::Usage`] for a name that stands for no format.
+/// [`CliError::Usage`] for a name that does not correspond to any format.
 pub fn check(show: &ShowArgs) -> Result<(), CliError> {
     let Some(path) = &show.table else { return Ok(()) };
     PaperTable::check(path).map_err(|_| {

@@ -22,7 +22,7 @@ pub fn of(args: &ReadArgs, mask: Option<&MaskArgs>, with_input: bool) -> Result<
     })
 }
 
-/// Tells what was left out of a file and the problems of it.
+/// Reports what was left out of a file and the problems of it.
 pub fn told(path: &Path, read: &ReadRecord) {
     let file = path.display().to_string();
     for note in &read.notes {
@@ -33,7 +33,7 @@ pub fn told(path: &Path, read: &ReadRecord) {
     }
 }
 
-/// Tells that a high rate was kept, where it was.
+/// Reports that a high rate was kept, where it was.
 pub fn say_kept(words: Option<String>) {
     if let Some(words) = words {
         output::notice("", words);

@@ -90,7 +90,7 @@ pub struct Regressors {
 pub struct Basis {
     point: Point,
     sample_time: f64,
-    /// Columns of Phi, and T_0 to T_2, each with a zero behind, so that they are as long as the signals.
+    /// Columns of Phi, and T_0 to T_2, each followed by a zero, so that they are as long as the signals.
     columns: [Paired; N],
     taps: [Paired; 3],
     monic: [f64; N],

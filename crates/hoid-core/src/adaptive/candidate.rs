@@ -9,8 +9,8 @@
 //! Royal Statistical Society* A 147 (1984) 278-292): by it candidates of the same data are compared. Each block was
 //! predicted from what was before it only, so that more parameters are not advantage. The density is that of Student
 //! with the variance of the last seconds and as many degrees of freedom as the block has samples, so that a change,
-//! which nobody predicts, decides nothing; and old evidence is forgotten, so that it is about what has been learnt and
-//! not about how fast.
+//! which no hypothesis predicts, decides nothing; and old evidence is forgotten, so that it is about what has been
+//! learnt and not about how fast.
 
 use super::{
     basis::{Basis, Complex, Point, Regressors},

@@ -1,4 +1,4 @@
-//! What is usual of people, in seconds: where the recursion starts for a person of whom nothing is known.
+//! Default values for people, in seconds: where the recursion starts for a person of whom nothing is known.
 //!
 //! The default person (lag 3 s, neuromuscular system of 11 rad/s and .25, their form `(T_L s + 1)^2/(T_I s + 1)`) is
 //! what recorded people have been found to be. All other numbers were set on simulated people: those whose operator has
@@ -73,9 +73,9 @@ const EARLIEST_S: f64 = 0.03;
 const NOW_S: [f64; 2] = [4.0, 8.0];
 const BEFORE_S: [f64; 2] = [15.0, 40.0];
 const REFRACTORY_S: f64 = 8.0;
-/// What must stand against chance at one false alarm an hour, nats, and by how much it falls with each logarithm
-/// of the rate. By chance alone 7200 blocks an hour pass 8.9 nats once; people vary more. In 3.8 hours of three
-/// pilots without a change 12.5 and 11.0 nats were passed 2.6 and 3.9 times an hour.
+/// What must have as log significance at one false alarm an hour, nats, and by how much it falls with each logarithm of
+/// the rate. By chance alone 7200 blocks an hour pass 8.9 nats once; people vary more. In 3.8 hours of three pilots
+/// without a change 12.5 and 11.0 nats were passed 2.6 and 3.9 times an hour.
 const THRESHOLD: f64 = 12.5;
 const SLOPE: f64 = 2.2;
 /// Standard deviation of a change of the delay, s.
@@ -97,8 +97,8 @@ pub struct DefaultOperator {
 }
 
 impl DefaultOperator {
-    /// Somebody with this delay, s, for an error that is straight between samples: one that is held comes
-    /// half a sample later.
+    /// Someone with this delay, s, for an error that is straight between samples: one that is held comes half a sample
+    /// later.
     pub fn with_delay(tau: f64) -> Self {
         Self {
             point: Point {

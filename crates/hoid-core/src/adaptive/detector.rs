@@ -6,9 +6,9 @@
 //!
 //! `T = d' C^-1 d`
 //!
-//! is a chi-square with `nu = 6` degrees of freedom where nothing changes. It is looked at over a short and over a
-//! long present: small changes need more data than large ones. A second between present and past is left out:
-//! nobody changes at the end of a block.
+//! is a chi-square with `nu = 6` degrees of freedom where nothing changes. It is looked at over a short and over a long
+//! present: small changes need more data than large ones. A second between present and past is left out: no one changes
+//! at the end of a block.
 //!
 //! Some people vary more than others, so T is divided by the root of the level c at which it has been so far, from the
 //! mean of log T, whose expectation for a chi-square is `ln 2 + psi(nu/2)`; c is at least one, and what is supposed of
@@ -52,7 +52,7 @@ const LEAST_AFTER_GAP: usize = 4;
 const PRIOR_BLOCKS: f64 = 60.0;
 /// Blocks that the level is a mean of at most.
 const LEVEL_MEMORY: f64 = 240.0;
-/// By so much a logarithm raises the level at most: a change is not a usual variation.
+/// By so much a logarithm raises the level at most: a change is not a typical variation.
 const LARGEST_LOG_STEP: f64 = 3.0;
 
 /// What the detector looks at.

@@ -1,9 +1,9 @@
 //! What changed: the difference of now from before, with its full covariance.
 //!
-//! Gains, level and what is held differ by d with the covariance C (`contrast`). Of that difference, `W = C^-1`, nobody
-//! asks for all at once: a delay that grows looks like gains that turn, and seconds hardly distinguish them. So each
-//! group (the gains; natural frequency and damping; the delay) is supposed to have changed or not, the level always;
-//! what is in the set S is then
+//! Gains, level and what is held differ by d with the covariance C (`contrast`). Of that difference, `W = C^-1`, not
+//! all components are of interest at once: a delay that grows looks like gains that turn, and seconds hardly
+//! distinguish them. So each group (the gains; natural frequency and damping; the delay) is supposed to have changed or
+//! not, the level always; what is in the set S is then
 //!
 //! `d_S = (W_SS)^-1 (W d)_S`, with the covariance `(W_SS)^-1`,
 //!

@@ -1,7 +1,7 @@
 //! The last blocks of a candidate, after one noise model and in one basis: what the detector compares.
 //!
 //! Where samples are not taken for longer than a quarter of a second, or nothing moves, what is next to that gap is not
-//! kept: the samples before it may have been part of the same fault, and after it the filters swing in.
+//! kept: the samples before it may have been part of the same fault, and after it the filters settle.
 
 use super::blocks::{Block, EMPTY, Row};
 

@@ -30,7 +30,7 @@ const PRIOR_DEVIATION: f64 = 10.0;
 /// Least of that weight, where nothing is left.
 const LEAST: f64 = 1e-300;
 
-/// Share of the sums from which on they are scaled anew.
+/// Share of the sums from which on they are scaled again.
 const RESCALE_BELOW: f64 = 0.5;
 
 /// The sums and D.

@@ -186,7 +186,7 @@ impl ChannelGuard {
         self.resting = difference;
     }
 
-    /// The last sample, or what stands for it.
+    /// The last sample, or what represents it.
     pub fn last(&self) -> f64 {
         self.last
     }
@@ -284,7 +284,7 @@ impl ChannelGuard {
         }
     }
 
-    /// The end of a block: averages the tails and chooses the order of the prediction anew.
+    /// The end of a block: averages the tails and chooses the order of the prediction again.
     pub fn end_block(&mut self) {
         self.average_tails();
         self.choose();
@@ -308,7 +308,7 @@ impl ChannelGuard {
         self.size
     }
 
-    /// Holds back a sample, or a missing one (NaN); returns what stands for it.
+    /// Holds back a sample, or a missing one (NaN); returns what represents it.
     pub fn hold(&mut self, x: f64) -> f64 {
         if self.held == 0 {
             (self.size, self.base) = (0.0, self.last);

@@ -8,7 +8,7 @@
 //!
 //! | what | rule | why |
 //! |---|---|---|
-//! | frozen e | `a_e1 <= A_e1/1000` in a block | the error of somebody who tracks never stays constant |
+//! | frozen e | `a_e1 <= A_e1/1000` in a block | the error of a person who tracks never stays constant |
 //! | frozen u | `a_u1 <= A_u1/1000` in three blocks in a row, but for a rest ([`super::resting`]) in which `a_eps` is at most twice its long-run value | a hand may rest |
 //! | idle | e and u each within a range of `M_c/20` in two blocks in a row | silence, with noise |
 //! | larger | `a_c1 > 5 A_c1` and `a_c3 > 5 A_c3` for e and u in two blocks in a row | both signals are what they were, times a factor |
@@ -167,7 +167,7 @@ pub enum Trouble {
 }
 
 impl Trouble {
-    /// True for what may have become typical; nobody tracks in silence.
+    /// True for what may have become typical; no one tracks in silence.
     pub fn may_be_the_new_level(self) -> bool {
         !matches!(self, Self::FrozenInput | Self::FrozenOutput | Self::Idle)
     }
@@ -355,7 +355,7 @@ impl Profile {
         self.swapped = (self.swapped + evidence).clamp(0.0, 2.0 * SWAPPED);
         let limit = (MISFIT * self.ratio).max(LEAST_RATIO);
         let misfit = self.ratios >= LEARNT && block.ratio().is_some_and(|ratio| ratio > limit);
-        // Of somebody who rests the past predicts all, and the model need not be wrong.
+        // Of a person who rests the past predicts all, and the model need not be wrong.
         let as_foretold = self.ratios < LEARNT || block.innovation <= LEAST_GROWTH * self.innovation;
         let misfit = misfit && !as_foretold;
         self.misfits = count(self.misfits, misfit);
@@ -481,7 +481,7 @@ mod tests {
         }
     }
 
-    /// The stick is where it rests and e goes on; not so where the person does what nobody predicted, or e stands too.
+    /// The stick is where it rests and e goes on; not so where the person does an unpredicted sample, or e stands too.
     #[test]
     fn a_rest_is_not_frozen_but_a_rest_that_does_not_fit_is() {
         let still = block([0.02, 0.0], [0.1, 1.1]);

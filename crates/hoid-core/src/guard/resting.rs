@@ -1,9 +1,9 @@
 //! A stick that rests, and a channel that is frozen: both stay constant, and only one of them is a fault.
 //!
-//! A stick with a dead zone rests at its centre, and one that is pushed to its end rests there. Such
-//! values are atoms of the distribution of u: u comes back to them often, and stays. The last
-//! [`ATOMS`] values at which u stood for `LEAST_S` or more are kept, each with the number of its
-//! rests n, their sum s and the longest of them, l. A stand of length T is a **rest**, and no fault, where
+//! A stick with a dead zone rests at its centre, and one that is pushed to its end rests there. Such values are atoms
+//! of the distribution of u: u comes back to them often, and stays. The last [`ATOMS`] values at which u represented
+//! `LEAST_S` or more are kept, each with the number of its rests n, their sum s and the longest of them, l. A stand of
+//! length T is a **rest**, and no fault, where
 //!
 //! `n >= 3`, `s >= .05 t`, `T < max(8 s, 2 l)`
 //!
@@ -47,7 +47,7 @@ pub struct Resting {
     tolerance: f64,
     atoms: [Atom; ATOMS],
     samples: u64,
-    /// The value at which u stands, and for how long.
+    /// The value at which u is stationary, and for how long.
     value: f64,
     stands: u64,
     /// True where the stand is not to be learnt.
@@ -117,7 +117,7 @@ impl Resting {
         self.atoms.iter().position(known)
     }
 
-    /// True while u stands as the person rests.
+    /// True while u is stationary as the person rests.
     pub fn is_rest(&self) -> bool {
         let Some(place) = self.place() else {
             return false;

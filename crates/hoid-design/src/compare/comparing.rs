@@ -67,7 +67,8 @@ impl Comparing {
     /// Compares.
     ///
     /// # Errors
-    /// Those of factors without meaning, and [`CompareError::NotInJson`]. What cannot be estimated of somebody is part of the result.
+    /// Those of factors without meaning, and [`CompareError::NotInJson`]. What cannot be estimated of a person is part
+    /// of the result.
     pub fn run(&self, group: &GroupEstimates) -> Result<Comparison, CompareError> {
         let asked = match self.factors.is_empty() {
             true => vec![Factor::conditions()],
@@ -472,7 +473,7 @@ fn fitted(
     }
 }
 
-/// With the squares of the errors; where somebody has none each counts the same.
+/// With the squares of the errors; where someone has none each counts the same.
 fn observations(all: &[EstimatedValue]) -> Vec<Observation> {
     let known = all
         .iter()

@@ -84,7 +84,7 @@ impl Resolved {
         let pool = if of_people { &subjects } else { &conditions };
         if let Some(other) = all.iter().find(|member| !pool.contains(member)) {
             return Err(bad(format!(
-                "{other} is not a condition and nobody in this group: the conditions are {}, the people {}",
+                "{other} is not a condition and no one in this group: the conditions are {}, the people {}",
                 conditions.join(", "),
                 subjects.join(", ")
             )));
@@ -108,7 +108,7 @@ impl Resolved {
             }
             (Some(Variation::Within), None) => {
                 return Err(bad(
-                    "nobody is in two of its levels: it varies between people".to_owned()
+                    "no one is in two of its levels: it varies between people".to_owned()
                 ));
             }
             (_, Some(_)) => Variation::Within,

@@ -38,7 +38,7 @@ pub enum DesignError {
     NoCrossover,
     /// Lines that leave the person open.
     #[error(
-        "{lines} lines do not determine {coordinates} parameters: add lines, each of which tells two numbers, and spread them over the frequencies at which the person works"
+        "{lines} lines do not determine {coordinates} parameters: add lines, each of which gives two numbers, and spread them over the frequencies at which the person works"
     )]
     NotIdentifiable {
         /// Lines of the forcing function.

@@ -37,7 +37,7 @@ pub(super) enum Logger {
 const CATEGORY: &CStr = c"logStatusError";
 
 impl Logger {
-    /// Tells a message.
+    /// Prints a message.
     ///
     /// # Safety
     /// The function is that of the importer, and its environment is alive.
@@ -153,7 +153,7 @@ pub(super) unsafe fn list<'a, T>(pointer: *const T, count: usize) -> Done<&'a [T
 /// A list of the importer to be written to.
 ///
 /// # Safety
-/// `pointer` has room for `count` initialised elements that nobody else uses during the call.
+/// `pointer` has room for `count` initialised elements that no other code uses during the call.
 pub(super) unsafe fn list_mut<'a, T>(pointer: *mut T, count: usize) -> Done<&'a mut [T]> {
     if count == 0 {
         return Ok(&mut []);

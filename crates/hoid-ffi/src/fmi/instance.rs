@@ -158,7 +158,7 @@ impl Instance {
         Ok(())
     }
 
-    /// What stands for the parameters and inputs.
+    /// What represents the parameters and inputs.
     fn given(&self) -> VariableValues<'_> {
         VariableValues {
             variables: &self.variables,

@@ -20,7 +20,7 @@ pub(super) enum Model {
     Operator(Box<OperatorModel>),
 }
 
-/// A tracker, and the changes that it has told.
+/// A tracker, and the changes that it has reported.
 pub(super) struct TrackerModel {
     session: Session,
     with_excitation: bool,

@@ -1,8 +1,8 @@
 //! The verdict of a fit of polynomials.
 //!
-//! Where the coefficients stand for no operator, the response to e counts as known when b as a
-//! whole differs from zero: `b' P_b^-1 b`, with P_b the covariance of b, beyond the 95 % point of
-//! chi-square with nb degrees of freedom (A. Wald, *Trans. AMS* 54 (1943) 426-482).
+//! Where the coefficients do not correspond to any operator, the response to e counts as known when
+//! b as a whole differs from zero: `b' P_b^-1 b`, with P_b the covariance of b, beyond the 95 %
+//! point of chi-square with nb degrees of freedom (A. Wald, *Trans. AMS* 54 (1943) 426-482).
 
 use hoid_model::{Finding, NotConvertible, Orders, Record, Verdict};
 use nalgebra::{DMatrix, DVector};
@@ -96,7 +96,7 @@ impl Fit {
             ) => {}
             Err(reason) => all.push(Finding::doubt(
                 "not-convertible",
-                format!("the coefficients stand for no operator: {reason}"),
+                format!("the coefficients do not correspond to any operator: {reason}"),
             )),
         }
         if self.responds() == Some(false) {

@@ -9,12 +9,12 @@
 //! | `delay-at-bound`, `parameter-at-bound` | the delay lies at the end of its range, another at a bound |
 //! | `unstable` | the model from e to u is unstable |
 //! | `gain`, `undetermined-parameter` | standard errors as large as the values |
-//! | `not-convertible` | coefficients that stand for no operator |
+//! | `not-convertible` | coefficients that do not correspond to any operator |
 //! | `neuromuscular-lag` | the two poles describe no neuromuscular system |
 //! | `not-constant` | parameters that change within the records, or from one to the next |
 //! | `residuals-not-white`, `structure`, `leverage` | sizes in the residuals |
 //! | `no-response` | nothing that could not be chance |
-//! | `exact-fit`, `no-change`, `change-point` | worth knowing; the result stands |
+//! | `exact-fit`, `no-change`, `change-point` | worth knowing; the result remains valid |
 //!
 //! | file | what it holds |
 //! |---|---|

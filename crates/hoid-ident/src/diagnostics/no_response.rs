@@ -32,7 +32,7 @@ const HIGHEST_RAD_S: f64 = 25.0;
 const DELAYS_S: [f64; 8] = [0.05, 0.1, 0.16, 0.23, 0.31, 0.4, 0.52, 0.7];
 /// Pole of the lag, 1/s.
 const LAG_RATE: f64 = 0.3;
-/// Usual neuromuscular system: rad/s, and damping.
+/// Typical neuromuscular system: rad/s, and damping.
 const NEUROMUSCULAR: (f64, f64) = (11.0, 0.4);
 /// Records without a relation that are drawn.
 const SURROGATES: usize = 1999;

@@ -15,8 +15,8 @@ const LEAST_ERRORS: f64 = 2.0;
 /// Damping beyond which the faster of two real poles is 34 times the slower: a lag.
 const LARGEST_DAMPING: f64 = 3.0;
 
-/// True where a value stands less than two of its standard errors from zero. A value without a
-/// standard error was given, not estimated.
+/// True where a value is less than two of its standard errors from zero. A value without a standard
+/// error was given, not estimated.
 pub fn is_open(e: &Estimate) -> bool {
     e.standard_error
         .is_some_and(|error| e.value.abs() < LEAST_ERRORS * error)
@@ -28,8 +28,8 @@ pub fn leads_backwards(o: &OperatorEstimate) -> bool {
     sign(&o.k_e) * sign(&o.k_e_dot) < 0.0
 }
 
-/// Gains and lead that are not determined, and leads that nobody has. Each operator has a label, as ` of record 2`, empty for
-/// a single one; where K_e and K_e_dot of all of them are open, nothing is known of the response.
+/// Gains and lead that are not determined, and leads that no one has. Each operator has a label, as ` of record 2`,
+/// empty for a single one; where K_e and K_e_dot of all of them are open, nothing is known of the response.
 pub fn gain_findings(operators: &[(&str, OperatorEstimate)]) -> Vec<Finding> {
     let mut open = Vec::new();
     let mut all_open = !operators.is_empty();
@@ -42,7 +42,7 @@ pub fn gain_findings(operators: &[(&str, OperatorEstimate)]) -> Vec<Finding> {
     if all_open {
         return vec![Finding::undetermined(
             "gain",
-            "no gain stands two standard errors from zero: there is too little response to e",
+            "no gain differs from zero by two standard errors: there is too little response to e",
         )];
     }
     let backwards = operators.iter().filter(|(_, o)| leads_backwards(o));
@@ -55,7 +55,7 @@ pub fn gain_findings(operators: &[(&str, OperatorEstimate)]) -> Vec<Finding> {
         .collect()
 }
 
-/// A lead below zero: nobody has one; a gain and a lead that stand for a lag do.
+/// A lead below zero: no one has one; a gain and a lead that represent a lag do.
 fn negative_lead(negative: &[String]) -> Option<Finding> {
     (!negative.is_empty()).then(|| {
         Finding::doubt(

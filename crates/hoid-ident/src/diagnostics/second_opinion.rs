@@ -181,8 +181,8 @@ pub fn of_family(
     })
 }
 
-/// Of an operator whose gains change once, without samples that stand out. One fit that finds a change
-/// where the other finds none is a difference whatever its size.
+/// Of an operator whose gains change once, without samples that are prominent. One fit that finds a change where the
+/// other finds none is a difference whatever its size.
 pub fn of_sigmoid(estimator: &SigmoidChange, fit: &SigmoidFit, records: &[Record]) -> Option<Finding> {
     let without = Without::SamplesThatStandOut;
     let other = SigmoidChange {

@@ -133,7 +133,7 @@ fn family_findings(operators: &[(&str, &ChangedOperator)], sample_time: SampleTi
     if !known {
         all.push(Finding::undetermined(
             "gain",
-            "no gain stands two standard errors from zero: there is too little response to e",
+            "no gain differs from zero by two standard errors: there is too little response to e",
         ));
     } else if !open.is_empty() {
         let verb = if open.len() == 1 { "is" } else { "are" };
@@ -149,7 +149,7 @@ fn family_findings(operators: &[(&str, &ChangedOperator)], sample_time: SampleTi
     if first.get("T_I").as_ref().is_some_and(is_open) {
         all.push(Finding::note(
             "lag",
-            "T_I and K are not determined, K/T_I is: 1/T_I stands less than two standard errors from zero",
+            "T_I and K are not determined, K/T_I is: 1/T_I is less than two standard errors from zero",
         ));
     }
     if let (Some(omega), Some(zeta)) = (first.get("omega_nm"), first.get("zeta_nm")) {

@@ -67,7 +67,7 @@ impl Whitened {
     }
 }
 
-/// Behind `1 + d_1 q^-1 + ..`, from the first sample on that has all lags.
+/// After `1 + d_1 q^-1 + ..`, from the first sample on that has all lags.
 pub(super) fn whitened(m: &DMatrix<f64>, d: &[f64]) -> DMatrix<f64> {
     DMatrix::from_fn(m.nrows() - NOISE, m.ncols(), |i, j| {
         let own = m[(i + NOISE, j)];

@@ -2,7 +2,7 @@
 //!
 //! In a closed loop the direct prediction error method needs a noise model that is rich enough and
 //! no knowledge of the loop (L. Ljung, *System Identification*, 1999, section 13.4). An ARX model
-//! of high order has that, is one linear regression, and its response stands for the describing
+//! of high order has that, is one linear regression, and its response represents the describing
 //! function where no periodic excitation was recorded: for the starts of all forms.
 
 use hoid_model::{Complex64, Record, Structure};

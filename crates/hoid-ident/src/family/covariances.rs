@@ -123,7 +123,8 @@ fn differences(fit: &PredictionFit<'_>, other: &[f64]) -> Vec<(usize, f64)> {
     free.map(|place| (place, fit.eta()[place] - other[place])).collect()
 }
 
-/// By how much `J d` may exceed the difference of two responses before it stands for none.
+/// By how much `J d` may exceed the difference of two responses before it does not correspond to
+/// any.
 const MOST_OVERSTATED: f64 = 2.0;
 /// Part of its diagonal that makes `J' J` regular.
 const RIDGE: f64 = 1e-9;

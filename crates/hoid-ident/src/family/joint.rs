@@ -37,7 +37,7 @@ use crate::{criterion::Workspace, grey_box::objective::Beside};
 
 /// Part of V_L that `V_L - V_P` is at least: both are estimates.
 const LEAST_DIFFERENCE: f64 = 0.25;
-/// Runs from which on their scatter tells the variances of the lines: what one run differs by may be chance.
+/// Runs from which on their scatter reports the variances of the lines: what one run differs by may be chance.
 const FEWEST_RUNS: usize = 3;
 /// Largest part of the way to the lines.
 const LARGEST_SHARE: f64 = 0.9;

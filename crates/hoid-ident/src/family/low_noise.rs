@@ -1,4 +1,4 @@
-//! Recordings with little noise, or none: simulations, and what anybody tries first.
+//! Recordings with little noise, or none: simulations, and what anyone tries first.
 //!
 //! The frequency response from which searches start is off by more than such noise, so that an autoregression of what
 //! it leaves of u would model the operator in place of the noise. Where a form leaves little, all of them are searched

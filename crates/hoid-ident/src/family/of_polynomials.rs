@@ -1,4 +1,4 @@
-//! The operator of the family that polynomials stand for: `q^-nk B/F` (or `B/A`) back to K, T_L,
+//! The operator of the family that polynomials represent: `q^-nk B/F` (or `B/A`) back to K, T_L,
 //! T_I, omega_nm, zeta_nm and tau_e.
 //!
 //! The poles show which is the lag and which are the neuromuscular system
@@ -54,7 +54,7 @@ const LATER: [f64; 6] = [0.02, 0.5, 0.98, 2.5, 5.0, 10.0];
 /// Lead times from which searches start, s.
 const LEADS_S: [f64; 3] = [0.1, 0.5, 2.0];
 
-/// An operator of the family that stands for polynomials.
+/// An operator of the family that represents polynomials.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FamilyConversion {
     /// The operator.
@@ -78,7 +78,7 @@ impl FamilyConversion {
 }
 
 impl Fit {
-    /// The operator of the family that the polynomials of this fit stand for, of this form or, for
+    /// The operator of the family that the polynomials of this fit represent, of this form or, for
     /// `None`, of the form that is nearest.
     ///
     /// # Errors
@@ -88,7 +88,7 @@ impl Fit {
     }
 }
 
-/// The operator of the family that polynomials stand for, of this form or, for `None`, of the
+/// The operator of the family that polynomials represent, of this form or, for `None`, of the
 /// simplest form that is met exactly, else of the one that is nearest. `covariance` is that of
 /// theta, by rows.
 ///

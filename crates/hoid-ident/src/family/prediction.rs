@@ -50,7 +50,7 @@ pub(super) struct Prediction<'a> {
     pub sample_time: SampleTime,
     /// Intersample behaviour of the error.
     pub intersample: Intersample,
-    /// Whether the data show that, or somebody has reported it.
+    /// Whether the data show that, or someone has reported it.
     pub course_is_known: bool,
     /// Share of the power of u that an output error leaves, where it is little.
     pub little_noise: Option<f64>,

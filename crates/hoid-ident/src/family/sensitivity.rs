@@ -34,7 +34,7 @@ pub(super) const MORE_WITHOUT_LINES: f64 = 0.5;
 /// Standard deviations of what no rival shows without lines.
 pub(super) const UNSEEN_WITHOUT_LINES: [(Coordinate, f64); 2] =
     [(Coordinate::LogOmega, 0.12), (Coordinate::LogZeta, 0.2)];
-/// Iterations in which a rival need not converge: it stands for a size.
+/// Iterations in which a rival need not converge: it represents a size.
 const SEARCH: (usize, f64) = (25, 1e-6);
 
 /// Coordinates of the operators of the same form with other noise models; none where there is no noise.

@@ -8,7 +8,7 @@
 //! back from, by more than it moves from one sample to the next in 999 of 1000, is a dropout.
 //!
 //! *Idle* is a stretch of [`IDLE_S`] or more in which e and u stay both within [`QUIET`] of their deviations, in each
-//! half second: before a run starts, or after its end. Nobody who tracks can do that: e is never at rest.
+//! half second: before a run starts, or after its end. No one who tracks can do that: e is never at rest.
 
 use std::ops::Range;
 

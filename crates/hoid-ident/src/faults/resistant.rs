@@ -3,7 +3,7 @@
 //! Each sample of e and of u is held to what those on both sides of it say: with the interpolation error
 //! `r(t) = sum_i a_i eps(t+i)/|a|^2`, whose standard deviation is `s = sigma/|a|`, a sample beyond `c s` is moved to
 //! it, `x(t) - r + c s sign(r)` (the filter cleaner of R. D. Martin and D. J. Thomson, *Proc. IEEE* 70 (1982)
-//! 1097-1115, with two sides). The sample that is farthest off comes first, and the others are looked at anew: an
+//! 1097-1115, with two sides). The sample that is farthest off comes first, and the others are looked at again: an
 //! outlier is in the interpolation of its neighbours, and they would be moved in its place. Whatever a sample is, what
 //! it brings into any filter behind is bounded, in e as in u, and so is its leverage on theta. c = [`HELD`]: of a
 //! normal channel one sample in 16 000 is moved. A fit to this record that is another than that to the record itself

@@ -4,10 +4,9 @@
 //! does a hand that works in pulses and lets go between them. Pilots leave it there in half of the
 //! samples and for seconds at a time. That is how they control, and no fault of the recording.
 //!
-//! The rest is the most frequent value, where it makes [`SHARE`] of the samples or more, is come to
-//! [`VISITS`] times or oftener, and is [`ALONE`] times as frequent as any other: levels of a channel
-//! in steps stand side by side, and a channel that has stopped once has stopped once. In the ends of
-//! its range nothing rests.
+//! The rest is the most frequent value, where it makes [`SHARE`] of the samples or more, is come to [`VISITS`] times or
+//! oftener, and is [`ALONE`] times as frequent as any other: levels of a channel in steps are side by side, and a
+//! channel that has stopped once has stopped once. In the ends of its range nothing rests.
 
 use std::ops::Range;
 

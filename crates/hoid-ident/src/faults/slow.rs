@@ -2,7 +2,7 @@
 //!
 //! A step or a drift of a sensor is not a fault that its neighbours could tell, and a level does not hold it. The
 //! person does not follow it, so that e has power at low frequencies that u does not answer, and the gain of the fit
-//! comes out too low with small error bars. Both channels lose their line and the cosines `cos(pi k (t + 1/2)/N)`,
+//! results too low with small error bars. Both channels lose their line and the cosines `cos(pi k (t + 1/2)/N)`,
 //! `k = 1 .. 2 T/`[`PERIOD_S`], so all that is slower than that period. The two lose it by the same linear operation,
 //! so that what leads from e to u stays. A fit to the rest has lost the information of low frequencies, and differs
 //! from the first by chance with a variance of `var' - var` where nothing is wrong (J. A. Hausman, *Econometrica* 46

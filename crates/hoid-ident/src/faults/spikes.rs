@@ -1,6 +1,6 @@
 //! One or few samples that those before and after them rule out.
 //!
-//! Two explanations of a large innovation stand against each other (A. J. Fox, *J. Royal Statistical Society B* 34
+//! Two explanations of a large innovation is compared with each other (A. J. Fox, *J. Royal Statistical Society B* 34
 //! (1972) 350-363; I. Chang, G. C. Tiao and C. Chen, *Technometrics* 30 (1988) 193-204). A *push* of the person enters
 //! the innovations: it moves the channel, which then goes on as it always does. A *fault* is added to the samples
 //! alone: each innovation after it is off by a coefficient of A, and the channel goes on as if nothing had been. For m
@@ -51,7 +51,7 @@ const CLEAN: f64 = 5.0;
 const SEED: f64 = 4.0;
 /// Least change of a sample, of the deviation of the channel.
 const SMALLEST: f64 = 1.5;
-/// Deviations of the channel that nobody moves by in a few samples.
+/// Deviations of the channel that no one moves by in a few samples.
 const WILD: f64 = 20.0;
 const ROUNDS: usize = 4;
 

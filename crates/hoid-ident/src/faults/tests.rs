@@ -94,7 +94,7 @@ fn one_sample_of_the_error_is_found_and_bridged() {
         assert!((fault.size - (30.0 - clean.input()[place])).abs() < 0.1, "{fault}");
         assert!((found.segments[0].input()[place] - clean.input()[place]).abs() < 0.05);
         assert_eq!(found.findings[0].severity, Severity::Note);
-        // Told and not repaired.
+        // Reported and not repaired.
         let told = repair(&record, FaultHandling::Report).unwrap();
         assert_eq!(told.segments[0].input(), record.input());
         assert_eq!(told.findings[0].severity, Severity::Doubt);

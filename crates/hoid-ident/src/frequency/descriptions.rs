@@ -88,7 +88,7 @@ fn several_runs_are_described_by_default() {
     };
     let function = describe(&records, &found.excitation, &by_hand).unwrap();
     assert_eq!(found.function, function);
-    // The delay of 0.28 s stands for the lag of the neuromuscular system too, 2 zeta/omega = 0.06 s
+    // The delay of 0.28 s represents the lag of the neuromuscular system too, 2 zeta/omega = 0.06 s
     // at low frequency and more near its resonance.
     assert!((0.28..0.45).contains(&found.delay_s), "{}", found.delay_s);
     let margins = found.margins.as_ref().unwrap();

@@ -10,7 +10,7 @@
 //!
 //! which is the same at a fixed point, but has F stable by itself. So with Z, C and D of a system fixed,
 //! `|Q' eps(theta)|^2`, Q an orthonormal basis of Z, is minimised over B and stable F (damped Gauss-Newton, along the
-//! border of stability where that is in the way: [`crate::optimize`]). Then Z, C and D are made anew, until they no
+//! border of stability where that is in the way: [`crate::optimize`]). Then Z, C and D are made again, until they no
 //! longer move theta ([`Extrapolation`] helps where that creeps or swings). Where g has no zero in the region of
 //! stability, the smallest value lies on its border, and the termination reports it.
 //!

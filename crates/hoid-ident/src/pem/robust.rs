@@ -30,7 +30,7 @@ use crate::{
     pem::{constraints::ConstrainedCriterion, fit_settings::FitSettings},
 };
 
-/// Rounds in which the scale is estimated anew.
+/// Rounds in which the scale is estimated again.
 const SCALES: usize = 10;
 
 /// Largest number of rounds.

@@ -7,7 +7,7 @@ use crate::IdentError;
 
 /// What a text makes of an estimator.
 type Set<E, X> = Box<dyn Fn(&mut E, &Setting, &str) -> Result<(), X>>;
-/// The value in words at a sample time; `None` for one that is not worth a line.
+/// The value as text at a sample time; `None` for one that is not worth a line.
 type Words<E> = Box<dyn Fn(&E, SampleTime) -> Option<String>>;
 
 /// An option of an estimator `E`, whose texts are refused by an `X`.

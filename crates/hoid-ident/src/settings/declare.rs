@@ -5,7 +5,7 @@
 /// share are a struct of their own, named under `groups`.
 ///
 /// In `#[setting(..)]` stand methods of [`Setting`](crate::settings::Setting): `unit`, `bounds`,
-/// `default` (in words), `name` (where it is not that of the field).
+/// `default` (as text), `name` (where it is not that of the field).
 #[macro_export]
 macro_rules! settings {
     (

@@ -17,7 +17,7 @@ pub struct Setting {
     pub kind: Kind,
     /// Unit of its value; empty where it has none.
     pub unit: &'static str,
-    /// Default as text, or in words; empty where nothing stands for it.
+    /// Default as text, or as text; empty where nothing represents it.
     pub default: String,
     /// What its numbers may be.
     pub bounds: Bounds,
@@ -65,7 +65,7 @@ impl Setting {
         Self { bounds, ..self }
     }
 
-    /// With a default in words.
+    /// With a default as text.
     pub fn default(self, words: &str) -> Self {
         Self {
             default: words.to_owned(),

@@ -15,10 +15,10 @@ pub trait Value: Sized {
     /// Reads a text.
     ///
     /// # Errors
-    /// The expected value, in words.
+    /// The expected value, as text.
     fn read(text: &str) -> Result<Self, String>;
 
-    /// The value as text; `None` for one that stands for nothing.
+    /// The value as text; `None` for one that has no meaning.
     fn text(&self) -> Option<String>;
 
     /// The numbers in it, which bounds are held against.
@@ -187,7 +187,7 @@ impl Value for Vec<String> {
 /// `NAME=VALUE,NAME=VALUE`, each name once.
 ///
 /// # Errors
-/// The expected value, in words.
+/// The expected value, as text.
 pub fn named_pairs(text: &str) -> Result<Vec<(String, String)>, String> {
     let mut pairs: Vec<(String, String)> = Vec::new();
     for item in text.split(',').map(str::trim).filter(|item| !item.is_empty()) {

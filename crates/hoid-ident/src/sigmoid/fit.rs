@@ -265,7 +265,7 @@ impl SigmoidFit {
     /// sigmoid where the records show a change, else those of the fit without one.
     ///
     /// The errors are those of the delta method, t_M and G included. Around a change point, where
-    /// the sigmoid is not a line over the interval of t_M, `step^2 p (1 - p)` stands for the
+    /// the sigmoid is not a line over the interval of t_M, `step^2 p (1 - p)` represents the
     /// latter, with p the probability that the change has happened.
     pub fn gains_at(&self, time_s: f64) -> GainsAt {
         let known = ThetaEstimate {

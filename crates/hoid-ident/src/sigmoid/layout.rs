@@ -58,7 +58,7 @@ pub(crate) enum Element {
     Varying(Coordinate, usize),
     Midpoint,
     LogRate,
-    /// A coordinate that does not change; omega_nm and zeta_nm stand for their logarithms.
+    /// A coordinate that does not change; omega_nm and zeta_nm represent their logarithms.
     Constant(Coordinate),
     /// d_i.
     Noise(usize),

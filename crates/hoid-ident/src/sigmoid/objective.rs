@@ -170,7 +170,7 @@ impl ChangeCriterion<'_> {
         if unit.nk + layout.reach() > from || self.first >= n {
             return None;
         }
-        // Where the oldest error of the past stands; those of a direct part reach on by two samples.
+        // Position of the oldest error of the past; those of a direct part reach on by two samples.
         let oldest = match layout.form {
             Form::Lead => 0,
             _ => from - unit.nk - layout.reach(),

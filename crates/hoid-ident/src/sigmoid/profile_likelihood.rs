@@ -1,6 +1,6 @@
 //! Profile likelihood intervals of t_M and G.
 //!
-//! An interval holds the values at which the other parameters, searched anew, lose little:
+//! An interval holds the values at which the other parameters, searched again, lose little:
 //! `n ln(V(x)/V) <= q`. It needs no parabola. For G, and for t_M where the change is resolved (two
 //! standard errors are less than the width 1/G of the change), the loss is chi-square with one
 //! degree of freedom: q = 3.84 for 95 %. An abrupt change is a change point instead: the loss at

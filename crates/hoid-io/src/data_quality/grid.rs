@@ -12,7 +12,7 @@
 /// Rows of a part, and the fewest that make one.
 const PART: usize = 256;
 const LEAST_PART: usize = 5;
-/// A gap of so many rows is a pause, after which the grid starts anew.
+/// A gap of so many rows is a pause, after which the grid starts again.
 const PAUSE: f64 = 10.0;
 /// Rows within which a step that was taken too far is set right.
 const NEAR: usize = 4;
@@ -167,7 +167,7 @@ fn follow(times: &[f64], ts: f64, pull: f64, steps: &mut [f64]) {
 
 /// Slope of least squares of the times over the grid.
 pub(super) fn slope(times: &[f64], steps: &[f64]) -> f64 {
-    // Counted anew for each sum: a record of hours has no room for its indices.
+    // Counted again for each sum: a record of hours has no room for its indices.
     let indexed = || {
         let mut index = 0.0;
         times.iter().zip(steps).enumerate().map(move |(i, (time, step))| {

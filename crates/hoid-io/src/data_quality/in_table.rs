@@ -66,7 +66,7 @@ pub(crate) fn issues_of_signals(
     found
 }
 
-/// The rows of the span, as far as the time of the file tells.
+/// The rows of the span, as far as the time of the file shows.
 fn span_rows(table: &Table<'_>, time: Option<usize>, options: &ReadOptions) -> Range<usize> {
     let at = |row: usize| match (time, options.sampling_hz) {
         (Some(time), _) => table.columns[time].values[row],

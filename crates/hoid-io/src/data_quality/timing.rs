@@ -10,9 +10,9 @@ use crate::wording::{counted, decimal, short};
 const JITTER: f64 = 1e-3;
 /// Relative deviation of a clock from a given rate that is reported; crystals are within 1e-4.
 const OFF: f64 = 2e-4;
-/// The same from a typical rate that nobody gave, and the farthest that still looks like it.
+/// The same from a typical rate that no one gave, and the farthest that still looks like it.
 const OFF_COMMON: (f64, f64) = (5e-4, 1e-2);
-/// Usual rates of recorders, Hz.
+/// Common rates of recorders, Hz.
 const COMMON_HZ: [f64; 42] = [
     1.0, 2.0, 4.0, 5.0, 8.0, 10.0, 12.5, 15.0, 16.0, 20.0, 24.0, 25.0, 29.97, 30.0, 32.0, 40.0, 50.0, 59.94, 60.0,
     64.0, 75.0, 80.0, 90.0, 100.0, 119.88, 120.0, 125.0, 128.0, 144.0, 150.0, 200.0, 240.0, 250.0, 256.0, 300.0, 400.0,
@@ -91,7 +91,7 @@ fn gaps(signals: &Signals<'_>, grid: &Grid, found: &mut Vec<QualityIssue>) {
         size: longest,
         unit: "s".to_owned(),
         text: format!(
-            "{} missing in {}, the first behind {}; the longest step is {} s",
+            "{} missing in {}, the first after {}; the longest step is {} s",
             counted(missing, "row"),
             counted(places.len(), "place"),
             at(first),
@@ -210,7 +210,7 @@ fn second_clocks(signals: &Signals<'_>, grid: &Grid, found: &mut Vec<QualityIssu
         else {
             continue;
         };
-        // The ends stand for the rate as far as a row of jitter allows.
+        // The ends represent the rate as far as a row of jitter allows.
         let uncertain = 2.0 / pairs.len() as f64;
         if off.abs() <= OFF.max(uncertain) {
             continue;

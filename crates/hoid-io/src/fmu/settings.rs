@@ -76,7 +76,7 @@ impl FmuSettings {
     /// From the text of the file.
     ///
     /// # Errors
-    /// Problems with it, in words.
+    /// Problems with it, as text.
     pub fn parse(text: &str) -> Result<Self, String> {
         let settings: Self = serde_json::from_str(text).map_err(|error| format!("{FMU_SETTINGS}: {error}"))?;
         settings.kind()?;

@@ -31,7 +31,7 @@ pub enum Role {
     Parameter,
     /// Set at every sample.
     Input,
-    /// Told at every sample.
+    /// Reported at every sample.
     Output,
 }
 

@@ -19,7 +19,7 @@ use crate::time::with_time;
 pub(crate) struct Format {
     /// Its name for a person.
     pub(crate) name: &'static str,
-    /// The extensions in lower case that stand for it, the default one first.
+    /// The extensions in lower case that represent it, the default one first.
     pub(super) endings: &'static [&'static str],
     /// How its bytes are read.
     pub(crate) reading: Reading,
@@ -60,7 +60,7 @@ pub(crate) enum Writing {
     Rows(RowsStart),
     /// Each column as one array, which reports its length first: all rows have to be there.
     Columns(ColumnsWriter),
-    /// Not at all; what the extension stands for, as in "the format of a recorder".
+    /// Not at all; what the extension represents, as in "the format of a recorder".
     ReadOnly(&'static str),
 }
 

@@ -21,7 +21,7 @@ pub fn writable_endings() -> String {
     endings(&written)
 }
 
-/// The endings of some formats in words.
+/// The endings of some formats as text.
 fn endings(formats: &[&Format]) -> String {
     let of_one = |format: &&Format| {
         let dotted: Vec<String> = format.endings.iter().map(|ending| format!(".{ending}")).collect();
@@ -84,7 +84,7 @@ fn ending_of(path: &Path) -> Option<String> {
     path.extension().map(|ending| ending.to_string_lossy().to_lowercase())
 }
 
-/// The format that the ending of a file stands for.
+/// The format that the ending of a file represents.
 fn format_of(path: &Path) -> Option<&'static Format> {
     let ending = ending_of(path)?;
     ALL.iter()
@@ -92,7 +92,8 @@ fn format_of(path: &Path) -> Option<&'static Format> {
         .find(|format| format.endings.contains(&ending.as_str()))
 }
 
-/// That an ending stands for no format, with what is `expected` and the remedy, if there is one.
+/// That an ending does not correspond to any format, with what is `expected` and the remedy, if
+/// there is one.
 fn unknown(path: &Path, expected: String, remedy: Option<&str>) -> IoError {
     IoError::UnknownFormat {
         file: path.display().to_string(),

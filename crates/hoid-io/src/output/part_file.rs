@@ -1,10 +1,10 @@
 //! Files on their way: `.hoid-*.part` next to the place where they are to be.
 //!
-//! A part is locked for as long as its writer lives; the system drops the locks of a process that
-//! is gone, however it ended. A part that can be locked is therefore nobody's, and is removed by the
-//! next process that writes into its directory. A writer looks after locking whether its part is
-//! still there, so that a part is never swept between its making and its lock. Where a file system
-//! has no locks, parts are left alone.
+//! A part is locked for as long as its writer lives; the system drops the locks of a process that is
+//! gone, however it ended. A part that can be locked therefore belongs to no person, and is removed
+//! by the next process that writes into its directory. A writer looks after locking whether its part
+//! is still there, so that a part is never swept between its making and its lock. Where a file
+//! system has no locks, parts are left alone.
 
 use std::collections::BTreeSet;
 use std::fs::{self, File};
@@ -101,8 +101,8 @@ fn make(directory: &Path) -> io::Result<NamedTempFile> {
     builder.tempfile_in(directory).map_err(without_path)
 }
 
-/// The error of the system without the name of the part, which is nobody's business: the message
-/// names the place that was asked for.
+/// The error of the system without the name of the part, which belongs to no person business: the
+/// message names the place that was asked for.
 fn without_path(error: io::Error) -> io::Error {
     let text = error.to_string();
     match text.split_once(" at path ") {

@@ -1,6 +1,6 @@
 //! Factors and units of channels: `u=12.5`, `u=12.5:deg`, `e=rad:deg`.
 //!
-//! A factor reports by what the numbers of the file are multiplied; after a colon stands the unit
+//! A factor reports by what the numbers of the file are multiplied; after a colon comes the unit
 //! that they then have. Two known units of one kind give the factor themselves, exactly: `rad:deg`
 //! is 180 / pi. Parameters of the operator are ratios of u and e: with e in deg and u in V the gain
 //! K_e is in V/deg.

@@ -1,4 +1,4 @@
-//! The account of the processing applied to a record: for people in words, for programs with its
+//! The account of the processing applied to a record: for people as text, for programs with its
 //! numbers.
 
 use std::fmt;

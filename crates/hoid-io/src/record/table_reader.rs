@@ -105,7 +105,7 @@ impl TableReader<'_> {
         if let Some(row) = rows.clone().find(bad) {
             return Err(self.table.bad_value(column, row, rows));
         }
-        // Nobody reads a column twice: what a file of hours fills is not copied.
+        // No one reads a column twice: what a file of hours fills is not copied.
         let mut values = std::mem::take(&mut source.values);
         values.truncate(rows.end);
         values.drain(..rows.start);

@@ -1,4 +1,4 @@
-//! Tables of results into files and out of them, in the format that the extension stands for.
+//! Tables of results into files and out of them, in the format that the extension represents.
 
 use std::path::Path;
 
@@ -10,7 +10,8 @@ use crate::formats::{bytes_of, format_to_write};
 /// Whether a table can be written to a place of this name; to be asked before long work.
 ///
 /// # Errors
-/// [`IoError::UnknownFormat`] for an extension that stands for no format, [`IoError::Directory`].
+/// [`IoError::UnknownFormat`] for an extension that does not correspond to any format,
+/// [`IoError::Directory`].
 pub fn check_table_path(path: &Path) -> Result<(), IoError> {
     format_to_write(path).map(drop)
 }

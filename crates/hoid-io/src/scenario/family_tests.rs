@@ -94,7 +94,7 @@ fn what_does_not_fit_is_refused_with_its_remedy() {
         (with("T_L_s = 0.6\n", "T_L_s = 0.6\nc_1_s = 1\n"), "[initial] has c_1_s"),
         (with("1/1,0", "1,0,0/1,0"), "higher degree"),
         (with("1/1,0", "one"), "line 9: initial.controlled_element is one"),
-        (with("1/1,0", "90/s(s+6)"), "at character 5 stands '('"),
+        (with("1/1,0", "90/s(s+6)"), "at character 5 there is '('"),
         (with("1/1,0", "1e13/s"), "controlled_element is 10000000000000"),
         (with("1/1,0", "exp(-0.1s)/s"), "the delay of a task is the operator's"),
         (with("controlled_element = \"1/1,0\"\n", ""), "lacks controlled_element"),

@@ -3,7 +3,7 @@
 //! A column is meant whose whole name is a typical one, whatever its capitals; else the only one that has a common name
 //! as a word, as in `Tracking error`, `stick [V]` or `e (deg)`. A single letter counts as the first word alone.
 
-/// Names of the error, the most telling first.
+/// Names of the error, the most informative first.
 const ERRORS: [&str; 6] = ["e", "error", "err", "tracking_error", "tracking error", "e_t"];
 /// Names of the control.
 const CONTROLS: [&str; 8] = [

@@ -1,4 +1,4 @@
-//! Report of the pages are: how the session stands, and the live estimate.
+//! Report of the pages are: the state of the session, and the live estimate.
 
 use std::path::{Path, PathBuf};
 

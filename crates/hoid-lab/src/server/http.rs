@@ -46,7 +46,7 @@ impl Request {
         }
         let path = parsed.path?.split('?').next()?.to_owned();
         let method = parsed.method?.to_owned();
-        // A header that is there twice is nobody's honest one.
+        // A header that is there twice belongs to no person honest one.
         let header = |name: &str| {
             let mut all = parsed.headers.iter().filter(|h| h.name.eq_ignore_ascii_case(name));
             let value = std::str::from_utf8(all.next()?.value).ok()?.trim().to_owned();
@@ -99,7 +99,7 @@ impl Reply {
         }
     }
 
-    /// A refusal in words.
+    /// A refusal as text.
     pub fn refused(status: u16, words: &str) -> Self {
         Self {
             status,

@@ -2,7 +2,7 @@
 //!
 //! While there are none it waits for the next one. Else it takes what comes, looks at each once (a head that is whole,
 //! one that is too long or too late, a peer that is gone), and pauses for [`PAUSE`] where nothing has happened. Who has
-//! come is looked at before anybody gives way: so the page, whose head comes at once, is heard however many others come
+//! come is looked at before anyone gives way: so the page, whose head comes at once, is heard however many others come
 //! and go, and the oldest of [`MOST`] that carry no information is closed for the next.
 
 use std::{

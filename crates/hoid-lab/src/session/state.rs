@@ -52,7 +52,7 @@ pub struct Facts {
     /// True when all runs are done.
     #[serde(default)]
     pub finished: bool,
-    /// Browser and screen, as the page tells them.
+    /// Browser and screen, as the page reports them.
     #[serde(default)]
     pub browser: BTreeMap<String, String>,
     /// All runs that are to be.

@@ -1,4 +1,4 @@
-//! What nobody reports to a lab, files of sessions as nobody wrote them, and trackers restored from numbers that were
+//! What no one reports to a lab, files of sessions as no one wrote them, and trackers restored from numbers that were
 //! changed and sealed again: each has an answer, and none panics, not even where it is caught.
 //!
 //! Case `k` of a seed is the same on every machine.

@@ -67,7 +67,7 @@ impl Person {
         self.say(json!({"type": "finish", "number": number}))
     }
 
-    /// How the session stands, as the page was reported last.
+    /// State of the session, as the page was reported last.
     pub fn state(&self) -> Value {
         let states = self.heard.try_iter().filter_map(|outgoing| match outgoing {
             Outgoing::Text(text) => serde_json::from_str::<Value>(&text).ok(),

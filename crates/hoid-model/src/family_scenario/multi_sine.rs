@@ -5,7 +5,7 @@
 //! the power lies where people follow (D. T. McRuer and H. R. Jex, IEEE Trans. Human Factors in
 //! Electronics 8 (1967) 231-249; M. M. van Paassen and M. Mulder, *Identification of Human Control
 //! Behaviour*, 2006; M. Yamagami et al., IEEE Trans. Cybernetics 53 (2023) 2039-2050 with primes
-//! times 0.05 Hz). Phases are random in each run, so that nobody learns the signal by heart.
+//! times 0.05 Hz). Phases are random in each run, so that no one learns the signal by heart.
 
 use std::f64::consts::TAU;
 
@@ -19,7 +19,7 @@ use crate::{
 pub struct Excitation {
     /// Its sinusoids; none is not a signal.
     pub function: ForcingFunction,
-    /// True where each run draws its phases anew, uniform over the circle.
+    /// True where each run draws its phases again, uniform over the circle.
     pub random_phases: bool,
 }
 
@@ -51,7 +51,7 @@ impl MultiSine {
         (2..=self.largest).filter(is_prime).collect()
     }
 
-    /// The excitation, its phases drawn anew in each run.
+    /// The excitation, its phases drawn again in each run.
     ///
     /// # Errors
     /// [`ModelError::OutOfRange`] for a period that is not positive, an rms that is not finite, or

@@ -4,8 +4,8 @@
 //! half the filter and half of M, about 15 samples of the new rate ([`Decimated::lag_s`]). Up to the
 //! end of what has come its values are those of the decimated record, digit for digit.
 //!
-//! **Values that are not finite** (missing, faulty) are held at the last good one within the filter;
-//! a new sample among whose M old ones is such a one is NaN, so that it is nobody's.
+//! **Values that are not finite** (missing, faulty) are held at the last good one within the filter; a new sample among
+//! whose M old ones is such a one is NaN, so that it belongs to no person.
 
 use std::collections::VecDeque;
 

@@ -63,7 +63,7 @@ pub struct TrueResponse {
 /// frequency that the longest record resolves, to 50 rad/s or half the sampling frequency.
 ///
 /// Bands are 1.96 standard errors to either side; a model without standard errors has none. A truth
-/// that no discrete model stands for (a delay of no whole number of samples) is drawn without the
+/// that no discrete model represents (a delay of no whole number of samples) is drawn without the
 /// hold.
 pub fn bode(id: &str, models: &[BodeModel<'_>], truths: &[TrueResponse]) -> String {
     bode_with_points(id, models, truths, &[])

@@ -130,7 +130,7 @@ impl BodeCurve {
 /// Bode pairs of one column.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct BodeColumn {
-    /// Text above it; empty for none. After `_` or `^` stands one sign, or several in braces.
+    /// Text above it; empty for none. After `_` or `^` comes one sign, or several in braces.
     pub title: String,
     /// Its curves.
     pub curves: Vec<BodeCurve>,

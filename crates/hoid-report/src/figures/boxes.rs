@@ -54,7 +54,7 @@ pub struct BoxSeries {
 /// One panel of box plots.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct BoxPanel {
-    /// Name of the quantity, such as `B_r(b_0)`; after `_` or `^` stands one sign, or several in
+    /// Name of the quantity, such as `B_r(b_0)`; after `_` or `^` comes one sign, or several in
     /// braces.
     pub name: String,
     /// Its unit; empty for none.

@@ -72,7 +72,7 @@ pub struct Curve {
 /// One panel of curves.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct CurvePanel {
-    /// Name of the ordinate; after `_` or `^` stands one sign, or several in braces.
+    /// Name of the ordinate; after `_` or `^` comes one sign, or several in braces.
     pub name: String,
     /// Its unit; empty for none. An ordinate in `deg` has ticks at parts of the circle.
     pub unit: String,
@@ -192,7 +192,7 @@ impl CurveGrid {
                 entries.push(entry);
             }
         }
-        // The truth stands last, so that the levels of a method stay in one row.
+        // The truth is last, so that the levels of a method stay in one row.
         entries.sort_by_key(|entry| entry.sample == Sample::Dashed && entry.colour == BLACK);
         entries
     }

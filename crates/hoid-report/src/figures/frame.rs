@@ -18,7 +18,7 @@ use super::{
     svg,
 };
 
-/// Above the axes of a panel, and below where no abscissa stands.
+/// Above the axes of a panel, and below where there is no abscissa.
 const SPACE: f64 = 8.0;
 /// Before a panel that shares the ordinate of its neighbour.
 const GAP: f64 = 16.0;

@@ -48,7 +48,7 @@ pub struct MapGrid {
     pub columns: usize,
     /// Text above each column, or above each panel; empty for none.
     pub titles: Vec<String>,
-    /// Name of the abscissa, such as `n_k^*`; after `_` or `^` stands one sign, or several in
+    /// Name of the abscissa, such as `n_k^*`; after `_` or `^` comes one sign, or several in
     /// braces.
     pub abscissa: String,
     /// Names of its places.
@@ -152,7 +152,7 @@ impl MapGrid {
         }
     }
 
-    /// The names of the places of an abscissa of this width: as many as stand apart.
+    /// The names of the places of an abscissa of this width: as many as are separate.
     fn x_names(&self, width: f64) -> Vec<String> {
         let names: Vec<String> = self.x_places.iter().map(|p| marked(p)).collect();
         let widest = names.iter().map(|n| draw::text_room(n, TEXT)).fold(0.0, f64::max);

@@ -81,7 +81,7 @@ pub fn shade(method: usize, level: usize, levels: usize) -> String {
     format!("#{r:02X}{g:02X}{b:02X}")
 }
 
-/// True when white stands out better than black on a colour `#rrggbb`: by contrast of luminance,
+/// True when white is prominent better than black on a colour `#rrggbb`: by contrast of luminance,
 /// below `L*` of 50.
 pub fn is_dark(colour: &str) -> bool {
     lightness(channels(colour)) < 50.0

@@ -38,7 +38,7 @@ impl Shaping {
     }
 }
 
-/// Where a filter stands.
+/// Position of a filter.
 #[derive(Debug, Clone)]
 pub(super) struct Shaped {
     state: Vec<f64>,

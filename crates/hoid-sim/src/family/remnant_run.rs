@@ -41,7 +41,7 @@ fn samples_of(scenario: &ResolvedFamilyScenario) -> usize {
     scenario.run_in_samples() + scenario.measurement_samples()
 }
 
-/// The remnant of a run, and where it stands.
+/// The remnant of a run, and its position.
 #[derive(Debug, Clone)]
 pub(super) struct RemnantRun {
     run: RunSeed,

@@ -2,7 +2,7 @@
 //!
 //! All runs of a person in a condition come first. Where nothing changes within them the family of operators is fitted
 //! to all of them at once ([`hoid_ident::family`]): the operator of the person. nk, and for Box-Jenkins nd and T_n, are
-//! one choice for all of them too (`run_orders`). Next to these stands a Box-Jenkins model of all runs with initial
+//! one choice for all of them too (`run_orders`). In addition there is a Box-Jenkins model of all runs with initial
 //! states of each, the delay that fits best, and the greatest order of the noise model that the manifest allows. In a
 //! closed loop a noise model that is too small biases the operator, and one run is too short for a great one.
 //!

@@ -1,7 +1,7 @@
 //! Names of files as patterns: `{subject}_{condition}_{run}*.csv`.
 //!
-//! A name in braces stands for one or more characters, as few as possible, `*` for any number of
-//! them; everything else stands for itself.
+//! A name in braces represents one or more characters, as few as possible, `*` for any number of
+//! them; everything else represents itself.
 
 use std::fmt;
 
@@ -88,7 +88,7 @@ impl Pattern {
         Ok(Self(parts))
     }
 
-    /// What the names stand for in a file name; none where it does not match.
+    /// What the names represent in a file name; none where it does not match.
     pub fn matches(&self, name: &str) -> Option<FileNameParts> {
         let mut found = FileNameParts::default();
         found_in(&self.0, name, &mut found).then_some(found)

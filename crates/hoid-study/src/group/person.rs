@@ -248,7 +248,7 @@ impl Person {
     }
 }
 
-/// Who and where, in words.
+/// Who and where, as text.
 pub(super) fn cell_name(subject: &str, condition: &str) -> String {
     if condition.is_empty() {
         subject.to_owned()
@@ -340,7 +340,7 @@ mod tests {
         let table = people_table(&[person.clone(), failed.clone()]);
         assert_eq!(people_of(&table), [person.clone(), failed.clone()]);
         assert_eq!((person.name().as_str(), failed.name().as_str()), ("P in c, run 3", "Q"));
-        // Nobody has a lead: no columns of it.
+        // No one has a lead: no columns of it.
         assert!(table.column("T_L").is_none() && table.column("T_I_low").is_some());
         person.parameters.clear();
         assert!(people_table(&[person]).column("tau_e").is_none());

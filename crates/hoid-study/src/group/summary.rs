@@ -10,7 +10,7 @@
 //! | `fits-failed` | note | other fits, which are rows with their reasons |
 //! | `condition-changes` | note | a condition that changes within its runs has no operator |
 //!
-//! One person whose data carry no information makes the group doubtful and not undetermined: the others stand.
+//! One person whose data carry no information makes the group doubtful and not undetermined: the others remain valid.
 
 use std::path::Path;
 

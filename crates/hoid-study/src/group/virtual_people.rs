@@ -91,7 +91,7 @@ pub fn simulate_people(
 ) -> Result<Manifest, StudyError> {
     experiment.check()?;
     VirtualFiles::refuse_another(directory)?;
-    // Nobody is written before everybody is found.
+    // No one is written before everybody is found.
     let mut people = Vec::new();
     for subject in 1..=experiment.subjects {
         for (place, plant) in (0..).zip(&experiment.plants) {

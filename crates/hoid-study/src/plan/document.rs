@@ -62,7 +62,7 @@ pub struct Cell {
     pub scenario: String,
     /// The condition from which it started, empty for none.
     pub condition: String,
-    /// What stands for the lists of its table.
+    /// What represents the lists of its table.
     pub axes: Vec<Axis>,
     /// The scenario, ready to be simulated.
     pub resolved: ResolvedScenario,

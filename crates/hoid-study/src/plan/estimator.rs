@@ -33,9 +33,9 @@ use super::{
 pub struct EstimatorCell {
     /// Its name in the plan.
     pub name: String,
-    /// The name, and what stands for the lists of its table.
+    /// The name, and what represents the lists of its table.
     pub label: String,
-    /// What stands for the lists.
+    /// What represents the lists.
     pub axes: Vec<Axis>,
     /// The estimator from whose VAF that of this one is counted.
     pub versus: Option<String>,

@@ -1,4 +1,4 @@
-//! Grids in TOML: where a list stands for a value, each of its entries is taken.
+//! Grids in TOML: where a list represents a value, each of its entries is taken.
 //!
 //! A table of a plan is taken apart into its leaves, `remnant.order = [1, 2]` and so on. A leaf
 //! with a list is an axis, unless a list is what the key wants. All combinations are formed, the
@@ -23,7 +23,7 @@ pub struct Variant {
     pub text: String,
     /// Line of the plan, from 1, of each line of `text`.
     pub lines: Vec<usize>,
-    /// What stands for the lists, in the order of the file.
+    /// What represents the lists, in the order of the file.
     pub axes: Vec<Axis>,
 }
 

@@ -14,7 +14,7 @@ use crate::{
 /// Numbers in memory at a time: 256 MB.
 pub(super) const BUDGET: usize = 1 << 25;
 
-/// Parts of each cell: where they stand and their numbers.
+/// Parts of each cell: its position and their numbers.
 pub(crate) type PartsOfCell<'a> = BTreeMap<usize, Vec<(&'a Path, u64)>>;
 
 /// Columns that report which cell and which estimator a row is about.

@@ -38,7 +38,7 @@ const DOUBT_S: f64 = 1.0;
 const PROTECTED_BIRTHS: f64 = 4.0;
 /// Age from which a hypothesis can report what changed, s.
 const SETTLED_S: f64 = 0.5;
-/// A hypothesis of up to this age stands for a change, s.
+/// A hypothesis of up to this age represents a change, s.
 const RECENT_S: f64 = 4.0;
 
 /// Births for one time at which other delays are proposed, how many of them, the odds of a change

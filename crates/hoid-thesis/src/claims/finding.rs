@@ -25,7 +25,7 @@ pub struct Finding {
     pub failed: usize,
     /// Cells in all; the others are undecided.
     pub of: usize,
-    /// The findings, in words.
+    /// The findings, as text.
     pub text: String,
 }
 

@@ -15,7 +15,7 @@ pub struct About {
     pub help: &'static str,
     /// Author, year, place.
     pub source: &'static str,
-    /// What it is reported that a recursion is not, in words; empty for nothing.
+    /// What it is reported that a recursion is not, as text; empty for nothing.
     pub told: &'static str,
 }
 

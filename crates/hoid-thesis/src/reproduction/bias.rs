@@ -102,7 +102,7 @@ impl Parameters {
 const LINEAR_WITHIN: f64 = 10.0;
 
 /// True for biases of up to thousands of times the value: the noise of a model of first order that
-/// stands for a remnant of higher order is not that of the remnant.
+/// represents a remnant of higher order is not that of the remnant.
 fn bends(model: Model, remnant_order: usize, letters: &str) -> bool {
     model == Model::First && remnant_order > 1 && matches!(letters, "innovation variance" | "T_n" | "K_n")
 }

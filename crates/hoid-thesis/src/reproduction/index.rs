@@ -119,7 +119,7 @@ impl IndexPage {
     }
 }
 
-/// A measured value in words: with its error, and its range over the cells where there are several.
+/// A measured value as text: with its error, and its range over the cells where there are several.
 fn measured(of: &Measured) -> String {
     let (value, error) = numbers::with_uncertainty(of.value, Some(of.error).filter(|error| *error > 0.0));
     let error = if of.error > 0.0 {

@@ -8,7 +8,7 @@
 //! | kind | what was observed |
 //! |---|---|
 //! | `start-explains-little` | VAF of the simulated start fit on its span below 20 % |
-//! | `not-convertible` | more than 5 % of the rows stand for no operator |
+//! | `not-convertible` | more than 5 % of the rows do not correspond to any operator |
 //! | `gain` | K_e and K_e_dot are both open (within two standard errors of zero) in most rows |
 //! | `undetermined-parameter` | K_e is; where K_e_dot alone is, they answer like a gain (a note) |
 //! | `neuromuscular-lag` | poles of no person, or omega_nm at its bound, in a quarter of the rows |

@@ -42,7 +42,10 @@ pub(super) fn operator_findings(trace: &Trace, operators: &[Operator]) -> Vec<Fi
     if lacking > NOT_CONVERTIBLE {
         let reason = operators.iter().find_map(|o| o.as_ref().err());
         let reason = reason.map_or(String::new(), |r| format!(", as {r}"));
-        let words = format!("{:.0} % of the rows stand for no operator{reason}", 100.0 * lacking);
+        let words = format!(
+            "{:.0} % of the rows do not correspond to any operator{reason}",
+            100.0 * lacking
+        );
         // A gain of zero in all rows is not a model of another form: nothing was found.
         let nothing = operators.iter().all(|o| matches!(o, Err(NotConvertible::ZeroGain)));
         all.push(match nothing {
@@ -96,7 +99,7 @@ pub(super) fn operator_findings(trace: &Trace, operators: &[Operator]) -> Vec<Fi
     all
 }
 
-/// A gain that changes its sign: nobody does, a channel that was turned over does.
+/// A gain that changes its sign: no one does, a channel that was turned over does.
 fn sign_finding(rows_with: &ShareOfRows<'_>) -> Option<Finding> {
     let beyond = |e: &Estimate, sign: f64| e.standard_error.is_some_and(|s| sign * e.value > 3.0 * s);
     let positive = rows_with(&|o| beyond(&o.k_e, 1.0));
@@ -113,7 +116,7 @@ fn sign_finding(rows_with: &ShareOfRows<'_>) -> Option<Finding> {
     })
 }
 
-/// A lead below zero: nobody has one; a gain and a lead that stand for a lag do.
+/// A lead below zero: no one has one; a gain and a lead that represent a lag do.
 fn lead_finding(rows_with: &ShareOfRows<'_>) -> Option<Finding> {
     let negative = rows_with(&leads_backwards);
     (negative > NEGATIVE_LEAD).then(|| {
@@ -141,7 +144,7 @@ fn gains_over_rows(rows_with: &ShareOfRows<'_>, remembers: bool) -> Option<Findi
         return Some(Finding::undetermined(
             "gain",
             format!(
-                "in {} of the rows no gain stands two standard errors from zero: there is too little response to e{why}",
+                "in {} of the rows no gain differs from zero by two standard errors: there is too little response to e{why}",
                 percent(both)
             ),
         ));

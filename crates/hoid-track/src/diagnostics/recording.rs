@@ -102,7 +102,7 @@ impl Trace {
     pub(super) fn not_followed(&self, record: &Record) -> Option<Finding> {
         let row = self.len().checked_sub(1)?;
         let operator = self.operator(row).ok()?;
-        // A gain and a lead that stand for another form answer otherwise than the estimate does.
+        // A gain and a lead that represent another form answer otherwise than the estimate does.
         if self.response_is_known && (is_open(&operator.k_e) || leads_backwards(&operator)) {
             return None;
         }
@@ -152,7 +152,7 @@ impl Trace {
         nothing.then(|| {
             Finding::doubt(
                 "last-row",
-                "at the end of the record no gain stands two standard errors from zero: report an earlier row",
+                "at the end of the record no gain differs from zero by two standard errors: report an earlier row",
             )
         })
     }
@@ -192,7 +192,7 @@ impl Trace {
     }
 }
 
-/// The first spans in words.
+/// The first spans as text.
 fn named(faults: &[TrackFault]) -> String {
     let one = |f: &TrackFault| format!("{} in {} at {:.2} to {:.2} s", f.kind, f.channel, f.from_s, f.to_s);
     let mut text = faults.iter().take(NAMED).map(one).collect::<Vec<_>>().join("; ");

@@ -1,4 +1,4 @@
-//! Whether the response is constant where the trace tells no change, and whether e answers to u.
+//! Whether the response is constant where the trace reports no change, and whether e answers to u.
 //!
 //! The gains of the basis and the delay are fitted to each stretch between two declared changes, and held against
 //! jumps, drifts and sways ([`hoid_ident::diagnostics::unsteady`]).
@@ -64,7 +64,7 @@ impl Trace {
         all
     }
 
-    /// The response goes another way than the trace tells. A method that forgets, or that has a model of how people
+    /// The response goes another way than the trace reports. A method that forgets, or that has a model of how people
     /// drift, does not report that they are constant between its changes.
     pub(super) fn unsteady_finding(&self, record: &Record) -> Option<Finding> {
         self.options().method.lag_of_basis_s()?;

@@ -22,7 +22,8 @@ fn judged(record: &Record, options: &TrackOptions) -> Verdict {
     track(record, options, 10).unwrap().verdict(record, None).unwrap()
 }
 
-/// The recursion of the text, without a guard, told 11.3293 ± .0096 rad/s of a person who had gone.
+/// The recursion of the text, without a guard, reported 11.3293 ± .0096 rad/s of a person who had
+/// gone.
 #[test]
 fn a_rest_from_which_is_learnt_is_a_doubt() {
     let record = simulated(Condition::C1);

@@ -40,7 +40,7 @@ hoid_model::named_choice!(GuardKind, "kind of fault", 9, {
 /// The actions taken.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum GuardAction {
-    /// Predictions stood in for the samples; the estimate stayed.
+    /// Predictions replaced the samples; the estimate stayed.
     Held,
     /// Held back at first, then taken as they came, as if nothing had been.
     Accepted,

@@ -26,9 +26,9 @@
 //! **Filters have settled** after the delay and [`SETTLE_S`]: the slowest poles of people's
 //! neuromuscular systems (omega zeta of 2 to 4 rad/s) leave less than 2 % after that time.
 //!
-//! A misfit, swapped channels or a larger level that last for [`GIVEN_UP_S`] are taken for the new usual: the recursion
-//! starts again from its start, and the default is learnt anew. When after that the signals are as they were before, so
-//! is the default. Silence has no end.
+//! A misfit, swapped channels or a larger level that last for [`GIVEN_UP_S`] are taken for the new typical level: the
+//! recursion starts again from its start, and the default is learnt again. When after that the signals are as they were
+//! before, so is the default. Silence has no end.
 //!
 //! | file | what it holds |
 //! |---|---|
@@ -84,7 +84,7 @@ const FLOOR: [f64; CHANNELS] = [0.3, 1e-3];
 /// A pulse of the hand takes no less, s, and goes no further, in units of the mean magnitude.
 const PULSE_S: f64 = 0.03;
 const PULSE: f64 = 6.0;
-/// A misfit or swapped channels of so long are the new usual, s.
+/// A misfit or swapped channels of so long are the new typical level, s.
 const GIVEN_UP_S: f64 = 120.0;
 
 /// Decision of the guard on a sample.
@@ -142,7 +142,7 @@ pub(crate) struct Guard {
     channels: [ChannelGuard; CHANNELS],
     profile: Profile,
     resting: Resting,
-    /// What was usual before it was learnt anew.
+    /// The typical values before it was learnt again.
     former: Profile,
     block: Block,
     in_block: u32,
@@ -204,9 +204,9 @@ impl State for Guard {
 }
 
 impl Guard {
-    /// A guard of a recursion at its start, with a delay of nk samples. What is usual is learnt from
-    /// the record of the start span, or where there is none from the first seconds, in which only
-    /// what is not a number is held back.
+    /// A guard of a recursion at its start, with a delay of nk samples. Typical values are learnt
+    /// from the record of the start span, or where there is none from the first seconds, in which
+    /// only what is not a number is held back.
     pub fn new(recursion: &mut dyn Recursion, nk: usize, span: Option<&Record>, sample_time: SampleTime) -> Self {
         let ts = sample_time.s();
         let longest = (LONGEST_S / ts).round().max(1.0) as u32;

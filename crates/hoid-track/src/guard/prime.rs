@@ -1,4 +1,4 @@
-//! What is usual, from the record of the start span.
+//! Typical values, from the record of the start span.
 //!
 //! Of each mean of a block ([`hoid_core::guard::profile`]) the median over all blocks is taken, and of each difference
 //! the largest of three estimates of its 99 % quantile: itself, and those that follow from the 50 and 95 % quantiles of

@@ -26,7 +26,7 @@ settings! {
     }
 }
 
-/// The default of the guard against windup, in words.
+/// The default of the guard against windup, as text.
 const WINDUP_GUARD: &str =
     "off for arx with a covariance and exponential forgetting (the text's recursion), else as for physical";
 

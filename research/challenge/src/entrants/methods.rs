@@ -2,7 +2,7 @@
 //!
 //! Where the delay is reported, it is given; where it is not, it is searched on the start span over
 //! the range that the program searches, the other orders as they are. H is the response that a row
-//! or a tracker tells.
+//! or a tracker reports.
 
 use hoid_ident::{
     OrderRanges,

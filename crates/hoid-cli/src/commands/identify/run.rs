@@ -149,7 +149,7 @@ fn prediction_ahead(fit: &Fit, records: &[Record], k: usize) -> Result<(usize, f
     Ok((k, vaf(&measured, &predicted), nrmse_fit(&measured, &predicted)))
 }
 
-/// The answer in words.
+/// The answer as text.
 fn sentence(found: &PolynomialAnswer<'_>) -> Option<String> {
     let of = found.operator.as_ref().ok().filter(|_| found.has_operator());
     let named = of.iter().flat_map(|o| o.rows()).map(|(name, _, e)| (name, e.value));

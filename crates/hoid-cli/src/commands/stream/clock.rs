@@ -101,9 +101,9 @@ impl Clock {
         }
     }
 
-    /// The rate of the times in Hz, where it is another than `--fs`: asked after each line, it answers
-    /// once in [`JUDGED`] lines. The median of the differences stands against single gaps, their
-    /// mean against times that are rounded; both have to be off.
+    /// The rate of the times in Hz, where it is another than `--fs`: asked after each line, it answers once in
+    /// [`JUDGED`] lines. The median of the differences is compared with single gaps, their mean against times that are
+    /// rounded; both have to be off.
     pub fn other_rate(&mut self) -> Option<f64> {
         if self.steps.len() < JUDGED {
             return None;

@@ -4,7 +4,7 @@
 //!
 //! | file | what it holds |
 //! |---|---|
-//! | `session` | the samples in their order, and where the recursion stands |
+//! | `session` | the samples in their order, and the state of the recursion |
 //! | `lines`, `clock` | what a line means, and its time |
 //! | `line` | one line of the output |
 //! | `datagram`, `udp` | binary samples and estimates; the socket |

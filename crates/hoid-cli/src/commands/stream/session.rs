@@ -1,4 +1,4 @@
-//! A stream: its samples in their order, and where the recursion stands.
+//! A stream: its samples in their order, and the state of the recursion.
 
 use std::collections::VecDeque;
 
@@ -150,7 +150,7 @@ impl Session {
     }
 
     /// Takes what came as a datagram, of which the samples that count for an answer are reported
-    /// one by one. What is not a sample is dropped: it may come from anybody.
+    /// one by one. What is not a sample is dropped: it may come from anyone.
     ///
     /// # Errors
     /// Those of the answers.
@@ -191,7 +191,7 @@ impl Session {
         Ok(())
     }
 
-    /// Where the recursion stands, as the answer to a binary sample.
+    /// State of the recursion, as the answer to a binary sample.
     pub fn estimate(&mut self, sequence: u32) -> EstimateDatagram {
         let answer = EstimateDatagram::new(sequence, self.t, &self.live, self.innovation, self.change.as_ref());
         self.change = None;

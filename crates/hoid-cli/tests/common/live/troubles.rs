@@ -84,7 +84,7 @@ fn until_answered(stream: &Stream, sent: usize, mut send: impl FnMut(usize)) -> 
     }
 }
 
-/// Answers that nobody takes are lost, samples are not.
+/// Answers that no one takes are lost, samples are not.
 pub fn reader_of_udp_stops(program: &Path, pause: Duration, draw: &mut Draw) -> Outcome {
     let stream = Stream::new(program, RATE, &[]);
     let mut send = |k: usize| {
@@ -159,7 +159,7 @@ pub fn stream_begins_again(program: &Path, draw: &mut Draw) -> Outcome {
     let (port, socket) = stream.killed();
     let mut refused = 0;
     for k in 100..150 {
-        // The system tells at the next call that nobody listens.
+        // The system reports at the next call that no one listens.
         refused += usize::from(socket.send(&datagram(k, draw)).is_err());
     }
     assert!(refused > 0);

@@ -8,11 +8,11 @@
 //!
 //! `r(t) = psi(t)' w(t)`, `w = v - a` in A and `-a` elsewhere, `a = G^-1 G_A v`
 //!
-//! and the statistic of the Lagrange multiplier (D. W. K. Andrews, *Econometrica* 61 (1993) 821-856)
-//! is `T = U / sqrt V`, `U = sum r eps`, whose sup over all A is judged. With blocks c and their
-//! `g_c = sum psi eps`, `G_c = sum psi psi'` everything follows from `h_c = w_c' g_c` and `R_c = w_c'
-//! G_c w_c`: `U = sum h_c`, `R = sum R_c`, and the change itself is `delta = U/R`. Exact information
-//! in A, and not a share of time, since nobody is excited evenly.
+//! and the statistic of the Lagrange multiplier (D. W. K. Andrews, *Econometrica* 61 (1993) 821-856) is
+//! `T = U / sqrt V`, `U = sum r eps`, whose sup over all A is judged. With blocks c and their `g_c = sum psi eps`,
+//! `G_c = sum psi psi'` everything follows from `h_c = w_c' g_c` and `R_c = w_c' G_c w_c`: `U = sum h_c`,
+//! `R = sum R_c`, and the change itself is `delta = U/R`. Exact information in A, and not a share of time, since no one
+//! is excited evenly.
 //!
 //! **V is the largest** of three. By the model, `sigma^2 R`. By the scatter of blocks of 2 s about
 //! the change that is tested, `sum (h_c - delta R_c)^2 n/(n-2)`, which holds whatever the residuals
@@ -31,7 +31,7 @@
 //! | `blocks` | scores and information of blocks of records |
 //! | `critical` | p-values of a supremum |
 //! | `polynomials` | the scores of a fit of polynomials, with that of the delay |
-//! | `search` | all changes, and the one that stands out |
+//! | `search` | all changes, and the one that is prominent |
 //! | `steadiness` | the same of columns that are known: jumps, drifts and sways |
 //! | `stretch` | the block that carries the fit |
 

@@ -1,4 +1,4 @@
-//! The change that stands out among all directions, records and instants.
+//! The change that is prominent among all directions, records and instants.
 
 use std::f64::consts::{FRAC_PI_4, TAU};
 

@@ -162,7 +162,7 @@ fn divide<R: Number>(zero: R, f: &[f64], x: &[f64], y: &mut [f64], at: usize) {
     divide_again(zero, f, &mut y[..end], at);
 }
 
-/// `y <- y/F` from place `at` on; before it stands what was divided already.
+/// `y <- y/F` from place `at` on; before it is what was divided already.
 #[inline(always)]
 fn divide_again<R: Number>(zero: R, f: &[f64], y: &mut [f64], at: usize) {
     let width = zero.lanes();

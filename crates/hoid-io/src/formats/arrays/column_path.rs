@@ -73,7 +73,7 @@ impl ColumnPath {
         matches!(&self.holds, Holds::Unread(what) if what.starts_with(OBJECT))
     }
 
-    /// Contents of it, in words.
+    /// Contents of it, as text.
     pub(crate) fn what(&self) -> String {
         match &self.holds {
             Holds::Numbers(numbers) => numbers.kind().name().to_owned(),

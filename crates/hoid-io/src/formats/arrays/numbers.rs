@@ -169,7 +169,7 @@ impl Numbers {
         (0..self.len).map(count).collect()
     }
 
-    /// The bytes of a number, the little end first, with zeros behind.
+    /// The bytes of a number, the little end first, followed by zeros.
     fn bytes_of(&self, at: usize) -> Option<[u8; 8]> {
         let size = self.kind.size();
         let from = self.start + at * self.step;

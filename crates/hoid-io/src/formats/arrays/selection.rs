@@ -180,7 +180,7 @@ fn column(name: &str, column_path: &ColumnPath, numbers: &Numbers) -> Column {
 
 /// Columns by the names that expressions may use.
 struct Named<'a> {
-    /// The paths, then the names that stand for one of them.
+    /// The paths, then the names that represent one of them.
     columns: Vec<(String, &'a ColumnPath)>,
 }
 

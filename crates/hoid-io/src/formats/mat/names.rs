@@ -6,7 +6,7 @@
 use crate::formats::arrays::{COMMENTS, Entry, Value};
 
 /// The variable that keeps the names that are not names of variables, each line a variable and the
-/// name it stands for.
+/// name it represents.
 pub(super) const NAMES: &str = "hoid_names";
 /// MATLAB cuts what is longer.
 const LONGEST_NAME: usize = 63;

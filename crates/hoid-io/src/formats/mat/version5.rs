@@ -75,7 +75,7 @@ struct Reader<'a> {
     file: &'a str,
 }
 
-/// Where something stands.
+/// Position of something.
 #[derive(Clone, Copy)]
 struct VariablePath<'a> {
     /// The structure around it; empty at top level.

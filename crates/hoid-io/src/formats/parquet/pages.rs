@@ -1,6 +1,6 @@
 //! What the pages of a column unpack to, before any of them is unpacked.
 //!
-//! The footer states how long a column is when unpacked, each page states it again in its header, and nobody has to be
+//! The footer states how long a column is when unpacked, each page states it again in its header, and no one has to be
 //! right: a page of a few kB may state 2 GB, which Snappy and LZ4 then fill with zeros, and gzip unpacks until it ends,
 //! whatever was stated. So the headers are read here first, in the compact protocol of Thrift
 //! (<https://github.com/apache/thrift/blob/master/doc/specs/thrift-compact-protocol.md>): a field is a byte

@@ -2,12 +2,11 @@
 //! (Kothe et al., "The Lab Streaming Layer for synchronized multimodal recording", 2024; pyxdf
 //! 1.17).
 //!
-//! The offset `o_k` of the recorder's clock was measured at the times `c_k`. A line
-//! `o = b_0 + b_1 c` is fitted under Huber's loss by the alternating direction method of
-//! multipliers (Boyd et al., 2011, section 6.1.1), in units of 1e-4 s, so that a measurement over a
-//! busy network counts little. Then `t <- t + b_0 + b_1 t`. Where the clock was set anew, each part
-//! has a line of its own. At last, of a stream with a nominal rate, the time stamps between two
-//! breaks are replaced by their least-squares line over the number of the sample.
+//! The offset `o_k` of the recorder's clock was measured at the times `c_k`. A line `o = b_0 + b_1 c` is fitted under
+//! Huber's loss by the alternating direction method of multipliers (Boyd et al., 2011, section 6.1.1), in units of 1e-4
+//! s, so that a measurement over a busy network counts little. Then `t <- t + b_0 + b_1 t`. Where the clock was set
+//! again, each part has a line of its own. At last, of a stream with a nominal rate, the time stamps between two breaks
+//! are replaced by their least-squares line over the number of the sample.
 //!
 //! Beyond pyxdf, lost samples are a break as well: a step of more than [`LOST_SAMPLES`] nominal sample times `T` after
 //! which the time stamps stay late, even after as many samples as are late, by the medians of `t_k - k T` on both
@@ -47,7 +46,7 @@ pub(super) fn times(stream: &Stream, notes: &mut Vec<String>) -> Vec<f64> {
         0 => String::from("no clock offsets were recorded: its time stamps are taken for those of the recorder"),
         1 => format!("clock aligned by a line through {} offsets", stream.offsets.len()),
         parts => format!(
-            "clock aligned by {parts} lines through {} offsets, for it was set anew",
+            "clock aligned by {parts} lines through {} offsets, for it was set again",
             stream.offsets.len()
         ),
     };

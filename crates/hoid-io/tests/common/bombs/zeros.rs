@@ -5,7 +5,7 @@ use flate2::{Compress, Compression, Crc, FlushCompress};
 
 /// A megabyte.
 pub const MEGABYTE: usize = 1 << 20;
-/// What is read takes no more: after it nobody comes to the sum.
+/// What is read takes no more: after it no one comes to the sum.
 const SUMMED: usize = 100;
 
 /// Deflated: so many megabytes of zeros after a start.

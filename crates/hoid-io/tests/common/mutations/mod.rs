@@ -1,5 +1,5 @@
 //! Files that were damaged on purpose, and what each reader has to make of them: values, or an error
-//! in words, within a second and 300 MB, and never a panic.
+//! as text, within a second and 300 MB, and never a panic.
 //!
 //! Case `k` of a seed is the same bytes on every machine: a good file is drawn, then some mutations
 //! of it. Formats that keep checksums over what is compressed are taken apart first and packed

@@ -50,7 +50,7 @@ impl Reader {
             None => "the end".to_owned(),
         };
         Err(format!(
-            "at character {} stands {found}, expected {expected}; {EXAMPLES}",
+            "at character {} there is {found}, expected {expected}; {EXAMPLES}",
             self.at + 1
         ))
     }
@@ -190,7 +190,7 @@ impl Reader {
         self.depth += 1;
         if self.depth > DEEPEST {
             return Err(format!(
-                "more than {DEEPEST} parentheses stand inside of each other at character {opened}; {EXAMPLES}"
+                "more than {DEEPEST} parentheses are nested at character {opened}; {EXAMPLES}"
             ));
         }
         let inside = self.sum()?;

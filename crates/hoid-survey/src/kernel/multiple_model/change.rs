@@ -10,7 +10,7 @@
 //! all others, or the delay, by three standard errors.
 //!
 //! The likeliest of the recent hypotheses assumes since when, and what held before: the change of each quantity over
-//! its standard error tells in what the operator changed. For the innovation variance that is `ln(s2/s1)/sqrt(2/n)`
+//! its standard error reports in what the operator changed. For the innovation variance that is `ln(s2/s1)/sqrt(2/n)`
 //! with the n samples since.
 
 use super::{
@@ -101,7 +101,7 @@ impl ChangeDetector {
         self.log_odds > 0.0 && before <= 0.0
     }
 
-    /// Declares the change that the likeliest of the recent hypotheses stands for, once it has
+    /// Declares the change that the likeliest of the recent hypotheses represents, once it has
     /// settled and if there is something new in it.
     fn declare(&mut self, sums: &Sums<'_>, hypotheses: &[Option<Hypothesis>], now: u64, prior: &ChangePrior) {
         let Some(h) = sums.likeliest.filter(|h| now - h.born >= prior.settling_time) else {
@@ -175,8 +175,8 @@ fn log_odds(probability: f64, of_others: f64) -> f64 {
     libm::log((probability + REGULARISATION) / (of_others + REGULARISATION))
 }
 
-/// True for a hypothesis within the change window. The first, born at sample 0, stands for no
-/// change.
+/// True for a hypothesis within the change window. The first, born at sample 0, does not correspond
+/// to any change.
 fn is_recent(h: &Hypothesis, now: u64, prior: &ChangePrior) -> bool {
     h.born > 0 && now - h.born < prior.change_window
 }
@@ -195,7 +195,7 @@ pub(super) fn delay_of<'a>(hypotheses: impl Iterator<Item = &'a Hypothesis>) -> 
     [mean, (second / sum - mean * mean).max(0.0) + 1.0 / 12.0]
 }
 
-/// The change that a hypothesis stands for, with the delay after it.
+/// The change that a hypothesis represents, with the delay after it.
 fn change_of(h: &Hypothesis, delay: [f64; 2], now: u64, log_odds: f64) -> Change {
     let (before, after) = (h.before, Snapshot { delay, ..h.snapshot() });
     let samples_ago = now - h.born;

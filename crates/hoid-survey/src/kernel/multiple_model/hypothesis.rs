@@ -195,7 +195,7 @@ impl Hypothesis {
     /// where they are known no better than after a change.
     pub fn drift(&mut self, now: u64, prior: &ChangePrior) {
         let scales = self.gain_scales(prior);
-        // The first, born at sample 0, stands for no change.
+        // The first, born at sample 0, does not correspond to any change.
         let transient = match self.born {
             0 => 0.0,
             born => exp(-((now - born) as f64) / prior.transient_time_constant),

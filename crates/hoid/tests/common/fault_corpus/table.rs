@@ -45,7 +45,7 @@ impl Table {
         [&mut self.e, &mut self.u].into_iter().chain(self.d.as_mut())
     }
 
-    /// Counts the time anew, as a recorder does that knows nothing of rows that are gone or twice.
+    /// Counts the time again, as a recorder does that knows nothing of rows that are gone or twice.
     pub fn renumber(&mut self) {
         let (n, h) = (self.e.len(), self.h);
         self.t = (0..n).map(|k| k as f64 * h).collect();

@@ -82,7 +82,7 @@ pub struct Reference {
     innovation: f64,
     pub held: u64,
     pub restarts: u64,
-    /// What the guard told of the run without a fault.
+    /// The report of the guard of the run without a fault.
     pub events: Vec<GuardEvent>,
 }
 
