@@ -143,7 +143,7 @@ def test_a_description_is_that_of_the_program(
         assert written["verdict"][key] == printed["verdict"][key]
     assert (found.verdict, found.reasons) == (printed["verdict"]["level"], printed["verdict"]["reasons"])
     if how == "spikes":
-        assert found.faults, "they were looked for and bridged"
+        assert found.faults, "they were searched for and bridged"
 
 
 def test_a_trace_hears_of_its_channels(

@@ -81,7 +81,7 @@ def test_what_a_fit_holds(found: pyhoid.OperatorFit) -> None:
     shape = found.loop_shape
     assert shape is not None and shape["stable"] is True
     lowest = shape["crossovers"][0]
-    # The shape is that of the form in front, the crossover the mean over forms.
+    # The shape is that of the best form, the crossover the mean over forms.
     assert abs(lowest[0].value - crossover.value) < 2 * (crossover.standard_error or 0.0)
     assert lowest[1].standard_error > 0
     assert shape["gain_margin_db"].value > 0 and shape["gain_margin_db"].standard_error > 0
@@ -115,7 +115,7 @@ def test_the_polynomials_are_the_same_model(found: pyhoid.OperatorFit) -> None:
     crossover = found.open_loop and found.open_loop["crossover_rad_s"]
     assert crossover
     response = found.fit.frequency_response([crossover.value]).response[0]
-    # The crossover is the mean over forms, the polynomials are of the form in front.
+    # The crossover is the mean over forms, the polynomials are of the best form.
     front = next(row["weight"] for row in found.forms if row["form"] == found.form)
     off = 1e-3 if front == 1.0 else 2 * (crossover.standard_error or 0.0) / crossover.value
     assert abs(response) / crossover.value == pytest.approx(1.0, rel=off)

@@ -1,9 +1,8 @@
 //! What the crates of the workspace may bring with them, with all features, by `cargo metadata`: licences, crates that
 //! are not wanted, one version of each, and not more of them than there are reasons for.
 //!
-//! An expression of licences is one of SPDX (Annex D: `OR` binds less than `AND`, that less than
-//! `WITH`), with the `/` of older manifests for `OR`. Advisories need the network and are looked at
-//! by the hosted workflows.
+//! An expression of licences is one of SPDX (Annex D: `OR` binds less than `AND`, that less than `WITH`), with the `/`
+//! of older manifests for `OR`. Advisories need the network and are examined by the hosted workflows.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -133,7 +132,7 @@ fn packages(metadata: &Value) -> Vec<Package> {
             name: text(&value["name"])?,
             version: text(&value["version"])?,
             licence: text(&value["license"]),
-            // Those of the workspace have none.
+            // The entries of the workspace have none.
             source: text(&value["source"])?,
         })
     };
@@ -166,7 +165,7 @@ fn licence_of(package: &Package) -> Option<String> {
     }
 }
 
-/// Whether an expression lets hoid hand the crate on; none where it cannot be read.
+/// Whether an expression lets hoid hand the crate on; none if it cannot be read.
 fn allows(expression: &str) -> Option<bool> {
     let spaced = expression.replace('/', " OR ").replace('(', " ( ").replace(')', " ) ");
     let words: Vec<&str> = spaced.split_whitespace().collect();

@@ -116,7 +116,7 @@ struct Slow {
     example: &'static str,
     /// The package whose program it runs.
     program: Option<&'static str>,
-    /// `release`; `dev` where sums that overflow are looked for, as in the tests; what is shipped where its times are
+    /// `release`; `dev` where sums that overflow are searched for, as in the tests; what is shipped where its times are
     /// reported.
     profile: &'static str,
 }

@@ -63,7 +63,7 @@ pub fn target_directory() -> PathBuf {
     env::var_os("CARGO_TARGET_DIR").map_or_else(|| root.join("target"), |named| root.join(named))
 }
 
-/// The targets that Rust can build for here; none where rustup is not at hand.
+/// The targets that Rust can build for here; none if rustup is not at hand.
 pub fn installed_targets() -> Vec<String> {
     let told = output(Command::new("rustup").args(["target", "list", "--installed"])).unwrap_or_default();
     told.lines().map(str::to_owned).collect()

@@ -21,7 +21,7 @@ pub fn other_processors(profile: &str) -> Result<(), String> {
     Ok(())
 }
 
-/// Builds the C ABI for WebAssembly by this profile; where it is, nothing where the target is not installed.
+/// Builds the C ABI for WebAssembly by this profile; where it is, nothing if the target is not installed.
 pub fn webassembly(profile: &str) -> Result<Option<PathBuf>, String> {
     if !is_there(WASM) {
         return Ok(None);
@@ -36,7 +36,7 @@ pub fn webassembly(profile: &str) -> Result<Option<PathBuf>, String> {
         "--target",
         WASM,
     ];
-    // Of the tests' profile with its symbols, or what runs at build time would be compiled once more.
+    // For the tests' profile with its symbols, or what runs at build time would be compiled once more.
     let stripped = format!("profile.{SHIPPED}.strip=true");
     cargo(&[&build[..], &["--config", &stripped]].concat(), &[])?;
     let folder = if profile == "dev" { "debug" } else { profile };

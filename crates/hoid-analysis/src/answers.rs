@@ -157,7 +157,7 @@ impl Answers for SigmoidFit {
     }
 }
 
-/// Of polynomials: the response, and the operator that they represent.
+/// For polynomials: the response, and the operator that they represent.
 pub(crate) fn of_operator(fit: &Fit) -> Vec<Answered> {
     let mut all = vec![answered(RESPONSE, None)];
     if let Ok(operator) = fit.operator() {

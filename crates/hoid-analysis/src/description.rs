@@ -46,8 +46,9 @@ impl Excitation {
 }
 
 impl Recordings {
-    /// The describing function of the recordings as they are used. Where an offset has cost rows, so that less
-    /// than whole periods are left, they are read without it: it is a phase of what is periodic. `None` where no excitation is wanted.
+    /// The describing function of the recordings as they are used. Where an offset has cost rows, so that less than
+    /// whole periods are left, they are read without it: it is a phase of what is periodic. `None` if no excitation is
+    /// wanted.
     ///
     /// # Errors
     /// [`AnalysisError`], where there are no lines, or the files cannot be read again.
@@ -93,7 +94,7 @@ impl Recordings {
     }
 }
 
-/// What a fit next to the lines is reported of them: what was looked for by name is missed, what was looked for by
+/// What a fit next to the lines is reported of them: what was searched for by name is missed, what was searched for by
 /// itself is not.
 pub(crate) fn of_lines(
     described: &Result<Option<Description>, AnalysisError>,

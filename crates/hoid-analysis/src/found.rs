@@ -1,5 +1,5 @@
-//! Findings in a recording, in one form: faults that were looked for, and trouble of channels and their time. JSON and
-//! Python show this list.
+//! Findings in a recording, in one form: faults that were searched for, and trouble of channels and their time. JSON
+//! and Python show this list.
 
 use hoid_io::QualityIssue;
 use hoid_model::Fault;
@@ -14,7 +14,7 @@ pub struct FoundFault {
     pub kind: &'static str,
     /// The channel; empty for all channels and for the time.
     pub channel: String,
-    /// Time of its first sample, s; none where there is no time.
+    /// Time of its first sample, s; none if there is no time.
     #[serde(rename = "from")]
     pub from_s: Option<f64>,
     /// Time of the sample after its last, s.

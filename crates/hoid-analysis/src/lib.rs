@@ -11,10 +11,10 @@
 //!
 //! | step of [`Identification::run`] | rules |
 //! |---|---|
-//! | a file is looked at, before anything is chosen | `look` |
+//! | a file is examined, before anything is chosen | `look` |
 //! | files are read (before it) | `files`, `reading`; kept with the processing of them in `recordings` |
 //! | runs that are given twice are refused | `copies` |
-//! | faults are looked for and repaired, channels are judged | `repair`, `quality` |
+//! | faults are searched for and repaired, channels are judged | `repair`, `quality` |
 //! | a high rate is lowered | `rate` |
 //! | the describing function, where the excitation is recorded | `description`, `offset` |
 //! | the fit, a second opinion, the loop, the settings of the estimator | `estimators`: a file each |

@@ -23,7 +23,7 @@ const COARSE: [f64; 2] = [0.05, 0.15];
 /// Longest gap that may be bridged by a straight line, s.
 const BRIDGED_S: f64 = 0.25;
 
-/// Whose record is judged.
+/// The person whose record is judged.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Of {
     /// A person, who answers what they see.

@@ -11,7 +11,7 @@ impl Recordings {
     /// only where a factor was named, and not where the rate was named in reading.
     ///
     /// # Errors
-    /// Those of the decimation.
+    /// The entries of the decimation.
     pub fn at_rate(mut self, decimation: Decimation, counts_samples: bool) -> Result<Self, AnalysisError> {
         if self.settles_the_rate() {
             return Ok(self);
@@ -35,7 +35,7 @@ impl Recordings {
         source.is_some_and(|source| source.reading.settles_the_rate())
     }
 
-    /// By how much e was moved with its rate, for a hold that is longer than the one it was recorded behind, s.
+    /// Amount by which e was moved with its rate, for a hold that is longer than the one it was recorded behind, s.
     pub(crate) fn input_lead_s(&self) -> f64 {
         let mut steps = self.accounts.iter().flat_map(|account| &account.steps);
         let lead = steps.find_map(|step| match step {

@@ -15,7 +15,7 @@ pub struct Account {
     pub steps: Vec<Step>,
     /// Problems with channels and their time as they were recorded.
     pub quality_issues: Vec<QualityIssue>,
-    /// Faults that were looked for, and the actions taken about them.
+    /// Faults that were searched for, and the actions taken about them.
     pub faults: Vec<Fault>,
     /// The report about any result.
     pub findings: Vec<Finding>,
@@ -40,7 +40,7 @@ pub struct Recordings {
 
 impl Recordings {
     /// Records that were not read from files here, called by their labels, else by their number. Problems with their
-    /// channels is looked for in them.
+    /// channels is searched for in them.
     pub fn of_records(records: impl IntoIterator<Item = Record>) -> Self {
         let mut all = Self::default();
         for record in records {

@@ -108,7 +108,7 @@ impl ResolvedRequest {
         self.structure().is_none_or(Structure::has_input)
     }
 
-    /// Sets an option by its name; false where it is none of its own.
+    /// Sets an option by its name; false if it is none of its own.
     ///
     /// # Errors
     /// [`AnalysisError`] for a text that is not a value of it.

@@ -13,7 +13,7 @@ pub struct Setting {
     pub name: String,
     /// The value that was used.
     pub value: String,
-    /// True where it is another than the default, so that someone gave it.
+    /// True if it is another than the default, so that someone gave it.
     pub given: bool,
 }
 

@@ -63,7 +63,7 @@ fn coloured(page: &str) -> String {
 /// Narrowest and widest line of a page: below, words are cut; above, the eye loses the line.
 const WIDTHS: (usize, usize) = (60, 110);
 
-/// Columns of the screen: those of `COLUMNS`, else of the terminal; none where a page goes into a
+/// Columns of the screen: those of `COLUMNS`, else of the terminal; none if a page goes into a
 /// file, which keeps its lines whole.
 pub fn width() -> Option<usize> {
     let told = std::env::var("COLUMNS").ok().and_then(|text| text.parse().ok());
@@ -185,7 +185,7 @@ pub fn progress(total: usize, what: &str) -> ProgressBar {
 }
 
 /// Does work that may last, with the time since its start on standard error, and a bar with the
-/// time left as soon as it reports how far it is; nothing where standard error is not a terminal.
+/// time left as soon as it reports how far it is; nothing if standard error is not a terminal.
 pub fn watched<T>(what: &'static str, work: impl FnOnce() -> T) -> T {
     let bar = ProgressBar::new_spinner().with_message(what);
     if let Ok(style) = ProgressStyle::with_template("{spinner} {msg}, {elapsed}") {

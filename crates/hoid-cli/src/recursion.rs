@@ -60,7 +60,7 @@ pub fn tracking(args: &TrackArgs) -> Result<Tracking, CliError> {
 /// Searches the orders that a plan leaves open, and shows how far it is.
 ///
 /// # Errors
-/// Those of the search.
+/// The entries of the search.
 pub fn choose(plan: &TrackPlan, span: &Record) -> Result<(TrackOptions, Option<Choice>), IdentError> {
     searching(plan, |each| plan.choose(span, each))
 }

@@ -15,7 +15,7 @@ fn kind_as_text(kind: Kind) -> String {
         Kind::Flag => "flag".to_owned(),
         Kind::Count => "whole number".to_owned(),
         Kind::Number => "number".to_owned(),
-        Kind::NumberOrDefault(default) => format!("number; {default} where none is given"),
+        Kind::NumberOrDefault(default) => format!("number; {default} if none is given"),
         Kind::Counts => "whole number or `LO..HI`".to_owned(),
         Kind::NumberOrSpan => "number or `LO..HI`".to_owned(),
         Kind::Delay => "samples (`29`, `20..40`) or seconds (`0.28s`, `0.1s..0.4s`)".to_owned(),
@@ -137,7 +137,7 @@ struct Keywords<'a> {
 }
 
 impl<'a> Keywords<'a> {
-    /// Those of the methods, without what Python has in another way.
+    /// The entries of the methods, without what Python has in another way.
     fn of(methods: &'a [MethodSpec], without: &[&str]) -> Self {
         let mut settings: Vec<(&Setting, Vec<&str>)> = Vec::new();
         for spec in methods {

@@ -29,7 +29,7 @@ const FIXED_BLANK: &str = "\u{a0}";
 pub struct Rows {
     header: Vec<String>,
     rows: Vec<Vec<String>>,
-    /// True where rows are instants of one course.
+    /// True if rows are instants of one course.
     course: bool,
 }
 
@@ -51,7 +51,7 @@ impl Rows {
         self.rows.push(cells.into_iter().map(Into::into).collect());
     }
 
-    /// The table on a screen of so many columns; of any width without.
+    /// The table on a screen of a given number of columns; of any width without.
     fn on(&self, width: Option<usize>) -> String {
         let whole = self.drawn(None);
         let Some(width) = width else { return whole };
@@ -66,8 +66,7 @@ impl Rows {
         }
     }
 
-    /// A course with its times above and its names before, for a narrow screen; none where not even the
-    /// last fits.
+    /// A course with its times above and its names before, for a narrow screen; none if not even the last fits.
     fn on_its_side(&self, width: usize) -> Option<String> {
         let last = self.rows.len().checked_sub(1).filter(|_| self.course)?;
         (1..=self.rows.len()).rev().find_map(|count| {

@@ -139,7 +139,7 @@ fn a_virtual_experiment_is_analysed_and_reported() {
                 measure["standard_error"].as_f64().unwrap(),
             );
             let end = |i: usize| measure["interval"][i].as_f64().unwrap();
-            // Of a mixture over forms, so that it need not be symmetric.
+            // For a mixture over forms, so that it need not be symmetric.
             assert!(error > 0.0 && end(0) < value && value < end(1), "{measure}");
             assert!(end(1) - end(0) > 2.0 * 1.96 * error, "{measure}");
         }

@@ -518,7 +518,7 @@ fn a_simulation_with_little_noise_is_identified() {
             (&"lead".into(), &"trustworthy".into()),
             "{level}"
         );
-        // Of a gain: 0.3 sqrt(share), and some rounding.
+        // For a gain: 0.3 sqrt(share), and some rounding.
         let allowed = 0.3 * level.parse::<f64>().unwrap().sqrt();
         for (name, expected) in [("K_e", 0.09), ("K_e_dot", 0.036), ("tau_e", 0.28)] {
             let value = found["operator"][name]["value"].as_f64().unwrap();

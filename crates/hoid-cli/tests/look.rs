@@ -97,7 +97,7 @@ fn one_file_has_one_reading() {
         let found = json(at, &[&command[..], &["--from", "3", "--to", "43", "--json"]].concat());
         assert_eq!(found["records"][0]["samples"], 2400, "{verb}");
     }
-    // What was typed is replaced; of another name a near one is looked for.
+    // What was typed is replaced; of another name a near one is searched for.
     let (_, message) = bad(at, &["identify", file, "--input", "R"]);
     assert!(message.contains("did you mean \"r\"?"), "{message}");
     let (_, message) = bad(at, &["identify", file, "--input=e", "--output", "u"]);

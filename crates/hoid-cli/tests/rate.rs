@@ -246,7 +246,7 @@ fn a_stream_at_1000_hz_is_the_track() {
     let directory = TempDir::new().unwrap();
     let at = directory.path();
     let file = simulate(at, "lead", 1000.0, 1);
-    // Of any worth: 20 s are few.
+    // For any worth: 20 s are few.
     hoid(at, &["track", &file, "--to", "20", "--out", "trace.csv"]);
     let text = fs::read_to_string(at.join(&file)).unwrap();
     let rows: Vec<&str> = text
@@ -283,7 +283,7 @@ fn a_stream_at_1000_hz_is_the_track() {
     assert!((0.1..0.2).contains(&behind_s), "{behind_s}");
     let told = String::from_utf8(output.stderr).unwrap();
     assert!(told.contains("filtered and decimated by 10 to 100 Hz"), "{told}");
-    // Of the same sample the digits are those of the track.
+    // For the same sample the digits are those of the track.
     let trace = fs::read_to_string(at.join("trace.csv")).unwrap();
     let mut table = trace.lines().filter(|line| !line.starts_with('#'));
     let names: Vec<&str> = table.next().unwrap().split(',').collect();

@@ -29,7 +29,7 @@ const FIT: [&str; 8] = [
     "nd=1",
 ];
 
-/// Standard output on a screen of so many columns.
+/// Standard output on a screen of a given number of columns.
 fn at_width(directory: &Path, columns: &str, arguments: &[&str]) -> String {
     let output = Command::new(env!("CARGO_BIN_EXE_hoid"))
         .args(arguments)

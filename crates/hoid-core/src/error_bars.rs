@@ -79,7 +79,7 @@ pub trait ErrorPropagation<const N: usize, const K: usize>: State {
     fn propagate(&mut self, layout: &ErrorLayout, rows: &Sensitivities<N, K>);
     /// Adds the variance by which parameter i drifts in a sample, up to `bound`.
     fn add_drift(&mut self, i: usize, variance: f64, bound: f64);
-    /// Innovation variance sigma^2; `None` where it is not estimated.
+    /// Innovation variance sigma^2; `None` if it is not estimated.
     fn variance(&self) -> Option<f64>;
 }
 

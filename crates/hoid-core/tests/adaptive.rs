@@ -202,7 +202,7 @@ fn a_steep_remnant_is_no_harder_than_a_flat_one() {
         }
         precision.push((variance[0] + variance[1]).sqrt());
     }
-    // Of the same power, with less of it where the response is.
+    // For the same power, with less of it where the response is.
     assert!(precision[1] < 2.0 * precision[0], "{precision:?}");
 }
 

@@ -35,7 +35,7 @@ const ALL_PRIOR: f64 = 0.9;
 pub struct PooledPerson {
     /// Who.
     pub subject: String,
-    /// What their own data show, with the standard error; none where that is nothing.
+    /// What their own data show, with the standard error; none if that is nothing.
     pub own: Option<(f64, f64)>,
     /// The estimate from all.
     pub value: f64,
@@ -67,7 +67,7 @@ pub struct PooledParameter {
 pub struct Population {
     /// The condition.
     pub condition: String,
-    /// The form of its people; none where they differ.
+    /// The form of its people; none if they differ.
     pub form: Option<String>,
     /// Its parameters.
     pub parameters: Vec<PooledParameter>,
@@ -146,7 +146,7 @@ fn data(parameter: &Parameter, prior: &OperatorPrior) -> Option<Observation> {
 
 fn pooled((name, unit): (&str, &str), own: &[(&str, Option<Observation>)]) -> Result<PooledParameter, CompareError> {
     let known: Vec<Observation> = own.iter().filter_map(|(_, o)| *o).collect();
-    // Of two people a variance between them is not known at all.
+    // For two people a variance between them is not known at all.
     if known.len() < LEAST_PEOPLE {
         return Err(CompareError::TooFew {
             found: known.len(),

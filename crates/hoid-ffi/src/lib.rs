@@ -2,7 +2,7 @@
 //!
 //! The one crate of the workspace with unsafe code. What is unsafe about a C boundary is that pointers are trusted, so
 //! that is all the unsafe code does: `boundary` reads texts and writes results through pointers of the caller, and
-//! nothing else dereferences one. After it comes the safe `session`, which knows nothing of C.
+//! nothing else dereferences one. After it comes the safe `session`, which has no information about C.
 //!
 //! Three rules hold for every function:
 //!

@@ -150,7 +150,7 @@ fn object(text: &str) -> Result<Map<String, Value>, Failure> {
     })
 }
 
-/// Takes an option out; none where it is not there or null.
+/// Takes an option out; none if it is not there or null.
 fn taken<T>(
     options: &mut Map<String, Value>,
     name: &str,
@@ -220,7 +220,7 @@ fn range(value: &Value, name: &str) -> Result<RangeInclusive<usize>, String> {
     }
 }
 
-/// A value as the command line writes it; none where it carries no information.
+/// A value as the command line writes it; none if it carries no information.
 fn text(value: &Value) -> Option<String> {
     Some(match value {
         Value::Null | Value::Bool(false) => return None,

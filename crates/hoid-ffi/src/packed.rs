@@ -62,7 +62,7 @@ pub(crate) fn as_bytes(numbers: &[f64]) -> Vec<u8> {
     numbers.iter().flat_map(|number| number.to_le_bytes()).collect()
 }
 
-/// The numbers of bytes; none where there are some left.
+/// The numbers of bytes; none if there are some left.
 pub(crate) fn as_numbers(bytes: &[u8]) -> Option<Vec<f64>> {
     let (numbers, []) = bytes.as_chunks::<8>() else {
         return None;

@@ -1,5 +1,5 @@
-//! A tracker as it was asked for, from its warm-up on. Nothing here knows of C, but for the names,
-//! which C wants to keep.
+//! A tracker as it was asked for, from its warm-up on. Nothing here knows of C, except for the
+//! names, which C wants to keep.
 
 use std::ffi::{CStr, CString};
 

@@ -32,7 +32,7 @@ pub struct HoidEstimate {
     pub unit: *const c_char,
     /// The value.
     pub value: f64,
-    /// Its standard error; NaN where there is none.
+    /// Its standard error; NaN if there is none.
     pub standard_error: f64,
     /// 1 where the data determine it, 0 where they do not, -1 where that is not judged.
     pub determined: i32,
@@ -58,11 +58,11 @@ pub struct HoidShift {
     pub name: *const c_char,
     /// Value before the change.
     pub before: f64,
-    /// Its standard error; NaN where there is none.
+    /// Its standard error; NaN if there is none.
     pub before_standard_error: f64,
     /// Value after the change.
     pub after: f64,
-    /// Its standard error; NaN where there is none.
+    /// Its standard error; NaN if there is none.
     pub after_standard_error: f64,
     /// The change over its standard error; for the remnant that of the logarithm.
     pub z: f64,

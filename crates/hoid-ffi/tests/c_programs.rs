@@ -24,7 +24,7 @@ fn built(name: &str, with: &str, options: &[&str]) -> Option<(TempDir, PathBuf)>
     Some((folder, program))
 }
 
-/// Value and error of each, NaN where there is none.
+/// Value and error of each, NaN if there is none.
 fn numbers(estimates: &[Option<Estimate>]) -> Vec<f64> {
     let pair = |e: &Option<Estimate>| {
         let value = e.map_or(f64::NAN, |e| e.value);

@@ -479,7 +479,7 @@ fn a_unit_by_every_function_of_fmi_3() {
     assert!(told.iter().all(|(status, text)| *status == 3 && !text.is_empty()) && told.len() > 4);
 }
 
-/// What the library hands out is above, but for what answers with an error whatever it is given.
+/// What the library hands out is above, except for what answers with an error whatever it is given.
 #[test]
 #[cfg_attr(miri, ignore = "it reads sources, not memory of a caller")]
 fn no_function_is_left_out() {

@@ -46,8 +46,7 @@ impl Root {
     }
 }
 
-/// Crossover and margins of an open loop with their uncertainty; `None` where there is no
-/// crossover.
+/// Crossover and margins of an open loop with their uncertainty; `None` if there is no crossover.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MarginEstimates {
     /// Gain crossover frequency omega_c in rad/s.

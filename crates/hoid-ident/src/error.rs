@@ -34,7 +34,7 @@ pub enum IdentError {
         label: String,
         /// Its sample time, s.
         found: f64,
-        /// That of the first record, s.
+        /// The value for the first record, s.
         expected: f64,
     },
     /// Fewer residuals than unknowns.

@@ -55,7 +55,7 @@ pub struct Estimator {
     pub loss: Loss,
     /// Purpose of the model. Default: prediction.
     pub focus: Focus,
-    /// True where u of each record has a constant that is not a response to e, an unknown as its initial states are
+    /// True if u of each record has a constant that is not a response to e, an unknown as its initial states are
     /// ([`crate::level`]); not with initial states of zero. Default false.
     pub level: bool,
     /// True when A must be stable too, so that the model from e to u is. C and F always are.
@@ -210,7 +210,7 @@ impl Estimator {
         })
     }
 
-    /// True where the system from e to u is to minimise another error than that of the prediction.
+    /// True if the system from e to u is to minimise another error than that of the prediction.
     fn simulates(&self) -> bool {
         self.focus == Focus::Simulation && self.structure != Structure::OutputError
     }

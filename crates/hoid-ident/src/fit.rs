@@ -31,9 +31,9 @@ pub struct Fit {
     pub(crate) held: Vec<bool>,
     /// Variance of the output over the residuals that count.
     pub(crate) output_variance: f64,
-    /// True where the innovation variance is the square of a robust scale.
+    /// True if the innovation variance is the square of a robust scale.
     pub(crate) robust: bool,
-    /// True where instruments was in place of the regressors.
+    /// True if instruments was in place of the regressors.
     pub(crate) instrumented: bool,
     /// The physical parameters that theta was computed from, for a grey box.
     pub(crate) physical: Option<Box<Physical>>,

@@ -145,8 +145,8 @@ fn standard_errors_cover_the_truth() {
 #[test]
 fn converges_near_the_truth_in_a_closed_loop_with_a_rich_remnant() {
     let (converged, errors) = study(4, 3);
-    // 24 numbers, correlated within a run: fewer than 15 beyond 1.96 but for one case in 1e6, and
-    // none beyond six.
+    // 24 numbers, correlated within a run: fewer than 15 beyond 1.96 except for one case in 1e6,
+    // and none beyond six.
     assert!(converged == 4 && covered(&errors) > 0.5, "{converged}: {errors:?}");
     assert!(errors.iter().flatten().all(|z| z.abs() < 6.0), "{errors:?}");
 }

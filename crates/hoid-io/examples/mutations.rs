@@ -25,7 +25,7 @@ use std::{
 
 use mutations::{Case, case, originals::originals, readers, spent::Spent};
 
-/// That of the page; the tests have another.
+/// The value for the page; the tests have another.
 const SEED: u64 = 2026;
 /// What one case may take.
 const LIMIT: Duration = Duration::from_secs(1);
@@ -41,7 +41,8 @@ struct Task {
     seed: u64,
     memory_mb: u64,
     keep: Option<PathBuf>,
-    /// That of the process itself, where it is one of several: its place for files, and its number.
+    /// The value for the process itself, where it is one of several: its place for files, and its
+    /// number.
     part: Option<(PathBuf, u64)>,
 }
 
@@ -182,7 +183,7 @@ fn start(task: &Task, place: &Path, first: u64, end: u64) -> Child {
     command.stdout(Stdio::piped()).spawn().unwrap()
 }
 
-/// Waits for the end; true where it does not come and the process is ended.
+/// Waits for the end; true if it does not come and the process is ended.
 fn wait(child: &mut Child, progress: &Path) -> bool {
     let mut last = (u64::MAX, Instant::now());
     while child.try_wait().unwrap().is_none() {

@@ -94,7 +94,7 @@ pub enum IoError {
         found: String,
         /// The extensions that are known.
         expected: String,
-        /// "; unpack it", empty where the format is unknown.
+        /// "; unpack it", empty if the format is unknown.
         remedy: String,
     },
     /// Bytes that are not text.
@@ -204,7 +204,7 @@ pub enum IoError {
         missing: String,
         /// The whole expression.
         asked: String,
-        /// "; did you mean "u"?", empty where no name is near.
+        /// "; did you mean "u"?", empty if no name is near.
         meant: String,
         /// The names that exist.
         available: String,
@@ -268,7 +268,7 @@ pub enum IoError {
         found: String,
         /// How many values are missing.
         count: usize,
-        /// How many rows were looked at.
+        /// How many rows were examined.
         rows: usize,
     },
     /// Missing values with nothing on one side of them.
@@ -458,7 +458,7 @@ pub enum IoError {
         column: String,
         /// Its values.
         found: usize,
-        /// Those of the first column.
+        /// The entries of the first column.
         expected: usize,
     },
     /// Arrays of different lengths in one record.

@@ -25,7 +25,7 @@ use parquet::basic::{Compression, GzipLevel};
 
 /// Most memory of the process, kB, on systems that report it.
 const MOST_KB: u64 = 300_000;
-/// Of each format.
+/// For each format.
 const SAMPLE: u64 = 5;
 
 #[test]

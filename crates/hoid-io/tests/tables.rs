@@ -66,7 +66,7 @@ fn table(rows: usize) -> OutputTable {
     }
 }
 
-/// Equal to the last bit, but for what NaN holds.
+/// Equal to the last bit, except for what NaN holds.
 fn assert_same(a: &OutputTable, b: &OutputTable) {
     assert_eq!(a.comments, b.comments);
     assert_eq!(a.schema(), b.schema());

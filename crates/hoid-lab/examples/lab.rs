@@ -187,7 +187,7 @@ fn main() -> ExitCode {
                 .iter()
                 .filter(|(value, error)| (value - truth).abs() <= 1.96 * error)
                 .count();
-            // Of a logarithm the difference is the relative one.
+            // For a logarithm the difference is the relative one.
             let log = matches!(kind, Coordinate::LogOmega | Coordinate::LogZeta);
             let share = if log { 100.0 } else { 100.0 / truth.abs() };
             println!(

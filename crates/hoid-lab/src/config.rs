@@ -47,10 +47,10 @@ pub struct Config {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Order {
-    /// That of the person's row of a balanced Latin square.
+    /// The value for the person's row of a balanced Latin square.
     #[default]
     Latin,
-    /// That of the file.
+    /// The value for the file.
     Given,
 }
 

@@ -15,9 +15,9 @@ use crate::{
 /// The task of a condition: what of a scenario is not the person.
 #[derive(Debug, Clone)]
 pub enum Course {
-    /// Of one of the conditions C1 to C6, or near one.
+    /// For one of the conditions C1 to C6, or near one.
     Reference(Box<hoid_model::scenario::ResolvedScenario>),
-    /// Of any controlled element.
+    /// For any controlled element.
     Family(Box<hoid_model::family_scenario::ResolvedFamilyScenario>),
 }
 
@@ -93,7 +93,7 @@ impl Course {
         }
     }
 
-    /// The controlled element all the time; nothing where that changes.
+    /// The controlled element all the time; nothing if that changes.
     ///
     /// # Errors
     /// As [`Course::element_at`].

@@ -231,10 +231,10 @@ impl Lab {
         obeyed
     }
 
-    /// The session as one archive; nothing where there is none.
+    /// The session as one archive; nothing if there is none.
     ///
     /// # Errors
-    /// Those of files.
+    /// The entries of files.
     pub fn export(&self) -> Result<Option<(Vec<u8>, &'static str)>, LabError> {
         let Some(folder) = self.shared.session_folder() else {
             return Ok(None);
@@ -242,10 +242,10 @@ impl Lab {
         Ok(Some((export::archive(&self.shared.out, &folder)?, "application/zip")))
     }
 
-    /// The signals of a run, `3.json`; nothing where there is no such run.
+    /// The signals of a run, `3.json`; nothing if there is no such run.
     ///
     /// # Errors
-    /// Those of files.
+    /// The entries of files.
     pub fn data(&self, name: &str) -> Result<Option<(Vec<u8>, &'static str)>, LabError> {
         let number: Option<usize> = name.strip_suffix(".json").and_then(|number| number.parse().ok());
         let (Some(number), Some(folder)) = (number, self.shared.session_folder()) else {
@@ -259,7 +259,7 @@ impl Lab {
     /// A file of the pages of results, by the names that [`State::reports`](crate::wire::State::reports) has.
     ///
     /// # Errors
-    /// Those of files.
+    /// The entries of files.
     pub fn report(&self, names: &[&str]) -> Result<Option<(Vec<u8>, &'static str)>, LabError> {
         let Some(folder) = self.shared.session_folder() else {
             return Ok(None);

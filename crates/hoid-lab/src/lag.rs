@@ -3,10 +3,10 @@
 //! The tracker acts in a basis whose lag stays where it started: nothing of it reports what T_I is. So the samples of
 //! the measurement since the last declared change are fitted as `hoid identify` does, each 10 s, on a thread of its
 //! own: all forms of the operator, the one that held-out data choose, and its T_I where the data determine it
-//! ([`hoid_analysis::identify`]). Of a form without a lag, or one whose interval reaches a pure integration, T_I is not
-//! determined, and no number is reported.
+//! ([`hoid_analysis::identify`]). For a form without a lag, or one whose interval reaches a pure integration, T_I is
+//! not determined, and no number is reported.
 //!
-//! A form with a lag is chosen now and then for who has none, a short lag next to a longer lead: for 13 of 60 runs of
+//! A form with a lag is chosen at intervals for who has none, a short lag next to a longer lead: for 13 of 60 runs of
 //! C1 and 2 of 20 of C2, 30 and 80 s long, with T_I up to 6.3 standard errors from zero. A lag of 1 s that is there is
 //! 25 of them from zero and more. So a lag counts from ten on.
 
@@ -37,7 +37,7 @@ pub enum Lag {
 }
 
 impl Lag {
-    /// Of a record of one person who does not change.
+    /// For a record of one person who does not change.
     pub fn of(record: Record) -> Self {
         let found = hoid_analysis::identify(&[record]);
         let parameter = found.ok().and_then(|found| {

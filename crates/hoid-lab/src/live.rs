@@ -34,12 +34,12 @@ use crate::{
 const WARM_UP_S: f64 = 20.0;
 /// Delay that a method starts at, samples of 10 ms.
 const DEFAULT_NK: usize = 21;
-/// Where the crossover is looked for, rad/s, and in how many steps of one factor.
+/// Where the crossover is searched for, rad/s, and in how many steps of one factor.
 const CROSSOVERS: (f64, f64, usize) = (0.3, 15.0, 40);
 /// Relative step of the slopes.
 const SLOPE: f64 = 1e-3;
 
-/// A number with its standard error; none where it is not known.
+/// A number with its standard error; none if it is not known.
 type ReportedValue = (Option<f64>, Option<f64>);
 
 /// The estimate at an instant.
@@ -83,7 +83,7 @@ pub struct LiveRun {
 }
 
 impl LiveRun {
-    /// Of a method by its name, for a task.
+    /// For a method by its name, for a task.
     ///
     /// # Errors
     /// [`LabError::Ident`] for a method that cannot run live.
@@ -163,8 +163,8 @@ fn reported(estimate: Estimate) -> ReportedValue {
     (finite(estimate.value), estimate.standard_error.and_then(finite))
 }
 
-/// Crossover frequency in rad/s and phase margin in degrees, to first order; none where `|L|` does
-/// not cross one from above.
+/// Crossover frequency in rad/s and phase margin in degrees, to first order; none if `|L|` does not
+/// cross one from above.
 fn crossover(
     response: &dyn Fn(f64) -> Option<Response>,
     element: &ContinuousTransferFunction,

@@ -30,7 +30,7 @@ impl Plant {
         self.b.len()
     }
 
-    /// True where the matrices fit each other and there is room for the state.
+    /// True if the matrices fit each other and there is room for the state.
     pub fn is_sound(&self) -> bool {
         let n = self.order();
         n <= MOST_STATES && self.a.len() == n * n && self.c.len() == n

@@ -13,7 +13,7 @@ use crate::{
 /// The run as JSON.
 ///
 /// # Errors
-/// Those of files.
+/// The entries of files.
 pub fn data(stem: &Stem) -> Result<Vec<u8>, LabError> {
     let begun = RunStart::read(stem)?;
     let task = begun.task(stem)?;
@@ -44,7 +44,7 @@ fn rounded(values: &[f64]) -> Vec<f64> {
     values.iter().map(|v| (v * 1e6).round() / 1e6).collect()
 }
 
-/// The rows of the live estimate, numbers or null, without its header; none where there was none.
+/// The rows of the live estimate, numbers or null, without its header; none if there was none.
 fn live(stem: &Stem) -> Vec<Vec<Value>> {
     let text = hoid_io::read_text(&stem.file("live.csv")).unwrap_or_default();
     let cell = |cell: &str| cell.parse::<f64>().map_or(Value::Null, Value::from);

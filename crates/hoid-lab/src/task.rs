@@ -220,8 +220,8 @@ mod tests {
     #[test]
     fn the_simulator_of_hoid_finds_the_same_loop() {
         // What the simulator of C4 does at 100 Hz, its u held over ten ticks each, is what the task
-        // does at 1 kHz: both holds are exact, and the element changes in the same blocks but for
-        // the middle of the block that the task takes.
+        // does at 1 kHz: both holds are exact, and the element changes in the same blocks except
+        // for the middle of the block that the task takes.
         use hoid_model::scenario::{Condition as Reference, Scenario};
         use hoid_sim::Simulator;
         let own = Condition {

@@ -14,8 +14,8 @@
 //! | `lab-frame` | a frame was too late, or did not show the tick that it names |
 //! | `lab-changed` | a file was changed after the end |
 //!
-//! u and e are compared bit for bit, but for the sign of zero, which text does not keep. e is recomputed from the u of
-//! the log, so that a false event and a false tick are distinguished; the tables are those that the page was given,
+//! u and e are compared bit for bit, except for the sign of zero, which text does not keep. e is recomputed from the u
+//! of the log, so that a false event and a false tick are distinguished; the tables are those that the page was given,
 //! which are compared with those made again from the seed to rounding (sines may differ between computers in the last
 //! bit).
 
@@ -54,7 +54,7 @@ pub struct Measures {
     pub frame_ms: f64,
     /// Longest time from frame to frame, ms.
     pub longest_frame_ms: f64,
-    /// Frames that the screen would have had besides.
+    /// Frames that the screen would have had in addition.
     pub missed_frames: usize,
     /// Input events a second.
     pub input_hz: f64,
@@ -62,14 +62,14 @@ pub struct Measures {
     pub input_age_ms: f64,
     /// Root mean square of e in the measurement.
     pub rms_e: f64,
-    /// That of what was to be followed or held off.
+    /// The value for what was to be followed or held off.
     pub rms_forcing: f64,
     /// 100 for no error, 0 for as much as hands at rest would leave.
     pub score: f64,
 }
 
 impl Checked {
-    /// True where nothing speaks against the run.
+    /// True if nothing speaks against the run.
     pub fn is_verified(&self) -> bool {
         self.verdict.level == VerdictLevel::Trustworthy
     }
@@ -79,7 +79,7 @@ impl Checked {
         if self.is_verified() { "verified" } else { "unverified" }
     }
 
-    /// Why not, in one line; empty where it is.
+    /// Why not, in one line; empty if it is.
     pub fn reasons(&self) -> String {
         self.verdict.reasons().collect::<Vec<_>>().join("; ")
     }
@@ -88,8 +88,8 @@ impl Checked {
 /// Checks a run of a session.
 ///
 /// # Errors
-/// [`LabError`] where nothing is known of the run (`run.json`) or the system refuses a file; what is wrong
-/// in the others is a finding.
+/// [`LabError`] where nothing is known about the run (`run.json`) or the system refuses a file; what is wrong in the
+/// others is a finding.
 pub fn check(stem: &Stem) -> Result<Checked, LabError> {
     let begun = RunStart::read(stem)?;
     let logged = Logged::read(stem)?;

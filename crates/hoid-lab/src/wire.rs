@@ -17,13 +17,13 @@ use crate::{
 /// Largest message of a page, bytes: a second of ticks is a tenth of it.
 pub const LARGEST: usize = 1 << 20;
 
-/// Who a page is for.
+/// Audience of a page.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Role {
     /// The person who tracks.
     Person,
-    /// Who looks on.
+    /// Observers.
     Experimenter,
 }
 
@@ -91,7 +91,7 @@ pub enum ToPage<'a> {
     Verdict { done: &'a Done, measures: &'a Measures },
     /// The estimate while a run goes on.
     Live { number: usize, line: &'a LiveLine },
-    /// What was asked for cannot be; `elsewhere` where the session is in another window.
+    /// What was asked for cannot be; `elsewhere` if the session is in another window.
     Refused { words: String, elsewhere: bool },
     /// The session goes on in this window, whose other window is gone.
     Yours {},
@@ -108,7 +108,7 @@ pub struct State {
     pub consent: String,
     /// When the person sees the live estimate.
     pub live: LiveFor,
-    /// True where a simulated operator takes the place of the person.
+    /// True if a simulated operator takes the place of the person.
     pub calibrate: bool,
     /// The session, as `sub-P01/ses-01`.
     pub session: Option<String>,

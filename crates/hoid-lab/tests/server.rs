@@ -323,7 +323,7 @@ fn one_experiment_has_one_server() {
     assert!(second.is_err_and(|error| error.to_string().contains("another process works on")));
 }
 
-/// Connections that send a byte now and then, as many as the system gives: they give way to the page.
+/// Connections that send a byte at intervals, as many as the system gives: they give way to the page.
 #[test]
 fn slow_strangers_do_not_shut_the_page_out() {
     let dir = tempfile::tempdir().unwrap();

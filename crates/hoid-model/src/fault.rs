@@ -102,8 +102,8 @@ pub struct Fault {
     /// How large, in the unit of the channel: by how much a spike or a step is off, the modulus of a
     /// wrap, the length of what is frozen or idle in s, the factor of a scale, the sample time in s.
     pub size: f64,
-    /// The size in robust standard deviations of what the statistic of this kind leaves of good data;
-    /// none where the kind has no such statistic.
+    /// The size in robust standard deviations of what the statistic of this kind leaves of good data; none if the kind
+    /// has no such statistic.
     pub deviations: Option<f64>,
     /// The actions taken.
     pub action: FaultAction,

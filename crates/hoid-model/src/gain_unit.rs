@@ -12,7 +12,7 @@ use crate::Record;
 pub struct GainUnit(Option<(String, String)>);
 
 impl GainUnit {
-    /// The units of a record: none where one of the two is not declared.
+    /// The units of a record: none if one of the two is not declared.
     pub fn of(record: &Record) -> Self {
         let units = record
             .input_channel()
@@ -41,7 +41,7 @@ impl GainUnit {
         }
         match (&self.0, own) {
             (None, _) => String::new(),
-            // Of like units a ratio has none, and time is left.
+            // For like units a ratio has none, and time is left.
             (Some((e, u)), "s" | "1/s") if e == u => own.to_owned(),
             (Some((e, u)), "s") => format!("{u} s/{e}"),
             (Some((e, u)), "1/s") => format!("{u}/({e} s)"),

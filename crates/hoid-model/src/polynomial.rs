@@ -126,8 +126,7 @@ fn newton_step(p: &[f64], z: Complex64) -> Complex64 {
 }
 
 /// Monic `[p_1, ..., p_n]` with each root outside the unit circle replaced by the inverse of its
-/// conjugate, which leaves the shape of the spectrum as it is. `None` where the roots cannot be
-/// found.
+/// conjugate, which leaves the shape of the spectrum as it is. `None` if the roots cannot be found.
 pub fn reflected_inside(coefficients: &[f64]) -> Option<Vec<f64>> {
     if roots_inside(coefficients, 1.0) {
         return Some(coefficients.to_vec());

@@ -102,7 +102,7 @@ pub fn finite_sorted(values: impl IntoIterator<Item = f64>) -> Vec<f64> {
     finite
 }
 
-/// The value below which this share of the finite values lies, by linear interpolation; `None` where
+/// The value below which this share of the finite values lies, by linear interpolation; `None` if
 /// none is finite.
 #[cfg(feature = "alloc")]
 pub fn quantile_of(values: &[f64], share: f64) -> Option<f64> {

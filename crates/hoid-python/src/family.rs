@@ -115,7 +115,7 @@ impl PyOperatorFit {
         self.0.fit.title()
     }
 
-    /// Those of the common operator, or of the operator of each record.
+    /// The entries of the common operator, or of the operator of each record.
     #[getter]
     fn parameters(&self) -> Vec<Vec<ParameterParts>> {
         let of = |parameters: &Vec<Parameter>| parameters.iter().map(parameter).collect();
@@ -239,8 +239,8 @@ impl PyOperatorFit {
         Ok(Some(all))
     }
 
-    /// Magnitude in dB and phase in deg at these frequencies, each with its standard error (NaN where there is
-    /// none), of the operator of a record.
+    /// Magnitude in dB and phase in deg at these frequencies, each with its standard error (NaN if there is none), of
+    /// the operator of a record.
     fn frequency_response<'py>(
         &self,
         py: Python<'py>,
@@ -344,7 +344,7 @@ impl PyOperatorFit {
         figures::termination(py, self.0.fit.termination)
     }
 
-    /// Channel of the excitation; none where there was none.
+    /// Channel of the excitation; none if there was none.
     #[getter]
     fn excitation(&self) -> Option<&str> {
         self.0.excitation.as_deref()

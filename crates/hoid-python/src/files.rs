@@ -157,7 +157,7 @@ pub fn detrended<'py>(py: Python<'py>, record: &Bound<'py, PyAny>, how: &str) ->
     Ok(parts(py, record.detrended(how))?)
 }
 
-/// The record at a lower rate, and the actions taken; None where nothing was.
+/// The record at a lower rate, and the actions taken; None if nothing was.
 #[pyfunction]
 #[pyo3(signature = (record, decimate))]
 pub fn decimated<'py>(

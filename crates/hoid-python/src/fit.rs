@@ -159,7 +159,7 @@ impl PyFit {
         }
     }
 
-    /// Of a part of another result its model alone, from which it comes back; none of a result by itself.
+    /// For a part of another result its model alone, from which it comes back; none of a result by itself.
     fn state(&self) -> Option<String> {
         if self.whole.is_some() {
             return None;
@@ -279,7 +279,7 @@ impl PyFit {
             .collect()
     }
 
-    /// The level of u in each record of the fit as it was read; empty where none was estimated.
+    /// The level of u in each record of the fit as it was read; empty if none was estimated.
     #[getter]
     fn levels(&self) -> Vec<Option<ValueWithError>> {
         let without = |whole: &&Whole| each!(whole, found => found.is_without_means());
@@ -363,8 +363,8 @@ impl PyFit {
         Ok(all)
     }
 
-    /// Magnitude in dB and phase in deg at these frequencies, each with its standard error (NaN
-    /// where there is none).
+    /// Magnitude in dB and phase in deg at these frequencies, each with its standard error (NaN if
+    /// there is none).
     fn frequency_response<'py>(
         &self,
         py: Python<'py>,

@@ -70,7 +70,7 @@ pub fn remnant_discretisation(found: &str) -> Outcome<RemnantDiscretisation> {
     choice("discretisation", found)
 }
 
-/// The keyword of an option: its name, but for a word that Python keeps for itself.
+/// The keyword of an option: its name, except for a word that Python keeps for itself.
 pub fn keyword(name: &'static str) -> &'static str {
     match name {
         "lambda" => "forgetting_factor",

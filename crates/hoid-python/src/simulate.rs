@@ -156,7 +156,7 @@ pub fn margins<'py>(
     Ok(all)
 }
 
-/// Those of an operator of the family, with the gains of the parts of its remnant.
+/// The entries of an operator of the family, with the gains of the parts of its remnant.
 fn family_margins<'py>(py: Python<'py>, scenario: &FamilyScenario, last: bool) -> Outcome<Bound<'py, PyDict>> {
     let state = if last { &scenario.last } else { &scenario.initial };
     let all = figures::plain_margins(py, &state.margins()?)?;

@@ -238,7 +238,7 @@ impl PyTracker {
         self.sample_time.s()
     }
 
-    /// How a high rate is lowered; None where it is not.
+    /// How a high rate is lowered; None if it is not.
     #[getter]
     fn decimation(&self) -> Option<String> {
         self.decimator.as_ref().map(|decimator| decimator.done().to_string())

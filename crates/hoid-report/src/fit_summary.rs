@@ -13,7 +13,7 @@ pub struct FitSummary {
     pub verdict: Verdict,
     /// The answer as text, as [`sentence`] makes it.
     pub sentence: Option<String>,
-    /// The parameters; none where the models of the page state them.
+    /// The parameters; none if the models of the page state them.
     pub parameters: Vec<ParameterRow>,
 }
 
@@ -22,9 +22,9 @@ pub struct FitSummary {
 pub struct ParameterRow {
     /// Its name, as `T_L`.
     pub name: String,
-    /// Its unit, empty where it has none or none was declared.
+    /// Its unit, empty if it has none or none was declared.
     pub unit: String,
-    /// Value and standard error; none where it is not determined.
+    /// Value and standard error; none if it is not determined.
     pub estimate: Option<Estimate>,
     /// The interval of 95 %; an end that is open is infinite.
     pub interval: Option<(f64, f64)>,
@@ -77,7 +77,7 @@ const WORDS: [(&str, &str, &str); 7] = [
 ];
 
 /// The answer as text: "gain 6.1, lead 0.60 s, delay 0.15 s; crossover 2.9 ± 0.1 rad/s, phase margin 34 ± 3°". A
-/// parameter that is not there or not finite is left out, and so is the loop; `None` where nothing is left.
+/// parameter that is not there or not finite is left out, and so is the loop; `None` if nothing is left.
 pub fn sentence<'a>(
     parameters: impl IntoIterator<Item = (&'a str, f64)>,
     crossover_rad_s: Option<Estimate>,

@@ -46,7 +46,7 @@ struct Row {
 }
 
 impl PaperTable {
-    /// The table of a result, by its object; `None` where nothing in it is an estimate.
+    /// The table of a result, by its object; `None` if nothing in it is an estimate.
     pub fn of(object: &Map<String, Value>) -> Option<Self> {
         let text = |key: &str| object.get(key).and_then(Value::as_str).unwrap_or_default();
         let level = object.get("verdict").and_then(|verdict| verdict["level"].as_str());

@@ -11,7 +11,7 @@ use crate::{RunSeed, Simulator, cascade::MOST};
 /// again, and what claims to stand farther on must not take all memory.
 const MOST_SAMPLES: f64 = 3e7;
 
-/// The number of a sample as it was saved; `None` where it is no such number.
+/// The number of a sample as it was saved; `None` if it is no such number.
 pub(crate) fn saved_sample(k: f64) -> Option<usize> {
     ((0.0..=MOST_SAMPLES).contains(&k) && k.fract() == 0.0).then_some(k as usize)
 }
@@ -87,7 +87,7 @@ impl OperatorRun {
     }
 
     /// Goes on from where an operator of the same scenario and run stood ([`OperatorRun::saved`]), with the same
-    /// digits. False where the numbers are of another; then nothing has changed.
+    /// digits. False if the numbers are of another; then nothing has changed.
     pub fn restore(&mut self, numbers: &[f64]) -> bool {
         let Some(([k], rest)) = numbers.split_first_chunk::<1>() else {
             return false;

@@ -57,7 +57,7 @@ pub(crate) struct Matrices {
 
 /// A held system by rows, `[a x_0 + b x_1 + g u, d x_1 - c x_0 - h u]`: the bits of
 /// [`HeldStates::step`]. Were both rows sums, the compiler would pack the states into one register,
-/// and each sample would wait for the shuffles besides.
+/// and each sample would wait for the shuffles in addition.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Rows {
     plus: [f64; 3],

@@ -54,7 +54,7 @@ impl BatchFits {
         Some(Self { requested, fits })
     }
 
-    /// The fit of a run that an estimator (by its place) needs; none where it needs none.
+    /// The fit of a run that an estimator (by its place) needs; none if it needs none.
     pub fn of_run(&self, estimator: usize, run: usize) -> Option<&Result<Fit, String>> {
         let request = (*self.requested.get(estimator)?)?;
         self.fits.get(request)?.get(run)

@@ -18,7 +18,7 @@ use crate::plan::{Plan, Task, analysis};
 
 /// The operator's parameters, in the order of all tables.
 pub const OPERATOR: [&str; 5] = ["K_e", "T_L", "K_e_dot", "omega_nm", "zeta_nm"];
-/// What is looked at in a trace: these and the delay, in the order of
+/// What is examined in a trace: these and the delay, in the order of
 /// [`hoid_model::uncertainty::OperatorEstimate::rows`].
 pub(crate) const TRACED: [&str; 6] = ["K_e", "T_L", "K_e_dot", "omega_nm", "zeta_nm", "tau_e"];
 
@@ -123,7 +123,7 @@ impl Rows {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct Schemas {
     pub fits: TableSchema,
-    /// None where no traces are kept.
+    /// None if no traces are kept.
     pub traces: Option<TableSchema>,
 }
 

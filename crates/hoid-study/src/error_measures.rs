@@ -124,7 +124,7 @@ impl TraceErrors {
     }
 }
 
-/// Time within which a change is to be declared, and during which bands are looked at apart, s.
+/// Time within which a change is to be declared, and during which bands are examined apart, s.
 const THROUGH_S: f64 = 5.0;
 /// Length of the end of a trace whose mean error is taken, s.
 const END_S: f64 = 10.0;

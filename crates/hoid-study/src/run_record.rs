@@ -24,7 +24,7 @@ pub(crate) struct RunRecord {
     pub shard: Option<Shard>,
     /// True once the tables are there.
     pub complete: bool,
-    /// True where blocks have seals; an earlier program wrote none.
+    /// True if blocks have seals; an earlier program wrote none.
     #[serde(default)]
     pub sealed: bool,
 }
@@ -53,7 +53,7 @@ impl RunRecord {
             .then(|| "its blocks carry no checksums, an earlier hoid wrote them: all were computed again".to_owned())
     }
 
-    /// The manifest of a directory; none where it holds no study.
+    /// The manifest of a directory; none if it holds no study.
     pub fn read(directory: &Path) -> Result<Option<Self>, StudyError> {
         let path = directory.join(NAME);
         if !path.exists() {

@@ -33,7 +33,7 @@ pub fn true_value(cell: &Cell, estimator: &EstimatorCell, name: &str) -> f64 {
     } else {
         after
     };
-    // Of a form that is not the lead K is the gain at rest too.
+    // For a form that is not the lead K is the gain at rest too.
     let named = if name == "K" { "K_e" } else { name };
     if let Some(i) = OPERATOR.iter().position(|p| *p == named) {
         return state.operator[i];
@@ -59,7 +59,8 @@ fn close(a: f64, b: f64) -> bool {
     (a - b).abs() <= 1e-2 * a.abs().max(b.abs())
 }
 
-/// Of an operator whose gains change: before (1) and after (2) the change, its instant and its rate.
+/// For an operator whose gains change: before (1) and after (2) the change, its instant and its
+/// rate.
 fn of_change(cell: &Cell, name: &str) -> f64 {
     let scenario = cell.resolved.scenario();
     let ends = cell.truth();
@@ -67,7 +68,7 @@ fn of_change(cell: &Cell, name: &str) -> f64 {
     let place = |parameter: &str| OPERATOR.iter().position(|p| *p == parameter);
     let end = |digit| name.strip_suffix(digit).and_then(place);
     match (name, &scenario.schedule) {
-        // Who changes there and back is not who is looked for.
+        // Who changes there and back is not who is searched for.
         (_, Schedule::Alternating { .. }) => f64::NAN,
         ("t_M", schedule) => schedule.change_s().unwrap_or(f64::NAN),
         ("G", schedule) => schedule.rate_per_s().unwrap_or(f64::NAN),

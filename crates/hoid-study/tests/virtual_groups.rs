@@ -217,7 +217,7 @@ fn virtual_people_have_their_truth_beside_them() {
         let offset = reals(&truth, "offset_e")[row];
         assert!((0..2400).all(|k| (e[k] + y[k] - offset).abs() < 1e-9));
     }
-    // Of a lead-lag K/T_I is there always, T_I where it is finite.
+    // For a lead-lag K/T_I is there always, T_I where it is finite.
     let forms = texts(&truth, "form");
     let ratio = reals(&truth, "K_over_T_I");
     assert!((0..12).all(|row| (forms[row] == "lead") == ratio[row].is_nan()));

@@ -243,7 +243,7 @@ impl Recursion for FusedRecursion {
         &self.theta
     }
 
-    /// That of each method; between them nothing is known, and zero is put.
+    /// The value for each method; between them nothing is known, and zero is put.
     fn covariance(&self, into: &mut [f64]) -> bool {
         let known = self.rpem.covariance(into);
         let p = self.theta.len();

@@ -81,7 +81,7 @@ fn a_delay_that_jumps_is_not_followed_by_a_fixed_one() {
     let told = |record: &Record| kinds(&judged(record, &options)).contains(&"not-followed");
     assert!(told(&late(5000, 20)));
     assert!(!told(&late(5000, 0)));
-    // Shorter than what is looked at.
+    // Shorter than what is examined.
     assert!(
         judged(&record.span(0.0, 12.0).unwrap(), &options)
             .findings()

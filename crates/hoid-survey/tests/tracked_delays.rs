@@ -112,7 +112,7 @@ fn the_response_of_physical_has_the_delay_of_its_row() {
         trace.operator(last).unwrap().tau_e_s.value,
         trace.response(last, 0).unwrap().phase_deg().value,
     );
-    // That of the operator of the row, not of the delay of the start fit.
+    // The value for the operator of the row, not of the delay of the start fit.
     let found = trace.operator(last).unwrap();
     let square = found.omega_nm_rad_s.value.powi(2);
     let lead = (2.5 * found.t_l_s.value).atan();

@@ -34,7 +34,7 @@
 //! | [`experiment`] | the experiment of the text with virtual people |
 //! | [`claims`] | statements of the text, tested by the results of the named plans |
 //!
-//! Studies and reports know nothing of this crate.
+//! Studies and reports do not depend on this crate.
 
 pub mod claims;
 pub mod comparators;

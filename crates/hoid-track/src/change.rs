@@ -32,8 +32,8 @@ pub struct Change {
     /// Change of K_e, K_e_dot, omega_nm, zeta_nm, the logarithm of the innovation variance and
     /// tau_e, each over its standard error.
     pub z: [f64; 6],
-    /// True where the operator was held against before as a whole: their response has changed then, even where
-    /// no single quantity has by two standard errors.
+    /// True if the operator was held against before as a whole: their response has changed then, even where no single
+    /// quantity has by two standard errors.
     pub of_operator: bool,
 }
 

@@ -143,7 +143,7 @@ impl<const N: usize> Gain<N> {
 
 /// A gain with a covariance that can be changed from outside.
 pub trait Scaled {
-    /// P times a factor; false where there is no P that stays.
+    /// P times a factor; false if there is no P that stays.
     fn scale(&mut self, factor: f64) -> bool;
 }
 

@@ -6,8 +6,8 @@ use hoid_core::state::{State, visit_all};
 /// of filtered signals are.
 const LARGEST: f64 = 1e60;
 
-/// The value as a recursion takes it: within 1e60, and zero where a product of large numbers
-/// has no value.
+/// The value as a recursion takes it: within 1e60, and zero if a product of large numbers has no
+/// value.
 pub fn bounded(x: f64) -> f64 {
     if x.is_nan() { 0.0 } else { x.clamp(-LARGEST, LARGEST) }
 }

@@ -17,7 +17,7 @@ pub type Choose<'a> = &'a dyn Fn(&Record) -> Result<(TrackOptions, Option<Choice
 
 /// Share of the warm-up that is collected besides after a fit that failed.
 const QUARTER: usize = 4;
-/// Of a warm-up that goes on, so many times its length is kept.
+/// For a warm-up that goes on, so many times its length is kept.
 const KEPT: usize = 2;
 /// Longest run of faulty samples within a warm-up, s; after a longer one it starts again.
 const LONGEST_FAULT_S: f64 = 1.0;
@@ -41,8 +41,8 @@ pub struct LiveOutcome {
 }
 
 impl Live {
-    /// A recursion that starts at once where its start is given, else with a warm-up of so many
-    /// samples.
+    /// A recursion that starts at once where its start is given, else with a warm-up of a given
+    /// number of samples.
     ///
     /// # Errors
     /// [`IdentError`] for a start that cannot be used.
@@ -219,7 +219,7 @@ impl WarmUp {
         self.collected += 1;
     }
 
-    /// Leaves out what came before the run started, and collects as much in its place; false where
+    /// Leaves out what came before the run started, and collects as much in its place; false if
     /// there is nothing of the kind.
     fn leave_out_idle(&mut self) -> bool {
         let Ok(record) = self.record() else { return false };

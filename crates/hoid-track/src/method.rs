@@ -34,8 +34,8 @@ pub struct About {
     pub help: &'static str,
     /// Where it comes from.
     pub source: &'static str,
-    /// The structures that it serves; the first is that of the method when none is named, but for
-    /// Box-Jenkins where it is among them.
+    /// The structures that it serves; the first is that of the method when none is named, except
+    /// for Box-Jenkins where it is among them.
     pub structures: &'static [Structure],
     /// Defaults, as text, of options that it shares with others.
     pub defaults: &'static [(&'static str, &'static str)],
@@ -103,7 +103,7 @@ pub trait RecursiveMethod: Settings + Boxed + 'static {
         Ok(())
     }
 
-    /// Order of the noise model when none is named; none where that of the structure is taken.
+    /// Order of the noise model when none is named; none if that of the structure is taken.
     fn default_nd(&self) -> Option<usize> {
         None
     }
@@ -129,7 +129,7 @@ pub trait RecursiveMethod: Settings + Boxed + 'static {
         None
     }
 
-    /// True where the two-sided estimate of a recorded run was asked for.
+    /// True if the two-sided estimate of a recorded run was asked for.
     fn smooths(&self) -> bool {
         false
     }
@@ -179,18 +179,18 @@ pub trait RecursiveMethod: Settings + Boxed + 'static {
         f64::INFINITY
     }
 
-    /// How far P may grow where nothing excites a parameter; none where that follows from the start.
+    /// How far P may grow where nothing excites a parameter; none if that follows from the start.
     fn windup_guard(&self, _structure: Structure) -> Option<WindupGuard> {
         self.gain().and_then(|gain| gain.windup_guard)
     }
 
-    /// Whether a guard is in front of it, or that was refused; none where nothing was specified and its own default is
-    /// to have none.
+    /// Whether a guard is in front of it, or that was refused; none if nothing was specified and its own default is to
+    /// have none.
     fn guard(&self) -> Option<GuardChoice> {
         None
     }
 
-    /// True where a guard is in front of it.
+    /// True if a guard is in front of it.
     fn is_guarded(&self) -> bool {
         self.guard() == Some(GuardChoice::Yes)
     }
@@ -210,7 +210,7 @@ pub trait RecursiveMethod: Settings + Boxed + 'static {
         None
     }
 
-    /// True where tau_e, when it is followed, is one of the parameters that move.
+    /// True if tau_e, when it is followed, is one of the parameters that move.
     fn delay_is_parameter(&self) -> bool {
         false
     }
@@ -231,7 +231,7 @@ pub trait RecursiveMethod: Settings + Boxed + 'static {
         None
     }
 
-    /// Takes the prior knowledge of the person; false where that is not an option.
+    /// Takes the prior knowledge of the person; false if that is not an option.
     fn set_person_prior(&mut self, _prior: PersonPrior) -> bool {
         false
     }

@@ -51,7 +51,7 @@ impl OpenLoop {
     /// Numbers of it.
     pub(crate) const NUMBERS: usize = 4;
 
-    /// Of an estimate whose response is `value`, and with its covariance `whole`.
+    /// For an estimate whose response is `value`, and with its covariance `whole`.
     pub(crate) fn of(
         value: impl Fn(f64) -> Option<[f64; 2]>,
         whole: impl Fn(f64) -> Option<Response>,
@@ -87,7 +87,7 @@ impl OpenLoop {
         }
     }
 
-    /// Values and variances, for means; NaN where there is none.
+    /// Values and variances, for means; NaN if there is none.
     pub(crate) fn packed(found: Result<Self, NoCrossover>) -> [f64; Self::NUMBERS] {
         let Ok(found) = found else {
             return [f64::NAN; Self::NUMBERS];
@@ -97,7 +97,7 @@ impl OpenLoop {
         [a, b, c, d]
     }
 
-    /// Of the numbers of [`OpenLoop::packed`].
+    /// For the numbers of [`OpenLoop::packed`].
     pub(crate) fn unpacked(numbers: &[f64]) -> Option<Self> {
         let &[a, b, c, d] = numbers else { return None };
         a.is_finite().then_some(Self {

@@ -88,7 +88,7 @@ impl TrackOptions {
         }
     }
 
-    /// The span of a record that gives the start fit, s; none where there is no such fit.
+    /// The span of a record that gives the start fit, s; none if there is no such fit.
     pub fn start_span(&self, record: &Record) -> Option<(f64, f64)> {
         let StartAt::Span(span) = self.start else { return None };
         Some(span.unwrap_or_else(|| default_start_span(record)))

@@ -16,7 +16,7 @@ pub enum PersonPrior {
     Population,
     /// As little as can be: the default values with wide errors.
     Nothing,
-    /// The same as by default, but for what is named.
+    /// The same as by default, except for what is named.
     Named(OperatorPrior),
     /// An earlier fit of the person.
     Fit(Box<FittedOperator>),

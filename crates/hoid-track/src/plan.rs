@@ -85,7 +85,7 @@ impl TrackPlan {
     /// every candidate.
     ///
     /// # Errors
-    /// Those of the search.
+    /// The entries of the search.
     pub fn choose(
         &self,
         span: &Record,
@@ -167,7 +167,7 @@ pub fn ranges_of(
     Ok(narrowed(default.with(named)?, delay, of_start, sample_time))
 }
 
-/// Narrows ranges to what is known besides.
+/// Narrows ranges to what is known in addition.
 fn narrowed(
     mut ranges: OrderRanges,
     track_delay_s: Option<(f64, f64)>,

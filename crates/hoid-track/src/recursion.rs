@@ -77,7 +77,7 @@ pub trait Recursion: State + Send + Sync {
     fn response_value(&self, _omega_rad_s: f64) -> Option<[f64; 2]> {
         None
     }
-    /// Multiplies the covariance of its gain by a factor; false where it has none.
+    /// Multiplies the covariance of its gain by a factor; false if it has none.
     fn scale_covariance(&mut self, _factor: f64) -> bool {
         false
     }

@@ -19,7 +19,7 @@ pub fn sealed(mut numbers: Vec<f64>) -> Vec<f64> {
     numbers
 }
 
-/// The numbers before their seal; none where it is another.
+/// The numbers before their seal; none if it is another.
 pub fn opened(sealed: &[f64]) -> Option<&[f64]> {
     let (stated, numbers) = sealed.split_last()?;
     (stated.to_bits() == seal(numbers).to_bits()).then_some(numbers)

@@ -43,7 +43,7 @@ pub struct Setup {
     pub forgetting: ForgettingRule,
     /// P at the start as a multiple of the unit matrix; none for that of the start fit.
     pub covariance: Option<f64>,
-    /// How far P may grow where nothing excites a parameter; none where that follows from the start.
+    /// How far P may grow where nothing excites a parameter; none if that follows from the start.
     pub windup_guard: Option<WindupGuard>,
     /// Multiple of the innovation's standard deviation beyond which an innovation moves the
     /// estimate no further.
@@ -52,7 +52,7 @@ pub struct Setup {
     pub stable: Stable,
     /// True for a method that needs no start fit.
     pub starts_itself: bool,
-    /// True where the operator's parameters move.
+    /// True if the operator's parameters move.
     pub is_physical: bool,
     /// Bounds of physical parameters.
     pub bounds: BTreeMap<String, Constraint>,

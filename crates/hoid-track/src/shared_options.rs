@@ -79,7 +79,7 @@ impl GainOptions {
         }
     }
 
-    /// The guard against windup in use; `None` where it follows from the start. It is off for the
+    /// The guard against windup in use; `None` if it follows from the start. It is off for the
     /// recursion of the thesis: P at the start is given, P forgets exponentially, and no innovation
     /// is too large.
     pub fn windup_guard(&self, limit: f64) -> Option<WindupGuard> {

@@ -68,9 +68,9 @@ pub struct StartState {
     pub variance: f64,
     /// Residuals that gave it.
     pub residuals: f64,
-    /// True where a fit gave it.
+    /// True if a fit gave it.
     pub from_fit: bool,
-    /// The fit, where it is at hand.
+    /// The fit, where it is available.
     pub fit: Option<Fit>,
 }
 
@@ -79,7 +79,7 @@ impl StartState {
     /// and that fit where it is known.
     ///
     /// # Errors
-    /// Those of the batch fit; [`IdentError::BadStart`].
+    /// The entries of the batch fit; [`IdentError::BadStart`].
     pub fn new(
         setup: &Setup,
         span: Option<&Record>,

@@ -18,7 +18,7 @@ pub(crate) struct StartNoise {
 }
 
 impl StartNoise {
-    /// Of order nd, from what the operator of this fit leaves of a record; `None` where that is too
+    /// Of order nd, from what the operator of this fit leaves of a record; `None` if that is too
     /// short or constant, or the fit is one of another sampling.
     pub fn of(fit: &Fit, record: &Record, nd: usize) -> Option<Self> {
         let simulated = fit.simulate(record).ok()?;

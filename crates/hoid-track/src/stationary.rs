@@ -163,7 +163,7 @@ impl Channel {
         self.steps = [self.steps[1], 0.0];
         let distance = std::mem::take(&mut self.largest);
         self.first = x;
-        // Of a stand the size is not learnt.
+        // For a stand the size is not learnt.
         if distance <= self.tolerance || !distance.is_finite() {
             return;
         }
@@ -227,7 +227,7 @@ impl State for StationaryWatch {
 }
 
 impl StationaryWatch {
-    /// Of a recursion with a delay of nk samples; none where samples are too close.
+    /// For a recursion with a delay of nk samples; none if samples are too close.
     pub fn new(nk: usize, sample_time: SampleTime) -> Option<Self> {
         let samples = |seconds: f64| ((seconds / sample_time.s()).round() as u64).max(LEAST);
         let one = samples(ONE_S);

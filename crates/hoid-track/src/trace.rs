@@ -24,7 +24,7 @@ pub struct Trace {
     pub(crate) times_s: Vec<f64>,
     /// theta by rows.
     pub(crate) theta: Vec<f64>,
-    /// Covariance of theta by rows and the upper triangle of each; NaN where there is none.
+    /// Covariance of theta by rows and the upper triangle of each; NaN if there is none.
     pub(crate) covariance: Vec<f64>,
     /// The operator itself, for a recursion in physical parameters.
     pub(crate) operator: Vec<OperatorEstimate>,
@@ -58,7 +58,7 @@ pub struct Trace {
     pub(crate) response_doubt: Option<Finding>,
     /// Every crossing of the loop at the end with its controlled element.
     pub(crate) loop_shape: Option<LoopShape>,
-    /// True where the response at the end is determined at some frequency, whatever gain and lead are.
+    /// True if the response at the end is determined at some frequency, whatever gain and lead are.
     pub(crate) response_is_known: bool,
     /// Samples between two rows.
     pub(crate) every: usize,
@@ -336,7 +336,7 @@ impl Trace {
         &self.held
     }
 
-    /// True where a guard was in front of the recursion.
+    /// True if a guard was in front of the recursion.
     pub fn is_guarded(&self) -> bool {
         self.guarded
     }

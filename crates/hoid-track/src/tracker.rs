@@ -24,7 +24,7 @@ use crate::{
     trace::operator_of,
 };
 
-/// Frequency at which the sign of a response is looked at, rad/s.
+/// Frequency at which the sign of a response is examined, rad/s.
 const LOW_RAD_S: f64 = 0.5;
 /// Frequencies at which a response may be known, rad/s, and the error from which it is, dB.
 const KNOWN_AT_RAD_S: [f64; 3] = [1.0, 2.0, 4.0];
@@ -43,7 +43,7 @@ pub struct Tracker {
     pub(crate) recursion: Box<dyn Recursion>,
     pub(crate) guard: Option<Box<Guard>>,
     pub(crate) stationary: Option<Box<StationaryWatch>>,
-    /// True where the last sample moved the estimate.
+    /// True if the last sample moved the estimate.
     pub(crate) moved: bool,
     pub(crate) last_e: f64,
     pub(crate) counts: Counts,
@@ -271,8 +271,8 @@ impl Tracker {
         Some(OpenLoop::of(value, whole, element, self.sample_time))
     }
 
-    /// True where a method whose basis holds more forms than gain and lead knows the response of now at some frequency
-    /// to a quarter: gain and lead may be open then.
+    /// True if a method whose basis holds more forms than gain and lead knows the current response at some frequency to
+    /// a quarter: gain and lead may be open then.
     pub(crate) fn response_is_known(&self) -> bool {
         let known = |omega: &f64| {
             let gain = self
@@ -283,7 +283,7 @@ impl Tracker {
         self.options.method.lag_of_basis_s().is_some() && KNOWN_AT_RAD_S.iter().any(known)
     }
 
-    /// Every crossing of the loop of now with its controlled element; `None` without one, or without an estimate.
+    /// Every crossing of the current loop with its controlled element; `None` without one, or without an estimate.
     pub(crate) fn open_loop_shape(&self) -> Option<LoopShape> {
         let element = self.options.controlled_element.as_ref()?;
         self.response(1.0)?;
@@ -304,7 +304,7 @@ impl Tracker {
         LoopShape::of(known, element, self.sample_time)
     }
 
-    /// What the response of now reports against who is reported to have held the loop: with a controlled element the
+    /// What the current response reports against who is reported to have held the loop: with a controlled element the
     /// loop that they would make ([`LoopShape::doubt`]), without one the sign of the response at low frequencies.
     pub(crate) fn response_doubt(&self) -> Option<Finding> {
         if let Some(element) = &self.options.controlled_element {

@@ -14,9 +14,9 @@
 //! that is too stiff explains less where the person changes. Runs are laid on one another from their
 //! first samples on, so that what changes in the task has to change at the same time in both.
 //!
-//! [`track_validated`] takes the proposal by its word: P is updated in course. At regular times the
-//! model of now and that of one interval before are both simulated over the last seconds of the second
-//! run; where the one of now explains less,
+//! [`track_validated`] takes the proposal by its word: P is updated in course. At regular times the current model and
+//! that of one interval before are both simulated over the last seconds of the second run; where the current one
+//! explains less,
 //!
 //! `P <- P max(least, ((1 - VAF_before)/(1 - VAF_now))^power)`,
 //!
@@ -224,7 +224,7 @@ pub fn choose_covariance(
 pub struct CovarianceUpdates {
     /// Time between two looks at the second run, s.
     pub interval_s: f64,
-    /// Length of the second run that is looked at, s.
+    /// Length of the second run that is examined, s.
     pub window_s: f64,
     /// Smallest factor of P.
     pub least: f64,

@@ -40,7 +40,7 @@ fn run(condition: Condition, order: usize, noise_level: f64, replication: u64) -
     Simulator::new(&scenario).unwrap().run(seed, false).unwrap()
 }
 
-/// By the settings of the text, and what is set besides.
+/// By the settings of the text, and what is set in addition.
 fn of_the_text(method: Method, besides: &[(&str, &str)]) -> TrackOptions {
     let rpem = method == Method::rpem();
     let options = TrackOptions {

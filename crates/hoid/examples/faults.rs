@@ -21,7 +21,7 @@ use fault_corpus::{
 };
 use rayon::prelude::*;
 
-/// That of the page; the tests have others.
+/// The value for the page; the tests have others.
 const SEED: u64 = 2121;
 /// Numbers of clean runs start here, so that none is the run of a fault.
 const FIRST_CLEAN: u64 = 100_000;

@@ -195,7 +195,7 @@ fn fits_are_judged() {
     let told = judged(&fit(1.5, Some(0.1), "doubtful"));
     assert!(told.wrong && told.flagged() && !told.silently_wrong());
     assert!(!judged(&fit(1.39, Some(0.1), "trustworthy")).wrong);
-    // What has no standard error claims nothing, but for a delay on the grid.
+    // What has no standard error claims nothing, except for a delay on the grid.
     let open = judged(&fit(9.0, None, "trustworthy"));
     assert!(!open.wrong && matches!(&open.worst, Some((name, z)) if name == "tau_e" && (z - 1.0).abs() < 1e-9));
     let mut late = fit(1.0, Some(0.1), "trustworthy");

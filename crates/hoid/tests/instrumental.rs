@@ -399,7 +399,7 @@ fn a_missing_or_useless_channel_is_told() {
 #[test]
 fn instruments_that_vanish_where_they_count_are_told() {
     let record = open_loop(&[], 1.0, 2000, 0);
-    // Zero but for one sample near the end: no instrument is left in the rows that count.
+    // Zero except for one sample near the end: no instrument is left in the rows that count.
     let mut late = vec![0.0; 2000];
     late[1999] = 1.0;
     let record = record.with_channel(Channel::new("late", "", late)).unwrap();

@@ -309,7 +309,7 @@ fn parameters_can_be_held_and_the_time_axis_moved() {
     let moved = record.clone().starting_at(100.0);
     let later = held.fit(one(&moved)).unwrap();
     let shift = value(&later, "t_M").value - value(&fit, "t_M").value;
-    // Of a standard error of half a second; the search stops at 1e-4 of it.
+    // For a standard error of half a second; the search stops at 1e-4 of it.
     assert!((shift - 100.0).abs() < 1e-3, "{shift}");
 
     let trace = fit.trace(record);

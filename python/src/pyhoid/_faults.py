@@ -37,5 +37,5 @@ def _same(one: Record, other: Record) -> bool:
 def faults_of(
     native: _pyhoid.Fit | _pyhoid.OperatorFit | _pyhoid.TimeVaryingFit | _pyhoid.Description,
 ) -> list[dict[str, Any]]:
-    """Faults of the records that were looked for, each with the place of its record."""
+    """Faults of the records that were searched for, each with the place of its record."""
     return [{"record": place, **fault} for place, fault in native.faults]

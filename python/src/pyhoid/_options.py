@@ -83,7 +83,7 @@ def numbers(name: str, values: Mapping[str, Any]) -> dict[str, float]:
 
 
 def guesses(name: str, values: Any) -> str | None:
-    """Pairs of numbers by name, as NAME=VALUE:WEIGHT; None where there are none.
+    """Pairs of numbers by name, as NAME=VALUE:WEIGHT; None if there are none.
 
     >>> guesses("coefficient_prior", {"f1": (-1.9, 0.5)})
     'f1=-1.9:0.5'
@@ -122,7 +122,7 @@ def delay(value: Any) -> tuple[float, float] | None:
 
 
 def text(name: str, value: Any) -> str | None:
-    """A value as the command line writes it; None where it carries no information.
+    """A value as the command line writes it; None if it carries no information.
 
     >>> text("memory_of", {"b": 256, "f": "inf"})
     'b=256,f=inf'

@@ -370,7 +370,7 @@ class Tracker:
     def sample_time(self) -> float: ...
     @property
     def decimation(self) -> str | None:
-        """How a high rate is lowered; None where it is not."""
+        """How a high rate is lowered; None if it is not."""
 
     @property
     def method(self) -> str: ...

@@ -30,9 +30,9 @@ class Result:
     settings: dict[str, Any]
     #: Names of those that are not the default.
     given: frozenset[str]
-    #: Units of e and u; empty where none is declared.
+    #: Units of e and u; empty if none is declared.
     units: tuple[str, str]
-    #: Faults of the records that were looked for: record, kind, channel, from, to, samples, size,
+    #: Faults of the records that were searched for: record, kind, channel, from, to, samples, size,
     #: deviations, action, words.
     faults: list[dict[str, Any]]
 

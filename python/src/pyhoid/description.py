@@ -33,7 +33,7 @@ class DescribingFunction:
 
     Columns are read by name, and have one value for each line: ``omega`` (rad/s), ``harmonic``,
     ``response`` (complex), ``response_se``, ``coherence``, ``magnitude_db``, ``phase_deg``, with
-    ``_se`` for standard errors (NaN where there is only one run).
+    ``_se`` for standard errors (NaN if there is only one run).
 
     Examples
     --------
@@ -280,7 +280,7 @@ class Description:
         self._json: str = native.to_json()
         #: The settings that were used, by name.
         self.settings: dict[str, str] = {name: value for name, value, _ in native.settings}
-        #: Faults of the records that were looked for: kind, channel, from, to, size, action.
+        #: Faults of the records that were searched for: kind, channel, from, to, size, action.
         self.faults: list[dict[str, Any]] = faults_of(native)
         self.phase_deg: FloatArray = native.phase_deg
         found = native.open_loop

@@ -58,7 +58,7 @@ def unit_of(name: str, units: tuple[str, str] = ("", ""), own: str | None = None
 
 
 def channel_units(records: Sequence[Record]) -> tuple[str, str]:
-    """The units of input and output, whatever their columns are called; empty where none is given."""
+    """The units of input and output, whatever their columns are called; empty if none is given."""
     if not records:
         return ("", "")
     record, units = records[0], records[0].units
@@ -71,7 +71,7 @@ def channel_units(records: Sequence[Record]) -> tuple[str, str]:
 class Estimate(NamedTuple):
     """A value and its standard error.
 
-    The standard error is None where there is none: for a delay of whole samples, or an exact fit.
+    The standard error is None if there is none: for a delay of whole samples, or an exact fit.
 
     Examples
     --------

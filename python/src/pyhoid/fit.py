@@ -143,7 +143,7 @@ class Fit(Model, Result):
 
     @property
     def operator(self) -> Operator | None:
-        """The human operator; None where the structure cannot represent one."""
+        """The human operator; None if the structure cannot represent one."""
         found = self._native.operator
         return None if found is None else Operator(found, self.units)
 
@@ -159,7 +159,7 @@ class Fit(Model, Result):
     def levels(self) -> list[Estimate | None]:
         """The level of u of each record: the constant that is not a response to e, in the unit of u.
 
-        Estimated of recorded data; empty for simulated runs and with ``faults="keep"``. None where
+        Estimated of recorded data; empty for simulated runs and with ``faults="keep"``. None if
         the model has no static gain.
         """
         return [None if pair is None else Estimate(*pair) for pair in self._native.levels]

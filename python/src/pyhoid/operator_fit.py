@@ -70,7 +70,7 @@ class OperatorFit(Model, Result):
         The whole of that loop: ``crossovers`` (every frequency in rad/s at which its gain is one, with
         its phase margin in deg, a pair of Estimates each), ``smallest_phase_margin_deg``,
         ``gain_margin_db``, ``phase_crossover_rad_s`` (None where there is none), and ``stable``: True,
-        False, or None where that cannot be determined. None without a controlled element.
+        False, or None if that cannot be determined. None without a controlled element.
     open_loop_intervals : dict or None
         Their intervals of 95 %, (low, high) each, Student's: the errors rest on few runs or blocks.
     open_loop_person : dict or None
@@ -105,7 +105,7 @@ class OperatorFit(Model, Result):
         The same model as polynomials, one for each of `operators`: prediction, simulation,
         residuals, frequency response. They take records without their mean, such as `records`.
     faults : list of dict
-        Faults of the records that were looked for: record, kind, channel, from, to, samples, size,
+        Faults of the records that were searched for: record, kind, channel, from, to, samples, size,
         deviations, action, words.
     settings : dict
         The keywords of the call, defaults included.

@@ -326,7 +326,7 @@ def info(
         with frequency, gaps and jitter; ``trouble`` with the problems of the sampling, where,
         how much, and the remedy; ``notes``; ``look`` with the columns of error and control, the
         excitation and its longest span of whole periods, by how much the control is late, and in
-        ``read`` the keywords by which `read` takes the file so (None where that is not certain).
+        ``read`` the keywords by which `read` takes the file so (None if that is not certain).
 
     Raises
     ------

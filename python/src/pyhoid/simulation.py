@@ -118,7 +118,7 @@ def margins(
     -------
     dict
         ``crossover_rad_s``, ``phase_margin_deg``, ``gain_margin_db``, ``phase_crossover_rad_s``
-        (None where there is none), and ``remnant_gain``, a list of dicts with ``remnant_order``,
+        (None if there is none), and ``remnant_gain``, a list of dicts with ``remnant_order``,
         ``noise_level``, ``definition`` and ``K_n``.
 
     Examples

@@ -52,7 +52,7 @@ class Trace:
     """The estimate at every sample that was kept, with its uncertainty. `track` makes it.
 
     Columns are read by name: ``trace["K_e"]``, and ``trace["K_e_se"]`` for its standard errors. All
-    have shape (N,), and NaN where a row has no operator. With `at` and `controlled_element` there
+    have shape (N,), and NaN if a row has no operator. With `at` and `controlled_element` there
     are ``trace["gain_db@2.5"]``, ``trace["phase_deg@2.5"]``, ``trace["crossover_rad_s"]`` and
     ``trace["phase_margin_deg"]``; ``"adaptive"`` adds ``trace["omega_nm_determined"]`` and the
     like, 1 where the data determine a parameter.

@@ -180,7 +180,7 @@ class Tracker(_pyhoid.Tracker):
         return told
 
     def operator_estimate(self) -> Operator | None:
-        """The operator with standard errors; None where the structure cannot represent one.
+        """The operator with standard errors; None if the structure cannot represent one.
 
         >>> tracker.operator_estimate()
         """

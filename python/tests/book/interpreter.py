@@ -1,4 +1,4 @@
-"""A fresh interpreter that runs the Python blocks of a page one after another.
+"""A fresh interpreter that runs the Python blocks of a page one after the other.
 
 It reads a block a line, as JSON, and answers by a line of JSON on the file that its first argument
 numbers: null, or what went wrong. A comment after an expression that is a number, a list or a text

@@ -226,7 +226,7 @@ impl Case {
         times
     }
 
-    /// True where all that changes does so within two seconds: there is a moment to be found.
+    /// True if all that changes does so within two seconds: there is a moment to be found.
     pub fn changes_at_once(&self) -> bool {
         self.shifts.iter().all(|shift| shift.takes_s <= 2.0)
     }

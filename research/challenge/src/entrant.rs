@@ -1,4 +1,4 @@
-//! Who takes part: anything that reports what the response of a person is, and when they changed.
+//! An entrant: anything that estimates the response of a person and the times of changes.
 
 use hoid_model::{Complex64, Record, SampleTime};
 
@@ -7,7 +7,7 @@ use hoid_model::{Complex64, Record, SampleTime};
 pub struct Task {
     /// Time between two samples.
     pub sample_time: SampleTime,
-    /// Error; NaN where nothing was recorded. The first sample is at time 0.
+    /// Error; NaN if nothing was recorded. The first sample is at time 0.
     pub e: Vec<f64>,
     /// Control.
     pub u: Vec<f64>,
@@ -65,8 +65,8 @@ impl Task {
         Some(record.labelled(self.label.clone()).starting_at(self.time_s(from)))
     }
 
-    /// All samples in order, with the history of the second recording before it: sample, or none
-    /// where it is history; error; control.
+    /// All samples in order, with the history of the second recording before it: sample, or none if
+    /// it is history; error; control.
     pub fn samples(&self) -> impl Iterator<Item = (Option<usize>, f64, f64)> + '_ {
         let at = self.seam.as_ref().map_or(self.e.len(), |seam| seam.at);
         let own = move |from: usize, to: usize| (from..to).map(move |k| (Some(k), self.e[k], self.u[k]));
@@ -80,7 +80,7 @@ impl Task {
 /// Report about the response at a time.
 #[derive(Debug, Clone, Default)]
 pub struct ReportedResponse {
-    /// H at each line; empty where nothing is specified.
+    /// H at each line; empty if nothing is specified.
     pub response: Vec<Complex64>,
     /// Variances of its real and imaginary part and their covariance, at each line.
     pub covariance: Option<Vec<[f64; 3]>>,
@@ -94,7 +94,7 @@ pub struct ReportedResponse {
 pub struct Alarm {
     /// When, s.
     pub t_s: f64,
-    /// True where it is reported to be of the remnant alone.
+    /// True if it is reported to be of the remnant alone.
     pub of_remnant: bool,
 }
 

@@ -13,7 +13,7 @@
 
 use hoid_model::{Complex64, ContinuousTransferFunction, ModelError, SampleTime, polynomial};
 
-/// An operator. Times in s, frequencies in rad/s; zero where a factor is not there.
+/// An operator. Times in s, frequencies in rad/s; zero if a factor is not there.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Operator {
     /// K, control per error.
@@ -116,7 +116,7 @@ impl Operator {
         ]
     }
 
-    /// True where it is the operator of the thesis: gain, lead, neuromuscular system, delay.
+    /// True if it is the operator of the thesis: gain, lead, neuromuscular system, delay.
     pub fn is_lead(&self) -> bool {
         self.leads == 1 && self.lag_s == 0.0 && self.third_s == 0.0 && self.stick_rad_s == 0.0
     }

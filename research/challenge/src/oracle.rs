@@ -63,8 +63,8 @@ pub fn evidence(case: &Case, run: &Run, change: usize, seconds: f64) -> f64 {
         .sum()
 }
 
-/// What the batch fit shows at the times that are asked for, `changes_s` known; nothing where it
-/// has too few seconds or fails.
+/// What the batch fit shows at the times that are asked for, `changes_s` known; nothing if it has
+/// too few seconds or fails.
 pub fn batch(task: &Task, changes_s: &[f64], tau_e_s: f64) -> Vec<ReportedResponse> {
     let nk = (tau_e_s / task.sample_time.s()).round() as usize + 1;
     let structure = Structure::BoxJenkins;

@@ -29,7 +29,7 @@ use super::{
 pub struct Run {
     /// Time between two samples.
     pub sample_time: SampleTime,
-    /// Recorded error; NaN where nothing was recorded.
+    /// Recorded error; NaN if nothing was recorded.
     pub e: Vec<f64>,
     /// Recorded control.
     pub u: Vec<f64>,

@@ -227,7 +227,7 @@ fn overview(lines: &[Line], methods: &[&str], cases: &[&str]) -> String {
     text
 }
 
-/// Who could not follow, why, and where.
+/// Entrants that failed, why, and where.
 fn failures(lines: &[Line]) -> String {
     let failed = || (lines.iter()).filter_map(|line| Some((line, line.failed.as_deref()?)));
     let mut text = String::new();

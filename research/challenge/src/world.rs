@@ -125,7 +125,7 @@ impl World {
                 self.errors.get(sample as usize).copied().unwrap_or(0.0)
             }
         };
-        // A place on the border but for rounding is on it.
+        // A place on the border except for rounding is on it.
         let edge = (first + 1.0 - 1e-9).floor();
         if edge >= last || edge <= first {
             return value(first + 1e-9);

@@ -126,7 +126,7 @@ impl Tables {
                     let rows = self.rows(&format!("{what}_{p}"), "all", &CHANGING, name);
                     let bias: Vec<f64> = rows.iter().map(|row| row.statistics.median.abs()).collect();
                     let spread = |row: &&SummaryRow| {
-                        // Of a normal sample the standard deviation; a few that diverged do not
+                        // For a normal sample the standard deviation; a few that diverged do not
                         // count.
                         (row.statistics.upper_quartile - row.statistics.lower_quartile) / 1.349
                     };

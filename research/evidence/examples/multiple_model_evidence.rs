@@ -184,7 +184,7 @@ fn detection(runs: usize) {
         }
         both
     };
-    // Of each method and threshold: lags and misses per condition, false alarms and hours.
+    // For each method and threshold: lags and misses per condition, false alarms and hours.
     let thresholds: [Vec<f64>; 2] = [
         vec![-1.0, 0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 15.0, 20.0],
         vec![2.0, 2.5, 3.0, 3.5, 4.0, 4.5, 5.0, 6.0, 7.0, 8.0, 10.0, 15.0],
@@ -480,7 +480,7 @@ fn joined(files: &[String]) {
     }
 }
 
-/// Time of a step with its estimate, the least mean of so many runs, ns.
+/// Time of a step with its estimate, the least mean of a given number of runs, ns.
 fn cost(runs: usize) {
     let simulator = simulator(Condition::C4, 2, 0.1);
     let record = run(&simulator, Condition::C4, 2, 1, 0);

@@ -3,7 +3,7 @@
 //! `HOID_PILOT_DATA=DIR cargo run --release -p hoid-evidence --example recorded_faults --
 //! [RUNS|all] [METHOD]`
 //!
-//! The folder is that of the example `pilots_evidence`. Of each recording as it is the first line counts what was
+//! The folder is that of the example `pilots_evidence`. For each recording as it is the first line counts what was
 //! reported, by kind. Each fault of the study `tracker-faults` that fits into it, and steps and ramps of a target as
 //! well, is put in at two places; *told* is an event between its first sample and 3 s after its last that the recording
 //! without it does not have there.

@@ -34,7 +34,7 @@ const RATE: usize = 100;
 const INNER: usize = 10;
 const PRIMES: [f64; 11] = [2.0, 3.0, 5.0, 7.0, 11.0, 13.0, 17.0, 19.0, 23.0, 29.0, 31.0];
 
-/// Who answers, as `K (T_L s + 1)/(T_I s + 1) e^{-tau s}` after the neuromuscular system; T_I = 0 for none.
+/// The simulated person, as `K (T_L s + 1)/(T_I s + 1) e^{-tau s}` after the neuromuscular system; T_I = 0 for none.
 #[derive(Debug, Clone, Copy)]
 struct Operator {
     k: f64,
@@ -137,7 +137,7 @@ impl Forcing {
     }
 }
 
-/// e and u; `None` where the loop does not stay bounded.
+/// e and u; `None` if the loop does not stay bounded.
 fn simulate(
     who: &Somebody,
     forcing: &Forcing,

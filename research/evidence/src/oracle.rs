@@ -1,7 +1,7 @@
 //! What someone could know at most: the likelihood ratio of the person after a change against the person before it,
 //! where both are known.
 //!
-//! The gains s of each are those of all trials of that element (but the one that is looked at), in the basis of the
+//! The gains s of each are those of all trials of that element (but the one that is examined), in the basis of the
 //! default person; after the whitening filter of the first trial's remnant, with its variance,
 //!
 //! `log Lambda = sum (limited (y - x' s_0))^2 - (limited (y - x' s_1))^2) / 2 sigma^2`
@@ -87,8 +87,8 @@ fn autoregression(v: &[f64]) -> Vec<f64> {
     core::iter::once(1.0).chain(d.iter().map(|d| -d)).collect()
 }
 
-/// `log Lambda` over the first `samples` of the second trial: `before` are the first person's trials, the one
-/// that is joined first at `joined`; `after` those of the second without the one that is looked at.
+/// `log Lambda` over the first `samples` of the second trial: `before` are the first person's trials, the one that is
+/// joined first at `joined`; `after` those of the second without the one that is examined.
 pub fn log_ratio(before: &[&Rows], joined: usize, after: &[&Rows], second: &Rows, samples: usize) -> f64 {
     let first = before[joined];
     let mut d: Vec<f64> = (0..=ORDER).map(|j| f64::from(j == 0)).collect();

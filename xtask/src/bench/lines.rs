@@ -76,7 +76,7 @@ pub fn best(lines: Vec<Line>) -> Vec<Line> {
     kept
 }
 
-/// Largest relative difference of two answers; none where they cannot be compared.
+/// Largest relative difference of two answers; none if they cannot be compared.
 pub fn difference(a: &[f64], b: &[f64]) -> Option<f64> {
     let comparable = !a.is_empty() && a.len() == b.len();
     let relative = |(x, y): (&f64, &f64)| (x - y).abs() / x.abs().max(y.abs()).max(f64::MIN_POSITIVE);

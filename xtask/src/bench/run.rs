@@ -31,7 +31,7 @@ const WORK: &str = "target/bench";
 pub fn bench(arguments: &[String]) -> Result<(), String> {
     let options = Options::read(arguments)?;
     if options.instructions {
-        // Of the whole workspace, as the tests: with other features the same crates would be built
+        // For the whole workspace, as the tests: with other features the same crates would be built
         // twice.
         let ours = build(&["--workspace", "--example", "tasks"], "examples/tasks", Profile::Tests)?;
         return instructions::gate(&ours, &data(), options.keep);

@@ -74,7 +74,7 @@ pub fn settings(all: &[Setting]) -> Value {
         .collect()
 }
 
-/// A number, or null where there is none: JSON has no NaN.
+/// A number, or null if there is none: JSON has no NaN.
 pub fn number(value: f64) -> Value {
     serde_json::Number::from_f64(value).map_or(Value::Null, Value::Number)
 }
@@ -89,7 +89,7 @@ pub fn estimate(e: &Estimate) -> Value {
     json!({"value": number(e.value), "standard_error": optional(e.standard_error)})
 }
 
-/// The same with its interval of 95 %, null where there is none.
+/// The same with its interval of 95 %, null if there is none.
 pub fn estimate_within(e: &Estimate, interval: Option<(f64, f64)>) -> Value {
     json!({
         "value": number(e.value),

@@ -83,7 +83,7 @@ pub struct PolynomialAnswer<'a> {
     pub quality: GoodnessOfFit,
     /// Its parameters as an operator with a gain and a lead.
     pub operator: Result<OperatorEstimate, NotConvertible>,
-    /// Of polynomials of other orders: the operator of the family that they represent.
+    /// For polynomials of other orders: the operator of the family that they represent.
     pub family: Option<Result<FamilyConversion, NotConvertible>>,
     /// Its noise model as a remnant filter.
     pub remnant: Option<Result<RemnantEstimate, NotConvertible>>,
@@ -101,7 +101,7 @@ impl<'a> PolynomialAnswer<'a> {
     /// A model that was identified, with what follows from it.
     ///
     /// # Errors
-    /// Those of a prediction of the records.
+    /// The entries of a prediction of the records.
     pub fn of<F>(found: &'a Identified<F>, fit: &'a Fit) -> Result<Self, AnalysisError> {
         let (data, with_input) = (&found.data, fit.model().structure().has_input());
         let validations = data.records.iter().map(|record| fit.validate(record));

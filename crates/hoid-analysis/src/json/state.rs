@@ -18,7 +18,7 @@ struct Table<T> {
     value: T,
 }
 
-/// A value as text; none where it cannot be written.
+/// A value as text; none if it cannot be written.
 pub fn written<T: Serialize>(value: &T) -> Option<String> {
     let text = toml::to_string(&Table { value }).ok()?;
     Some(format!("{}{text}", sum(&text)))

@@ -31,8 +31,8 @@ pub struct Advice {
 }
 
 impl Look {
-    /// How the file is to be read; `None` where it is not certain which columns are error and control. Of
-    /// one that makes no record yet the columns are known alone.
+    /// How the file is to be read; `None` if it is not certain which columns are error and control. For one that makes
+    /// no record yet the columns are known alone.
     pub fn advice(&self) -> Option<Advice> {
         if !self.roles.are_certain() {
             return None;

@@ -31,8 +31,8 @@ pub struct RecordSummary {
     pub record: Record,
     /// The excitation and its span of whole periods, or why there is none.
     pub periods: Result<Periods, String>,
-    /// By how much the control was recorded late, or why that is not known; `None` where no controlled
-    /// element is known, or the lag is.
+    /// Amount by which the control was recorded late, or why that is not known; `None` if no controlled element is
+    /// known, or the lag is.
     pub lag: Option<Result<Lag, String>>,
 }
 
@@ -86,7 +86,7 @@ fn seen(path: &Path, roles: &Roles, known: &LookOptions) -> Result<RecordSummary
         sampling_hz: known.sampling_hz,
         ..ReadOptions::default()
     };
-    // Of several trials the first is looked at.
+    // For several trials the first is examined.
     let record = match read_record(path, &options) {
         Err(IoError::SeveralTrials { by, trials, .. }) => {
             let first = trials.first().map_or("", String::as_str);

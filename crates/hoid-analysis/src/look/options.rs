@@ -1,4 +1,4 @@
-//! Prior knowledge of a file before it is looked at.
+//! Prior knowledge of a file before it is examined.
 
 use hoid_io::{TimeChoice, TrialChoice};
 use hoid_model::ContinuousTransferFunction;
@@ -10,7 +10,7 @@ pub struct LookOptions {
     pub input: Option<String>,
     /// Column of the output.
     pub output: Option<String>,
-    /// Column of the excitation; `none` where there is none.
+    /// Column of the excitation; `none` if there is none.
     pub excitation: Option<String>,
     /// The controlled element, as it was typed, and as it is meant.
     pub controlled_element: Option<(String, ContinuousTransferFunction)>,

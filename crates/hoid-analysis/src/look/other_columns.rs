@@ -18,7 +18,7 @@ pub struct OtherColumns {
     pub missing: String,
     /// The columns that there are.
     pub available: String,
-    /// The error; `None` where none is wanted.
+    /// The error; `None` if none is wanted.
     pub input: Option<String>,
     /// The control.
     pub output: String,
@@ -69,8 +69,7 @@ impl OtherColumns {
     }
 }
 
-/// The columns that a file has in place of e and u; `None` where the error is another one, or that is not
-/// certain.
+/// The columns that a file has in place of e and u; `None` if the error is another one, or that is not certain.
 pub fn other_columns(error: &IoError, path: &Path, options: &ReadOptions) -> Option<OtherColumns> {
     let IoError::NoSuchColumn {
         file,

@@ -84,7 +84,7 @@ fn in_channel(record: &Record, channel: &str, known: &LookOptions) -> Option<Per
         .filter_map(|span| lines_in(record, channel, *span).map(|(excitation, leak)| (*span, excitation, leak)))
         .collect();
     let least = near.iter().map(|(.., leak)| *leak).fold(f64::INFINITY, f64::min);
-    // Of those that leak alike the first, which is the longest.
+    // For those that leak alike the first, which is the longest.
     let limit = LEAKS_ALIKE * least.max(ROUNDING);
     let ((from_s, to_s), excitation, _) = near.into_iter().find(|(.., leak)| *leak <= limit)?;
     let (omega, period_s) = (excitation.omega_rad_s(), excitation.period_s());

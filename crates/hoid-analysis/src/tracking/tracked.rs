@@ -128,7 +128,7 @@ impl Tracked {
         OutputTable { comments, columns }
     }
 
-    /// True where the coefficients represent an operator at all.
+    /// True if the coefficients represent an operator at all.
     pub fn has_operator(&self) -> bool {
         self.operators.iter().any(|o| {
             !matches!(

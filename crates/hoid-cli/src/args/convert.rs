@@ -69,7 +69,7 @@ pub struct ConvertArgs {
     pub json: bool,
 }
 
-/// A discretisation; prewarping needs its frequency besides.
+/// A discretisation; prewarping needs its frequency in addition.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum MethodName {
     Zoh,

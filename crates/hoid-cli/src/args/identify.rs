@@ -1,4 +1,5 @@
-//! Options of `hoid identify`: what is read and written. Those of the estimators are in the registry of the library.
+//! Options of `hoid identify`: what is read and written. The entries of the estimators are in the registry of the
+//! library.
 
 use std::path::PathBuf;
 

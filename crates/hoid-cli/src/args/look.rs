@@ -1,4 +1,4 @@
-//! Prior knowledge of a file before it is looked at, as `hoid info` and `hoid group init` take it.
+//! Prior knowledge of a file before it is examined, as `hoid info` and `hoid group init` take it.
 
 use clap::Args;
 use hoid::analysis::LookOptions;

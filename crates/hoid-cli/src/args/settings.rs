@@ -58,7 +58,7 @@ impl<R> SettingArgs<R> {
     }
 }
 
-/// The flag of an option: its name, but for one that no language lets its keywords have.
+/// The flag of an option: its name, except for one that no language lets its keywords have.
 pub fn flag(name: &str) -> String {
     match name {
         "answers" => "for".to_owned(),

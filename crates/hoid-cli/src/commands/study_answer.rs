@@ -29,7 +29,7 @@ const MOST_PARAMETERS: usize = 3;
 /// Rows of one screen.
 const MOST_ROWS: usize = 24;
 
-/// The answer of the tables of a study; empty where they have no bias of a parameter.
+/// The answer of the tables of a study; empty if they have no bias of a parameter.
 pub fn answer(tables: &[PathBuf]) -> Result<String, CliError> {
     let is_summary = |path: &&PathBuf| path.file_stem().is_some_and(|stem| stem == "summary");
     let Some(summary) = tables.iter().find(is_summary) else {
@@ -50,7 +50,7 @@ struct Row {
     not_convertible: f64,
     /// Rate of those whose verdict is trustworthy, where there are verdicts.
     trustworthy: Option<f64>,
-    /// One a parameter, empty where there is none.
+    /// One a parameter, empty if there is none.
     biases: Vec<String>,
 }
 

@@ -3,7 +3,7 @@
 //! The covariance of an estimate is that about one top of the likelihood. Poles and delay have others, and what people
 //! do below 10 rad/s carries little information about which is right. So the operators at which the starts elsewhere
 //! have ended count too, each with the weight `w = exp(-deficit/TEMPERATURE_NATS) f^2`, where `deficit` is by how much
-//! its evidence was less and f the share of the samples of now that there were then: the scatter about the estimate is
+//! its evidence was less and f the share of the current samples that there were then: the scatter about the estimate is
 //! `sum w d d'/(1 + sum w)`. The evidence is tempered, for it supposes that the model is right (P. Grunwald and T. van
 //! Ommen, *Bayesian Analysis* 12 (2017) 1069-1103); and what they left open, more samples have made narrower.
 
@@ -23,7 +23,7 @@ struct Alternative {
 
 crate::state!([] Alternative { operator, deficit, samples, known });
 
-/// Those of all starts.
+/// The entries of all starts.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Alternatives {
     all: [Alternative; STARTS],

@@ -21,10 +21,10 @@
 //! `T_1 = Phi(h) (G(delta) (1 - delta/Ts) + R(delta)/Ts) + G(h) - R(h)/Ts`,
 //! `T_2 = Phi(h) (G(delta) delta/Ts - R(delta)/Ts)`, `h = Ts - delta`
 //!
-//! (K. J. Åström and B. Wittenmark, *Computer-Controlled Systems*, 1997, section 3.2; the triangle
-//! hold of G. F. Franklin, J. D. Powell and M. Workman, *Digital Control of Dynamic Systems*, 1998,
-//! section 6.3). Exact for a straight error and any delay. The response to a sampled sine is the
-//! operator's times that of the hold, `(sin(omega Ts/2)/(omega Ts/2))^2`, but for aliases.
+//! (K. J. Åström and B. Wittenmark, *Computer-Controlled Systems*, 1997, section 3.2; the triangle hold of G. F.
+//! Franklin, J. D. Powell and M. Workman, *Digital Control of Dynamic Systems*, 1998, section 6.3). Exact for a
+//! straight error and any delay. The response to a sampled sine is the operator's times that of the hold,
+//! `(sin(omega Ts/2)/(omega Ts/2))^2`, except for aliases.
 //!
 //! Each x_i is divided by its gain at [`REFERENCE`], so that all gains are in units of |Y| there.
 
@@ -219,8 +219,8 @@ impl Basis {
         self.point
     }
 
-    /// Whole samples of the delay: the signals of a sample need the error of so many samples ago,
-    /// and the two before it.
+    /// Whole samples of the delay: the signals of a sample need the error of a given number of
+    /// samples ago, and the two before it.
     pub fn delay(&self) -> usize {
         self.delay
     }

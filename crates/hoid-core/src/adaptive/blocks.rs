@@ -133,7 +133,7 @@ impl Block {
         matrix
     }
 
-    /// Least squares; `None` where they determine nothing, or there are too few samples.
+    /// Least squares; `None` if they determine nothing, or there are too few samples.
     pub fn solved(&self) -> Option<Solution> {
         if self.samples <= STATES as f64 {
             return None;

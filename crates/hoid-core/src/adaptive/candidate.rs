@@ -1,9 +1,9 @@
 //! One way to read the data: a basis, a noise model, and a mixture about what the gains did.
 //!
-//! A candidate reads samples one after another. Its whitening filter D and its basis stay as they are, so
-//! that it is the prediction error method for given D and a linearisation; what it learns for the next one
-//! is a better point of the basis (the corrections), a better noise model (`noise`, by the residuals) and how
-//! unevenly the innovations come (`volatility`). [`super::filter`] runs one after another over the data.
+//! A candidate reads samples one after the other. Its whitening filter D and its basis stay as they are, so that it is
+//! the prediction error method for given D and a linearisation; what it learns for the next one is a better point of
+//! the basis (the corrections), a better noise model (`noise`, by the residuals) and how unevenly the innovations come
+//! (`volatility`). [`super::filter`] runs one after the other over the data.
 //!
 //! `evidence` is the sum of the logarithms of the densities that it gave to blocks before it saw them (A. P. Dawid, *J.
 //! Royal Statistical Society* A 147 (1984) 278-292): by it candidates of the same data are compared. Each block was
@@ -184,7 +184,7 @@ impl Candidate {
         self.volatility.dispersion()
     }
 
-    /// The signals of a sample, from the errors of so many samples ago.
+    /// The signals of a sample, from the errors of a given number of samples ago.
     #[inline(always)]
     pub fn respond(&mut self, error: impl Fn(usize) -> f64) {
         let l = self.basis.delay();
@@ -218,7 +218,7 @@ impl Candidate {
         white.y - state[GAINS] * white.level - (0..SIGNALS).map(|k| w[k] * white.signals[k]).sum::<f64>()
     }
 
-    /// Learns from a sample; false where a number has overflowed.
+    /// Learns from a sample; false if a number has overflowed.
     #[inline(always)]
     pub fn update(&mut self, white: &Whitened, u: f64, prior: &ChangePrior) -> bool {
         let sound = |x: &f64| x.abs() < LARGEST;
@@ -354,7 +354,7 @@ impl Candidate {
 
     /// Ends a sample whose output is a prediction, or was moved to where it must be.
     pub fn remember_prediction(&mut self, u: f64) {
-        // As many as were predicted one after another, no more than D reaches back.
+        // As many as were predicted one after the other, no more than D reaches back.
         self.predicted = (self.predicted + 1).min(self.noise.order() as u64);
         self.remember(u);
     }

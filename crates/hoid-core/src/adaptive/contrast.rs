@@ -53,8 +53,8 @@ pub struct Contrast {
 crate::state!([] Contrast { difference, covariance, before, covariance_before, left, samples });
 
 impl Contrast {
-    /// Between blocks before and now, to each of which `with_prior` adds what is known besides; `shown` is w.
-    /// `None` where one side determines nothing.
+    /// Between blocks before and now, to each of which `with_prior` adds what is known in addition; `shown` is w.
+    /// `None` if one side determines nothing.
     pub(super) fn between(sides: [&[Block]; 2], shown: f64, with_prior: impl Fn(Block) -> Block) -> Option<Self> {
         let sums = sides.map(|blocks| with_prior(Block::of(blocks)));
         let [Some(before), Some(now)] = sums.each_ref().map(Block::solved) else {
@@ -93,8 +93,8 @@ impl Contrast {
         })
     }
 
-    /// How many times larger the covariance is than another, in the mean: `tr(C_other^-1 C) / N`. `None` where the
-    /// other is not positive.
+    /// How many times larger the covariance is than another, in the mean: `tr(C_other^-1 C) / N`. `None` if the other
+    /// is not positive.
     pub(super) fn dispersion(&self, other: &Self) -> Option<f64> {
         let mut factor = other.covariance;
         if !cholesky::factor(&mut factor, STATES) {
@@ -146,7 +146,7 @@ mod tests {
     use super::*;
     use crate::adaptive::blocks::{EMPTY, Row};
 
-    /// A number of the standard normal distribution, but for its tails.
+    /// A number of the standard normal distribution, except for its tails.
     fn normal(state: &mut u64) -> f64 {
         let uniform = |state: &mut u64| {
             *state = state

@@ -6,7 +6,7 @@
 //!
 //! `T = d' C^-1 d`
 //!
-//! is a chi-square with `nu = 6` degrees of freedom where nothing changes. It is looked at over a short and over a long
+//! is a chi-square with `nu = 6` degrees of freedom where nothing changes. It is examined over a short and over a long
 //! present: small changes need more data than large ones. A second between present and past is left out: no one changes
 //! at the end of a block.
 //!
@@ -21,7 +21,7 @@
 //! block that leaves least where all is free before it and after it (R. E. Quandt, *J. American Statistical
 //! Association* 53 (1958) 873-880).
 //!
-//! The blocks are those of the candidate of now (`last_blocks`), all after its noise model and in its basis: when
+//! The blocks are those of the current candidate (`last_blocks`), all after its noise model and in its basis: when
 //! another takes over, so do its blocks. From three seconds after a gap on, what is after it is held against what was
 //! before.
 //!
@@ -138,7 +138,7 @@ pub struct Detector {
 crate::state!([] Detector { statistics, since, declared, declared_contrast, innovation_variances, difference, ago });
 
 impl Detector {
-    /// Before the first block. `None` where there is no room for the blocks.
+    /// Before the first block. `None` if there is no room for the blocks.
     pub fn new(settings: Detection) -> Option<Self> {
         let [short, long] = settings.recent;
         let present = short > 0 && short <= long;
@@ -181,7 +181,7 @@ impl Detector {
         }
     }
 
-    /// T of a present; `None` where there is too little to compare.
+    /// T of a present; `None` if there is too little to compare.
     fn wald_statistic(&self, blocks: &[Block], fresh: usize, dynamics: [f64; DYNAMICS], present: usize) -> Option<f64> {
         let Detection {
             recent, least, most, ..
@@ -254,7 +254,7 @@ impl Detector {
         self.innovation_variances
     }
 
-    /// True where a change was declared at the last sample.
+    /// True if a change was declared at the last sample.
     pub fn declared(&self) -> bool {
         self.declared
     }

@@ -1,4 +1,4 @@
-//! What changed: the difference of now from before, with its full covariance.
+//! What changed: the current difference from before, with its full covariance.
 //!
 //! Gains, level and what is held differ by d with the covariance C (`contrast`). Of that difference, `W = C^-1`, not
 //! all components are of interest at once: a delay that grows looks like gains that turn, and seconds hardly
@@ -40,7 +40,7 @@ pub struct Difference {
 crate::state!([] Difference { value, covariance, changed });
 
 impl Difference {
-    /// `None` where the contrast does not determine it.
+    /// `None` if the contrast does not determine it.
     pub(super) fn of(contrast: &Contrast) -> Option<Self> {
         let (d, mut factor) = (contrast.difference, contrast.covariance);
         if !cholesky::factor(&mut factor, STATES) {

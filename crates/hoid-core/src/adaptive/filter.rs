@@ -1,8 +1,8 @@
 //! The recursion: a sample in, an estimate out.
 //!
-//! The candidate of now ([`super::candidate`]) takes each sample as it comes; what it learns and what it only follows
+//! The current candidate ([`super::candidate`]) takes each sample as it comes; what it learns and what it only follows
 //! is decided here, and remembered for those who read the record again (`replay`). The detector looks at the blocks of
-//! the candidate of now.
+//! the current candidate.
 
 mod replay;
 
@@ -95,7 +95,7 @@ impl<E: AsMut<[f64]>> State for AdaptiveFilter<E> {
 
 impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
     /// At rest. `memory` is for [`memory_needed`] numbers, or fewer for no replays, but never fewer than
-    /// [`least_memory`]. `None` for numbers that make no sense, or too little memory.
+    /// [`least_memory`]. `None` for numbers that are not valid, or too little memory.
     pub fn new(prior: AdaptivePrior, memory: E) -> Option<Self> {
         let ts = prior.sample_time;
         if !prior.is_sound() || prior.person.tau > LATEST_S || memory.as_ref().len() < least_memory(ts) {
@@ -145,7 +145,7 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         })
     }
 
-    /// Starts at once, at what is known of the person. `None` for numbers that make no sense.
+    /// Starts at once, at what is known of the person. `None` for numbers that are not valid.
     pub fn with_initial_estimate(mut self, known: &InitialEstimate) -> Option<Self> {
         if !known.is_sound() || !known.apply_to_noise(&mut self.prior_noise, self.prior.sample_time) {
             return None;
@@ -378,7 +378,7 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         self.age
     }
 
-    /// True where an earlier fit of the person is where the estimate started.
+    /// True if an earlier fit of the person is where the estimate started.
     pub fn has_initial_estimate(&self) -> bool {
         self.initial.is_some()
     }
@@ -499,7 +499,7 @@ pub fn least_memory(sample_time: f64) -> usize {
 /// Samples that are replayed at most.
 const MOST_REPLAYED: f64 = 12_000.0;
 
-/// Numbers of memory for replays of so many seconds, for a sample time in s.
+/// Numbers of memory for replays of a given number of seconds, for a sample time in s.
 pub fn memory_needed(sample_time: f64, seconds: f64) -> usize {
     let samples = (seconds / sample_time).clamp(0.0, MOST_REPLAYED);
     3 * (2 * errors_needed(sample_time) + libm::ceil(samples) as usize)

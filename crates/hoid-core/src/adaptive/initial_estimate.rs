@@ -26,7 +26,7 @@ pub struct InitialEstimate {
 }
 
 impl InitialEstimate {
-    /// True for numbers that make sense.
+    /// True for numbers that are valid.
     pub(super) fn is_sound(&self) -> bool {
         let finite = |x: &f64| x.is_finite();
         self.state.iter().all(finite)
@@ -39,7 +39,7 @@ impl InitialEstimate {
             && self.unit.is_finite()
     }
 
-    /// Puts the remnant into a noise model; false for numbers that make no sense.
+    /// Puts the remnant into a noise model; false for numbers that are not valid.
     pub(super) fn apply_to_noise(&self, noise: &mut NoiseModel, sample_time: f64) -> bool {
         match &self.remnant {
             Some((lags, seconds)) => noise.set_prior(lags, self.variance, seconds / sample_time),

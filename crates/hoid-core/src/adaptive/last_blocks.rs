@@ -20,7 +20,8 @@ pub(super) struct LastBlocks {
     open: Block,
     blocks: [Block; BLOCKS],
     count: usize,
-    /// Samples that were not taken, one after another, and those that are not looked at from now on.
+    /// Samples that were not taken, one after the other, and those that are not looked at from now
+    /// on.
     gap: u64,
     behind: u64,
     fresh: usize,
@@ -101,7 +102,7 @@ impl LastBlocks {
         self.fresh
     }
 
-    /// True where the last sample ended a block.
+    /// True if the last sample ended a block.
     pub fn closed(&self) -> bool {
         self.closed
     }

@@ -11,10 +11,10 @@
 //! 1175-1193; R. P. Adams and D. J. C. MacKay, *Bayesian online changepoint detection*, 2007; the births of A. S.
 //! Willsky and H. L. Jones, *IEEE Trans. Automatic Control* 21 (1976) 108-112, with all their likelihoods).
 //!
-//! **Classes.** The numerator is any, or that of a gain with a lead, `(K_e + K_e_dot s)(s + a)`: the second
-//! is the first with a covariance that leaves the gains no other direction. Of each form the gains hardly
-//! drift between changes, or they wander, as people do. Children have the class of their parent, but one
-//! with a gain and a lead has children of any numerator too. The best of each class is never pruned.
+//! **Classes.** The numerator is any, or that of a gain with a lead, `(K_e + K_e_dot s)(s + a)`: the second is the
+//! first with a covariance that leaves the gains no other direction. For each form the gains hardly drift between
+//! changes, or they wander, as people do. Children have the class of their parent, but one with a gain and a lead has
+//! children of any numerator too. The best of each class is never pruned.
 //!
 //! **The estimate** is the mean of the mixture, its covariance that of the mixture, the differences between
 //! the hypotheses included.
@@ -367,7 +367,7 @@ impl Mixture {
         self.all().iter().map(|h| h.weight() * h.variance).sum()
     }
 
-    /// What the likeliest reports about the past: the states before its changes, the oldest first, and the one of now.
+    /// What the likeliest reports about the past: the states before its changes, the oldest first, and the current one.
     pub fn segments(&self) -> Segments {
         let mut segments = Segments::NONE;
         if let Some(best) = self.likeliest(|_| true) {

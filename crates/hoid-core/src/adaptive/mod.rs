@@ -17,12 +17,12 @@
 //! `N = (K_e + K_e_dot s)(T_I s + 1)`, and is weighed against any numerator.
 //!
 //! - **Candidates** (`candidate`). One basis and one noise model read the data sample by sample: that is the prediction
-//!   error method for given D and a linearisation. The candidate of now answers; next to it another one reads the
+//!   error method for given D and a linearisation. The current candidate answers; next to it another one reads the
 //!   record again ([`AdaptiveFilter`]), from where the estimate points, with what has been learnt of the noise, and
 //!   takes over when it has caught up. Every second one starts elsewhere. So the estimate is that of a batch fit which
 //!   is repeated again and again, at a bounded cost for each sample.
 //! - **Changes** ([`mixture`]). Within a candidate, hypotheses assume when the operator last changed: they are born in
-//!   each block, weighed by what they predicted, and pruned. Of each there are forms and drifts.
+//!   each block, weighed by what they predicted, and pruned. For each there are forms and drifts.
 //! - **Noise** ([`noise`], `volatility`). D is a long autoregression of the residuals, by least squares. The
 //!   innovations of a steep remnant have 1e-7 of the power of u, those of a flat one 1e-2: what is supposed of their
 //!   variance and of D before the data is in the scale of what D leaves, never in that of u. How unevenly the
@@ -36,7 +36,7 @@
 //!   [`difference`].
 //!
 //! Nothing has to be fitted before: the estimate starts with the first second, whose ratio of output to error gives the
-//! scale of the gains' prior. Where an earlier fit of the person is at hand ([`known`]), it starts there.
+//! scale of the gains' prior. Where an earlier fit of the person is available ([`known`]), it starts there.
 //! [`AdaptiveFilter`] is the recursion: it needs no operating system, and its memory is an array of the caller's.
 //!
 //! ```

@@ -1,10 +1,10 @@
 //! The noise model: a long autoregression `D v = eps`, by least squares with a slow memory.
 //!
-//! D minimises `sum_k lambda^{t-k} w_k (v(k) + d_1 v(k-1) + .. + d_p v(k-p))^2` with
-//! `v = u - theta' x - level` (L. Ljung, *System Identification*, 1999, section 10.1). The products
-//! of `[v(t), .., v(t-p)]` are summed at each sample, all its lags with the gains of that sample, and
-//! solved now and then. The weights w are one, and less where eps is far out. The memory grows with the time since the start up to its limit: the first
-//! seconds, in which the gains are not known, do not stay.
+//! D minimises `sum_k lambda^{t-k} w_k (v(k) + d_1 v(k-1) + .. + d_p v(k-p))^2` with `v = u - theta' x - level` (L.
+//! Ljung, *System Identification*, 1999, section 10.1). The products of `[v(t), .., v(t-p)]` are summed at each sample,
+//! all its lags with the gains of that sample, and solved at intervals. The weights w are one, and less where eps is
+//! far out. The memory grows with the time since the start up to its limit: the first seconds, in which the gains are
+//! not known, do not stay.
 //!
 //! Before the data show more the coefficients are supposed to be normal about those of a typical remnant, with the
 //! standard deviation `PRIOR_DEVIATION`, which adds `sigma^2/PRIOR_DEVIATION^2` to the diagonal of the sums, sigma^2
@@ -80,7 +80,7 @@ impl NoiseModel {
     }
 
     /// Starts as if so many samples of a v had been seen, with this variance of eps and autocovariances over it; false
-    /// where they are none.
+    /// if they are none.
     pub(super) fn set_prior(&mut self, lags: &Lags, variance: f64, samples: f64) -> bool {
         let positive = |x: f64| x > 0.0 && x.is_finite();
         if !(positive(variance) && lags[0] > 0.0 && lags.iter().all(|c| c.is_finite()) && positive(samples)) {

@@ -5,8 +5,8 @@
 //! `K_e + K_e_dot j omega = Y e^{j tau omega} (1 - omega^2/omega_nm^2 + 2 j zeta omega/omega_nm)`; exactly those of a
 //! person who has a gain and a lead. They are linear in the state s, so that their covariance is `M C M'`.
 //!
-//! Their covariance is that of the mixture over changes ([`super::mixture`]) at the basis of now, and the
-//! scatter of other operators that predict u about as well ([`super::alternatives`]).
+//! Their covariance is that of the mixture over changes ([`super::mixture`]) at the current basis, and the scatter of
+//! other operators that predict u about as well ([`super::alternatives`]).
 
 use super::{
     AdaptiveFilter,

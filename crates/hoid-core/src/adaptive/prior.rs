@@ -32,7 +32,7 @@ pub struct AdaptivePrior {
 }
 
 impl AdaptivePrior {
-    /// True for numbers that make sense.
+    /// True for numbers that are valid.
     pub(super) fn is_sound(&self) -> bool {
         let positive = |x: f64| x > 0.0 && x.is_finite();
         [self.sample_time, self.hold].into_iter().all(positive)

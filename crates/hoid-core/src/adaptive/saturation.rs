@@ -3,12 +3,11 @@
 //! A stick that is at its end reports only that they would have gone at least as far. Taken as it is, such an output
 //! reports that they answered less than they do, and the samples after it are held against a noise that was none. So
 //! nothing is learnt of it, and what goes on in the filters is the output that was predicted, where that lies beyond
-//! the end, and the end where it does not: the output given what is known, but for the noise (J. Tobin, *Econometrica*
-//! 26 (1958) 24-36, has the regression with both).
+//! the end, and the end where it does not: the output given what is known, except for the noise (J. Tobin,
+//! *Econometrica* 26 (1958) 24-36, has the regression with both).
 //!
-//! The stick is at its end where two samples one after another are alike, and none has been farther out;
-//! from then on one sample there is enough. The first time, the sample before is only known to be at the end
-//! when a replay reads it.
+//! The stick is at its end where two samples one after the other are alike, and none has been farther out; from then on
+//! one sample there is enough. The first time, the sample before is only known to be at the end when a replay reads it.
 
 use super::history::Use;
 

@@ -2,7 +2,7 @@
 
 /// Gains of the numerator.
 pub const GAINS: usize = 3;
-/// What is held but for small corrections: natural frequency, damping, delay.
+/// What is held except for small corrections: natural frequency, damping, delay.
 pub const DYNAMICS: usize = 3;
 /// Gains and level.
 pub const LINEAR: usize = GAINS + 1;

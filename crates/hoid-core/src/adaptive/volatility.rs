@@ -53,7 +53,7 @@ impl Volatility {
         }
     }
 
-    /// Takes the energy of a block of so many samples.
+    /// Takes the energy of a block of a given number of samples.
     pub fn take(&mut self, energy: f64, samples: f64) {
         self.energy += energy;
         self.samples += samples;

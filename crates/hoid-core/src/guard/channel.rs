@@ -29,10 +29,10 @@
 //! deviations on, one of 8e9 samples. The floor is a share of the signal's mean magnitude below which an
 //! outlier is worth nothing.
 //!
-//! **While it is held back** the signal goes on along its last slope where that has a meaning (order
-//! 2 or more), damped with a time constant of [`SLOPE_S`], else at its last value. It has come back
-//! when it is as near to that as it may be after h samples: within `max(m q_j, floor) + h q_1` where
-//! it has a slope, and `max(m q_1, floor) sqrt(h + 1)` where it wanders.
+//! **While it is held back** the signal goes on along its last slope where that has a meaning (order 2 or more), damped
+//! with a time constant of [`SLOPE_S`], else at its last value. It has come back when it is as near to that as it may
+//! be after h samples: within `max(m q_j, floor) + h q_1` if it has a slope, and `max(m q_1, floor) sqrt(h + 1)` if it
+//! wanders.
 
 /// Orders of the differences.
 pub const ORDERS: usize = 4;
@@ -72,7 +72,7 @@ pub struct ChannelGuard {
     /// Mean of the squares of the quotients of the two, and what they were averaged over.
     heavy: [f64; ORDERS],
     averaged: u32,
-    /// True once outliers are looked for.
+    /// True once outliers are searched for.
     watching: bool,
     /// A first difference within which the signal stays constant.
     resting: f64,
@@ -94,7 +94,7 @@ crate::state!([] ChannelGuard {
 });
 
 impl ChannelGuard {
-    /// A signal of which nothing is known: everything passes until [`ChannelGuard::set_quantiles`].
+    /// A signal without prior knowledge: everything passes until [`ChannelGuard::set_quantiles`].
     pub fn new(sample_time: f64) -> Self {
         Self {
             last: 0.0,
@@ -148,7 +148,7 @@ impl ChannelGuard {
         self.choose();
     }
 
-    /// True once the quantiles are known and outliers are looked for.
+    /// True once the quantiles are known and outliers are searched for.
     pub fn is_known(&self) -> bool {
         self.watching
     }
@@ -200,7 +200,7 @@ impl ChannelGuard {
         }
     }
 
-    /// True where the signal is predicted by more than its last value.
+    /// True if the signal is predicted by more than its last value.
     pub fn has_slope(&self) -> bool {
         self.order > 0
     }
@@ -278,7 +278,7 @@ impl ChannelGuard {
         let weight = 1.0 / f64::from(self.averaged);
         for ((heavy, q), p) in self.heavy.iter_mut().zip(&self.quantiles).zip(&self.inner) {
             let quotient = q / p;
-            // A tail of which nothing is known (0/0) is a Gaussian one.
+            // A tail without prior knowledge (0/0) is a Gaussian one.
             let square = (quotient * quotient).clamp(LIMIT, HEAVIEST);
             *heavy += weight * (square - *heavy);
         }
@@ -324,7 +324,7 @@ impl ChannelGuard {
         self.last
     }
 
-    /// True where a signal that is held back has come back with this sample.
+    /// True if a signal that is held back has come back with this sample.
     pub fn is_back(&self, x: f64) -> bool {
         let expected = self.last + self.damping * self.slope;
         let (limit, held) = (self.limit(self.order_in_use()), f64::from(self.held));

@@ -1,15 +1,15 @@
 //! Both signals over a second, against what they were before.
 //!
-//! Of each block of a second the mean magnitudes of e and u about their long-run means are kept,
-//! `m_c`, of their backward differences of order 1 to 4, `a_cj`, and of the innovations of the
-//! recursion, `a_eps`. Their long-run means M_c and A_cj follow with a time constant of 60 blocks; a
-//! block enters with no less than half and no more than twice the long-run value, so that no block
-//! moves them by more than 1/60. Blocks that are not as they should be do not enter.
+//! For each block of a second the mean magnitudes of e and u about their long-run means are kept, `m_c`, of their
+//! backward differences of order 1 to 4, `a_cj`, and of the innovations of the recursion, `a_eps`. Their long-run means
+//! M_c and A_cj follow with a time constant of 60 blocks; a block enters with no less than half and no more than twice
+//! the long-run value, so that no block moves them by more than 1/60. Blocks that are not as they should be do not
+//! enter.
 //!
 //! | what | rule | why |
 //! |---|---|---|
 //! | frozen e | `a_e1 <= A_e1/1000` in a block | the error of a person who tracks never stays constant |
-//! | frozen u | `a_u1 <= A_u1/1000` in three blocks in a row, but for a rest ([`super::resting`]) in which `a_eps` is at most twice its long-run value | a hand may rest |
+//! | frozen u | `a_u1 <= A_u1/1000` in three blocks in a row, except for a rest ([`super::resting`]) in which `a_eps` is at most twice its long-run value | a hand may rest |
 //! | idle | e and u each within a range of `M_c/20` in two blocks in a row | silence, with noise |
 //! | larger | `a_c1 > 5 A_c1` and `a_c3 > 5 A_c3` for e and u in two blocks in a row | both signals are what they were, times a factor |
 //! | rescaled | all four `a_cj/A_cj` of one channel above 3.5 and within a factor of 1.5 of each other, those of the other below 2, in two blocks in a row | another unit, a gain that was turned |
@@ -239,7 +239,7 @@ impl Profile {
         }
     }
 
-    /// True where the last blocks gave no reason to suspect anything.
+    /// True if the last blocks gave no reason to suspect anything.
     pub fn is_calm(&self) -> bool {
         self.is_known()
             && self.frozen_u == 0
@@ -355,7 +355,7 @@ impl Profile {
         self.swapped = (self.swapped + evidence).clamp(0.0, 2.0 * SWAPPED);
         let limit = (MISFIT * self.ratio).max(LEAST_RATIO);
         let misfit = self.ratios >= LEARNT && block.ratio().is_some_and(|ratio| ratio > limit);
-        // Of a person who rests the past predicts all, and the model need not be wrong.
+        // For a person who rests the past predicts all, and the model need not be wrong.
         let as_foretold = self.ratios < LEARNT || block.innovation <= LEAST_GROWTH * self.innovation;
         let misfit = misfit && !as_foretold;
         self.misfits = count(self.misfits, misfit);

@@ -50,7 +50,7 @@ pub struct Resting {
     /// The value at which u is stationary, and for how long.
     value: f64,
     stands: u64,
-    /// True where the stand is not to be learnt.
+    /// True if the stand is not to be learnt.
     doubted: bool,
 }
 
@@ -90,7 +90,7 @@ impl Resting {
         }
     }
 
-    /// The stand of now is not a rest: it is not learnt.
+    /// The current stand is not a rest: it is not learnt.
     pub fn doubt(&mut self) {
         self.doubted = true;
     }
@@ -111,7 +111,7 @@ impl Resting {
         atom.longest = atom.longest.max(stands);
     }
 
-    /// Where the value of now is kept.
+    /// Where the current value is kept.
     fn place(&self) -> Option<usize> {
         let known = |atom: &Atom| atom.rests > 0 && (atom.value - self.value).abs() <= self.tolerance;
         self.atoms.iter().position(known)

@@ -67,8 +67,8 @@ impl Comparing {
     /// Compares.
     ///
     /// # Errors
-    /// Those of factors without meaning, and [`CompareError::NotInJson`]. What cannot be estimated of a person is part
-    /// of the result.
+    /// The entries of factors without meaning, and [`CompareError::NotInJson`]. What cannot be estimated of a person is
+    /// part of the result.
     pub fn run(&self, group: &GroupEstimates) -> Result<Comparison, CompareError> {
         let asked = match self.factors.is_empty() {
             true => vec![Factor::conditions()],
@@ -499,7 +499,7 @@ fn known_of(e: &PersonEstimate) -> EstimatedValue {
     known(e.value, e.standard_error)
 }
 
-/// Who is missing, by their reason.
+/// Missing people, by their reason.
 fn missing(result: &Comparison) -> Vec<Finding> {
     let mut all: Vec<(String, Vec<String>)> = Vec::new();
     for out in &result.left_out {

@@ -16,7 +16,7 @@ pub struct PersonEstimate {
     pub subject: String,
     /// In which condition.
     pub condition: String,
-    /// The group of people that they are in; empty where none are compared.
+    /// The group of people that they are in; empty if none are compared.
     pub group: String,
     /// The value; with a covariate that at its middle.
     pub value: f64,
@@ -33,7 +33,7 @@ pub struct Mean {
     pub quantity: Quantity,
     /// In which condition.
     pub condition: String,
-    /// Of which group of people; empty where none are compared.
+    /// Of which group of people; empty if none are compared.
     pub group: String,
     /// How many people.
     pub people: usize,
@@ -57,7 +57,7 @@ pub struct Difference {
     pub from: String,
     /// The level from which it is.
     pub to: String,
-    /// Of an interaction the factor whose effect differs, and its levels.
+    /// For an interaction the factor whose effect differs, and its levels.
     pub effect: Option<[String; 3]>,
     /// The people, and of a difference between them the group of each.
     pub people: Vec<(String, usize)>,
@@ -122,7 +122,7 @@ pub struct Comparison {
     pub differences: Vec<Difference>,
     /// Changes from run to run, where they were asked for.
     pub learning: Vec<Learning>,
-    /// Who is missing.
+    /// Missing people.
     pub left_out: Vec<LeftOut>,
     /// The settings.
     pub settings: Vec<Setting>,

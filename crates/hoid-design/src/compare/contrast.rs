@@ -40,7 +40,7 @@ pub(super) struct Contrast {
     pub variation: Variation,
     pub from: String,
     pub to: String,
-    /// Of an interaction the effect that differs, and its levels.
+    /// For an interaction the effect that differs, and its levels.
     pub effect: Option<[String; 3]>,
     /// People with the weights of their conditions, of group 0 or 1.
     pub people: Vec<(String, BTreeMap<String, f64>, usize)>,
@@ -320,7 +320,7 @@ mod tests {
             .iter()
             .map(|c| (c.from.as_str(), c.to.as_str(), c.people.len()))
             .collect();
-        // Q lacks c: that is found when its estimates are looked for, and named.
+        // Q lacks c: that is found when its estimates are searched for, and named.
         assert_eq!(pairs, [("a", "b", 2), ("a", "c", 2), ("b", "c", 2)]);
         let all = of(&three[..4], &["who:one=P;two=Q"]).unwrap();
         assert_eq!((all.len(), all[0].variation), (1, Variation::Between));

@@ -43,7 +43,7 @@ pub struct Level {
 pub struct Factor {
     /// Its name.
     pub name: String,
-    /// Its levels; none where they are those of the manifest, or the conditions.
+    /// Its levels; none if they are those of the manifest, or the conditions.
     pub levels: Vec<Level>,
 }
 

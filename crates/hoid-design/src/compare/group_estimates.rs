@@ -153,7 +153,7 @@ impl GroupEstimates {
         }
     }
 
-    /// A quantity in each run of a cell, with the names of the runs; empty where the runs are not known.
+    /// A quantity in each run of a cell, with the names of the runs; empty if the runs are not known.
     pub(super) fn of_runs(&self, cell: &Cell, quantity: &Quantity) -> Vec<(&str, Observation)> {
         let Some(runs) = &self.runs else { return Vec::new() };
         let one = |run: &str| match quantity.column() {

@@ -36,17 +36,17 @@ use super::CompareError;
 pub struct Observation {
     /// The value.
     pub value: f64,
-    /// Square of its standard error; zero where it is not known.
+    /// Square of its standard error; zero if it is not known.
     pub variance: f64,
 }
 
-/// Whose tau^2 the weights of people have.
+/// The people whose tau^2 enters the weights.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub enum Weights {
     /// Kept away from zero.
     #[default]
     Penalised,
-    /// That of the restricted likelihood.
+    /// The value for the restricted likelihood.
     Restricted,
 }
 
@@ -77,7 +77,7 @@ pub struct MetaRegression {
     pub coefficients: Vec<Coefficient>,
     /// Variance between people, by the restricted likelihood.
     pub tau_squared: f64,
-    /// That of the weights.
+    /// The value for the weights.
     pub tau_squared_of_weights: f64,
     /// Degrees of freedom n - p.
     pub degrees_of_freedom: usize,
@@ -221,7 +221,7 @@ struct At {
     q: f64,
     /// tr P.
     trace: f64,
-    /// The restricted log-likelihood but for constants.
+    /// The restricted log-likelihood except for constants.
     likelihood: f64,
     /// Its slope by tau^2.
     slope: f64,
@@ -260,7 +260,7 @@ impl Model {
         })
     }
 
-    /// Variance of y about its regression, all weights equal; none where X is singular.
+    /// Variance of y about its regression, all weights equal; none if X is singular.
     fn scatter(&self) -> Option<f64> {
         let (n, p) = self.x.shape();
         let information = self.x.transpose() * &self.x;

@@ -36,7 +36,7 @@ impl Quantity {
         vec![Self::Crossover, Self::PhaseMargin, Self::Parameter(DELAY.to_owned())]
     }
 
-    /// Its unit; empty where there is none, or it is that of the recording.
+    /// Its unit; empty if there is none, or it is that of the recording.
     pub fn unit(&self) -> &str {
         match self {
             Self::Crossover => "rad/s",

@@ -319,7 +319,7 @@ pub fn expected(task: &Task, forcing: &ForcingFunction, length_s: f64) -> Result
     Loop::of(task)?.expected(forcing, length_s)
 }
 
-/// The inverse by rows and columns of unit diagonal; none where that is singular.
+/// The inverse by rows and columns of unit diagonal; none if that is singular.
 pub(super) fn inverse(information: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let n = information.nrows();
     let scale: Vec<f64> = (0..n).map(|k| information[(k, k)].sqrt()).collect();

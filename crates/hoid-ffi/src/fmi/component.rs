@@ -20,7 +20,7 @@ pub type Fmi2Logger = unsafe extern "C" fn(*mut c_void, *const c_char, c_int, *c
 /// `fmi3LogMessageCallback`.
 pub type Fmi3Logger = unsafe extern "C" fn(*mut c_void, c_int, *const c_char, *const c_char);
 
-/// Who is shown what went wrong.
+/// Pages that show the error.
 #[derive(Clone, Copy)]
 pub(super) enum Logger {
     Nobody,
@@ -74,7 +74,7 @@ pub struct Component {
     is_broken: bool,
 }
 
-/// Makes an instance; null where that fails.
+/// Makes an instance; null if that fails.
 ///
 /// # Safety
 /// `logger` is that of the importer.

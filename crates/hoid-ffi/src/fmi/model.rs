@@ -30,7 +30,7 @@ pub(super) struct TrackerModel {
 }
 
 impl Model {
-    /// Of the parameters, from a time in s on.
+    /// For the parameters, from a time in s on.
     pub fn new(settings: &FmuSettings, given: &VariableValues<'_>, start_s: f64) -> Done<Self> {
         Ok(match settings.kind()? {
             FmuKind::Tracker => Self::Tracker(Box::new(TrackerModel::new(settings, given)?)),
@@ -89,7 +89,7 @@ impl Model {
         }
     }
 
-    /// True where the outputs are of the sample that was taken, not of the next one.
+    /// True if the outputs are of the sample that was taken, not of the next one.
     pub fn speaks_at_once(&self) -> bool {
         matches!(self, Self::Tracker(_))
     }

@@ -78,7 +78,7 @@ impl OperatorModel {
         }
     }
 
-    /// False where the numbers are of another operator.
+    /// False if the numbers are of another operator.
     pub fn restore(&mut self, saved: &[f64]) -> bool {
         match &mut self.run {
             Run::Reference(run) => run.restore(saved),

@@ -47,10 +47,10 @@ pub(crate) struct InitialHistory<'a> {
     pub f: &'a [f64],
     /// Samples from the first value of w to the first residual.
     pub lead: usize,
-    /// The past of the noise when it was stationary; else nothing is known of it.
+    /// The past of the noise when it was stationary; else nothing is known about it.
     pub noise: Option<&'a StationaryNoise>,
-    /// Square roots of the weights of the residuals, from the first residual on; none where all
-    /// count the same.
+    /// Square roots of the weights of the residuals, from the first residual on; none if all count
+    /// the same.
     pub weights: Option<&'a [f64]>,
     /// Whether u has a level.
     pub level: bool,
@@ -118,7 +118,7 @@ impl InitialStateResponses {
         };
         for (index, column) in columns.into_iter().enumerate() {
             let mut whole = vec![0.0; prior_rows];
-            // Of a state of the noise.
+            // For a state of the noise.
             if let Some(z) = index.checked_sub(f.len()).and_then(|state| whole.get_mut(state)) {
                 *z = 1.0;
             }
@@ -156,8 +156,8 @@ impl InitialStateResponses {
     }
 
     /// Takes the best initial states into the signals: w and v from the first regressed sample on,
-    /// eps (weighted, if there are weights) from the first residual. Returns z, empty where the
-    /// past is not random.
+    /// eps (weighted, if there are weights) from the first residual. Returns z, empty if the past
+    /// is not random.
     pub fn eliminate(&self, w: &mut [f64], v: &mut [f64], eps: &mut [f64]) -> Vec<f64> {
         let components: Vec<f64> = self.basis().map(|q| dot(q, &eps[..q.len()])).collect();
         for (q, &component) in self.basis().zip(&components) {
@@ -186,7 +186,7 @@ impl InitialStateResponses {
         z
     }
 
-    /// True when nothing of the responses is left at the end of so many rows.
+    /// True when nothing of the responses is left at the end of a given number of rows.
     pub fn have_died(&self, rows: usize) -> bool {
         /// A response below this share of its size has died away.
         const DEAD: f64 = 1e-15;

@@ -36,7 +36,7 @@ pub(crate) struct Criterion<'a> {
     /// [`first_residual`](super::first_residual).
     pub first: usize,
     /// Square roots of the weights of the residuals of each record, from the first residual on;
-    /// none where all count the same.
+    /// none if all count the same.
     pub weights: Option<&'a [Vec<f64>]>,
 }
 

@@ -338,7 +338,7 @@ fn a_later_first_residual_leaves_the_gradient_exact() {
     assert!((slope + 2.0 * exact.descent[7]).abs() < 1e-6 * slope.abs());
 }
 
-/// Adds the first record with a head of this length; none where it has to pass whole.
+/// Adds the first record with a head of this length; none if it has to pass whole.
 fn add_in_spans(
     c: &Criterion<'_>,
     theta: &[f64],

@@ -1,6 +1,6 @@
 //! Whether the error answers to the output, as it does in a loop.
 //!
-//! In a loop every change of u comes back in e. Of the latest [`LATEST_S`] of u the question is whether they predict e
+//! In a loop every change of u comes back in e. For the latest [`LATEST_S`] of u the question is whether they predict e
 //! better than the errors before and the outputs before those do (C. W. J. Granger, *Econometrica* 37 (1969) 424-438).
 //! What two runs have in common, a forcing function, is in both pasts; what is u's own is not.
 
@@ -21,7 +21,7 @@ pub struct LoopResponse {
     pub share: f64,
 }
 
-/// Of samples `from..`. `None` where there is too little, or something is not a number or does not move.
+/// For samples `from..`. `None` if there is too little, or something is not a number or does not move.
 pub fn answer(e: &[f64], u: &[f64], from: usize, sample_time_s: f64) -> Option<LoopResponse> {
     let thin = thinning(sample_time_s);
     let latest = (LATEST_S / (thin as f64 * sample_time_s)).round().max(1.0) as usize;

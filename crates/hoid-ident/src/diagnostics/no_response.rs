@@ -82,11 +82,11 @@ struct Spectra {
     u: Vec<Complex64>,
     /// Columns without the delay and E: `(A_u/A_e) N G_j`.
     columns: Vec<[Complex64; COLUMNS]>,
-    /// Of each delay `e^{-j omega tau}`.
+    /// For each delay `e^{-j omega tau}`.
     delays: Vec<Vec<Complex64>>,
 }
 
-/// Of records of a person; `None` where there is too little, or something is not a number or does not move.
+/// For records of a person; `None` if there is too little, or something is not a number or does not move.
 pub fn response(records: &[Record]) -> Option<Response> {
     let all: Option<Vec<Spectra>> = records.iter().map(Spectra::of).collect();
     let all = all?;
@@ -95,7 +95,7 @@ pub fn response(records: &[Record]) -> Option<Response> {
     }
     let power: f64 = all.iter().flat_map(|s| &s.u).map(Complex64::norm_sqr).sum();
     let inverse = inverse_gram(&all)?;
-    // Of each frequency and delay the products of columns and output; a surrogate turns them.
+    // For each frequency and delay the products of columns and output; a surrogate turns them.
     let products: Vec<[[Complex64; COLUMNS]; DELAYS_S.len()]> = all.iter().flat_map(Spectra::products).collect();
     let mut turns = vec![Complex64::ONE; products.len()];
     let share = |turns: &[Complex64]| -> f64 {

@@ -15,21 +15,21 @@ const LEAST_ERRORS: f64 = 2.0;
 /// Damping beyond which the faster of two real poles is 34 times the slower: a lag.
 const LARGEST_DAMPING: f64 = 3.0;
 
-/// True where a value is less than two of its standard errors from zero. A value without a standard
+/// True if a value is less than two of its standard errors from zero. A value without a standard
 /// error was given, not estimated.
 pub fn is_open(e: &Estimate) -> bool {
     e.standard_error
         .is_some_and(|error| e.value.abs() < LEAST_ERRORS * error)
 }
 
-/// True where K_e and K_e_dot have opposite signs by two standard errors each: a negative lead.
+/// True if K_e and K_e_dot have opposite signs by two standard errors each: a negative lead.
 pub fn leads_backwards(o: &OperatorEstimate) -> bool {
     let sign = |e: &Estimate| if is_open(e) { 0.0 } else { e.value.signum() };
     sign(&o.k_e) * sign(&o.k_e_dot) < 0.0
 }
 
 /// Gains and lead that are not determined, and leads that no one has. Each operator has a label, as ` of record 2`,
-/// empty for a single one; where K_e and K_e_dot of all of them are open, nothing is known of the response.
+/// empty for a single one; where K_e and K_e_dot of all of them are open, nothing is known about the response.
 pub fn gain_findings(operators: &[(&str, OperatorEstimate)]) -> Vec<Finding> {
     let mut open = Vec::new();
     let mut all_open = !operators.is_empty();
@@ -235,7 +235,7 @@ mod tests {
             ..lead
         };
         assert_eq!(gain_findings(&[("", nothing)])[0].kind, "gain");
-        // Of two operators one is known.
+        // For two operators one is known.
         let found = gain_findings(&[(" of record 1", nothing), (" of record 2", operator())]);
         assert_eq!(found[0].kind, "undetermined-parameter");
         assert!(found[0].message.contains("K_e_dot of record 1"), "{}", found[0].message);

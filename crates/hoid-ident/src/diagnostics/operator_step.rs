@@ -54,8 +54,8 @@ impl OperatorStep {
     }
 }
 
-/// The steps of K_e, K_e_dot (s), omega_nm (rad/s), zeta_nm and tau_e (s). `None` where the record is too short or
-/// carries no information.
+/// The steps of K_e, K_e_dot (s), omega_nm (rad/s), zeta_nm and tau_e (s). `None` if the record is too short or carries
+/// no information.
 pub fn operator_step(operator: &OperatorParameters, record: &Record) -> Option<[OperatorStep; OPERATOR]> {
     let ts = record.sample_time();
     let eta = delayed_parameters(operator);

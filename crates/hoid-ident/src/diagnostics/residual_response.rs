@@ -1,9 +1,9 @@
 //! Whether a response to the error is left that a model does not have.
 //!
-//! Of a model that is linear in what it has to estimate, `u = X b + v`, the columns X are known: responses of a basis,
+//! For a model that is linear in what it has to estimate, `u = X b + v`, the columns X are known: responses of a basis,
 //! their derivatives by the fixed dynamics, a level. With an autoregression `D v = eps` of order [`NOISE`] the question
 //! is whether further taps on e carry information about eps, Z in place of the impulse response that X cannot have:
-//! means of e over [`TAPS`] spans of [`TAP_S`] one after another. By the statistic of the Lagrange multiplier (T. S.
+//! means of e over [`TAPS`] spans of [`TAP_S`] one after the other. By the statistic of the Lagrange multiplier (T. S.
 //! Breusch and A. R. Pagan, *Review of Economic Studies* 47 (1980) 239-253; L. Ljung, *System Identification*, 1999,
 //! section 16.6, for the residuals of a model)
 //!
@@ -42,7 +42,7 @@ pub struct ResidualResponse {
 }
 
 /// Tests whether columns, all as long as e and u, are all that there is of a response of u to e in samples `from..`.
-/// The level need not be among them. `None` where there is too little, or something is not a number.
+/// The level need not be among them. `None` if there is too little, or something is not a number.
 pub fn residual_response(
     columns: &[Vec<f64>],
     e: &[f64],
@@ -63,7 +63,7 @@ pub fn residual_response(
     let n = rows.len();
     let p = columns.len() + 1;
     let z = DMatrix::from_fn(n, TAPS, |i, j| {
-        // The error of now already holds what is new in u, where the controlled element answers at once.
+        // The current error already holds what is new in u, where the controlled element answers at once.
         let (next, newest) = (rows[i] + 1, if j == 0 { thin } else { j * tap });
         e[next - (j + 1) * tap..next - newest.min((j + 1) * tap - 1)]
             .iter()

@@ -44,7 +44,7 @@ enum Without {
 impl Without {
     const ALL: [Self; 2] = [Self::SamplesThatStandOut, Self::WhatIsSlow(PERIOD_S)];
 
-    /// The records without it; `None` where they have none of it.
+    /// The records without it; `None` if they have none of it.
     fn records(self, records: &[Record]) -> Option<Vec<Record>> {
         match self {
             Self::SamplesThatStandOut => held(records),
@@ -91,8 +91,7 @@ fn opinions(all: &[Without], records: &[Record], again: impl Fn(&[Record]) -> Op
     all.iter().filter_map(asked).collect()
 }
 
-/// Of a fit of polynomials, by the estimator that made it; with its loop where the controlled element is
-/// known.
+/// For a fit of polynomials, by the estimator that made it; with its loop where the controlled element is known.
 pub fn of_polynomials(
     estimator: &Estimator,
     fit: &Fit,
@@ -118,7 +117,7 @@ fn slow_period_s(fit: &Fit) -> f64 {
     periods.fold(PERIOD_S, f64::max)
 }
 
-/// Of a grey box: the order of its remnant stays.
+/// For a grey box: the order of its remnant stays.
 pub fn of_grey_box(
     estimator: &GreyBox,
     fit: &GreyBoxFit,
@@ -137,8 +136,8 @@ pub fn of_grey_box(
     })
 }
 
-/// Of an operator of the family: its form and the orders of its noise model stay. A fit at the lines of a recorded
-/// excitation is next to it already, and knows nothing of what is slow.
+/// For an operator of the family: its form and the orders of its noise model stay. A fit at the lines of a recorded
+/// excitation is next to it already, and has no information about what is slow.
 pub fn of_family(
     estimator: &FamilyEstimator,
     fit: &FamilyFit,
@@ -165,7 +164,7 @@ pub fn of_family(
     let measures = |of: &FamilyFit| of.loop_measures_in_front(0, element?);
     opinions(asked, records, |others| {
         let other = again.fit_with_response(others, None).ok()?;
-        // Of the form in front by itself: the other fit has no other.
+        // For the best form by itself: the other fit has no other.
         let (one, two) = (fit.weighed.first()?, other.weighed.first()?);
         let parameters = one.operators.iter().zip(&two.operators).flat_map(|(one, two)| {
             let both = one.parameters.iter().zip(&two.parameters);
@@ -181,7 +180,7 @@ pub fn of_family(
     })
 }
 
-/// Of an operator whose gains change once, without samples that are prominent. One fit that finds a change where the
+/// For an operator whose gains change once, without samples that are prominent. One fit that finds a change where the
 /// other finds none is a difference whatever its size.
 pub fn of_sigmoid(estimator: &SigmoidChange, fit: &SigmoidFit, records: &[Record]) -> Option<Finding> {
     let without = Without::SamplesThatStandOut;

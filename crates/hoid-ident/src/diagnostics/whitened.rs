@@ -23,7 +23,7 @@ pub(super) fn thinning(sample_time_s: f64) -> usize {
 
 /// A fit of columns and a level.
 pub(super) struct Whitened {
-    /// Of the columns, the level last.
+    /// For the columns, the level last.
     pub b: DVector<f64>,
     /// The part of u that the columns leave unexplained.
     pub v: DVector<f64>,
@@ -36,7 +36,7 @@ pub(super) struct Whitened {
 }
 
 impl Whitened {
-    /// Of these samples of columns and u; `None` where something is not a number, or columns are not independent, or
+    /// For these samples of columns and u; `None` where something is not a number, or columns are not independent, or
     /// nothing but rounding is left. Residuals are limited to `limit` standard deviations.
     pub fn of(columns: &[Vec<f64>], u: &[f64], samples: &[usize], limit: f64) -> Option<Self> {
         let (n, p) = (samples.len(), columns.len() + 1);
@@ -103,7 +103,7 @@ fn clipped(eps: &DVector<f64>, limit: f64) -> DVector<f64> {
     eps.map(|v| v.max(-most).min(most))
 }
 
-/// Least squares by columns of unit length; `None` where they are not independent.
+/// Least squares by columns of unit length; `None` if they are not independent.
 pub(super) fn solution(x: &DMatrix<f64>, y: &DVector<f64>) -> Option<DVector<f64>> {
     let (q, r, scales) = factored(x)?;
     let mut b = r.solve_upper_triangular(&(q.transpose() * y))?;

@@ -36,16 +36,16 @@ pub(super) struct ArxResponse {
 }
 
 impl ArxResponse {
-    /// Of all records together: a smooth record determines fewer coefficients.
+    /// For all records together: a smooth record determines fewer coefficients.
     ///
     /// # Errors
-    /// Those of the regression with the fewest coefficients.
+    /// The entries of the regression with the fewest coefficients.
     pub fn of(records: &[Record]) -> Result<Self, IdentError> {
         regressed(records, false, MOST_GAINS)
     }
 
     /// The same where there is hardly any noise, to as many coefficients of B as there may be: u without noise leaves
-    /// those of A open, and B is to be as long as the delay. `None` where there is more.
+    /// those of A open, and B is to be as long as the delay. `None` if there is more.
     pub fn without_noise(records: &[Record]) -> Option<Self> {
         let found = regressed(records, true, MOST_GAINS).ok()?;
         if found.innovations < NONE {

@@ -1,5 +1,5 @@
 //! From the searches of the forms that count to the result: operators with their errors, averaged over forms; for the
-//! form in front what the methods report about each other; and the verdict.
+//! best form what the methods report about each other; and the verdict.
 //!
 //! The order matters: both methods are compared with their own errors, and only then does their
 //! difference become a part of the errors of the operator (`Covariances::add_bias`).
@@ -50,7 +50,7 @@ pub(super) struct Beside<'a> {
     pub weight: f64,
 }
 
-/// The search of the form in front, and what its result is made from next to it.
+/// The search of the best form, and what its result is made from next to it.
 pub(super) struct Chosen<'p, 'a> {
     pub fit: PredictionFit<'a>,
     pub weight: f64,
@@ -64,7 +64,7 @@ pub(super) struct Chosen<'p, 'a> {
     pub records: &'p [Record],
     /// Channel of the recorded excitation.
     pub excitation: Option<&'p str>,
-    /// Variation of a person's gain from one run to the next, as a part of it; zero where there is no noise, of no person.
+    /// Variation of a person's gain from one run to the next, as a part of it; zero if there is no noise, of no person.
     pub run_to_run: f64,
     /// Highest order of the noise models that the estimate is held against.
     pub highest_order: usize,
@@ -74,7 +74,7 @@ impl<'a> Chosen<'_, 'a> {
     /// All that is informed of the person.
     ///
     /// # Errors
-    /// Those of the model.
+    /// The entries of the model.
     pub fn result(self, workspace: &mut Workspace) -> Result<FamilyFit, IdentError> {
         let (fit, layout) = (&self.fit, self.fit.layout());
         let separate = if self.prediction.individual.is_empty() {
@@ -239,7 +239,7 @@ impl<'a> Chosen<'_, 'a> {
         figures.collect()
     }
 
-    /// Another form with its errors, made as those of the form in front.
+    /// Another form with its errors, made as those of the best form.
     fn weighed(&self, of: &Beside<'a>, separate: usize, workspace: &mut Workspace) -> Result<WeighedForm, IdentError> {
         let joint = self.joint(&of.fit, of.lines.as_ref(), separate, workspace);
         let found = joint.as_ref().unwrap_or(&of.fit);
@@ -253,10 +253,9 @@ impl<'a> Chosen<'_, 'a> {
     }
 }
 
-/// What the fit may be off by becomes a part of its errors: its difference to the fit at the
-/// lines, and, for what the lines leave to the prior or without lines, its differences to fits
-/// with other noise models ([`super::sensitivity`]). `unseen` is false where there is little noise, and little of what no
-/// noise model shows.
+/// What the fit may be off by becomes a part of its errors: its difference to the fit at the lines, and, for what the
+/// lines leave to the prior or without lines, its differences to fits with other noise models ([`super::sensitivity`]).
+/// `unseen` is false if there is little noise, and little of what no noise model shows.
 fn add_bias(
     errors: &mut Errors,
     fit: &PredictionFit<'_>,

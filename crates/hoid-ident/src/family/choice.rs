@@ -1,10 +1,10 @@
 //! Which forms the data leave, and which of them is in front.
 //!
 //! Each form has Akaike's criterion, `chi^2 + 2 p` at the lines of an excitation, or `n ln V/kappa + 2 p` of the
-//! prediction error, kappa the inflation of variances; with little noise Schwarz's ([`super::comparison`]). Estimates are averaged over forms by their weights
-//! ([`super::mixture`]); parameters have the names of the form in front, the simplest within 2 of the least
-//! (K. P. Burnham and D. R. Anderson, *Model Selection and Multimodel Inference*, 2002, section 2.6: no evidence
-//! against it).
+//! prediction error, kappa the inflation of variances; with little noise Schwarz's ([`super::comparison`]). Estimates
+//! are averaged over forms by their weights ([`super::mixture`]); parameters have the names of the best form, the
+//! simplest within 2 of the least (K. P. Burnham and D. R. Anderson, *Model Selection and Multimodel Inference*, 2002,
+//! section 2.6: no evidence against it).
 
 use hoid_model::Form;
 

@@ -34,9 +34,9 @@ pub(super) struct Tried<'a> {
 
 /// Reliability of all forms, and which of them is in front.
 pub(super) struct Comparison {
-    /// Place of the form in front; `None` where none could be fitted.
+    /// Place of the best form; `None` if none could be fitted.
     pub front: Option<usize>,
-    /// Of each form, in their order.
+    /// For each form, in their order.
     pub figures: Vec<FormFigures>,
 }
 
@@ -102,8 +102,8 @@ fn retain(counting: &mut [Option<f64>], is_good: impl Fn(usize) -> bool) {
     }
 }
 
-/// True where a combination of parameters is open, or the gain is not distinguished from zero: the other parameters of
-/// the form are then shares of nothing, and a form with fewer of them states the same.
+/// True if a combination of parameters is open, or the gain is not distinguished from zero: the other parameters of the
+/// form are then shares of nothing, and a form with fewer of them states the same.
 fn is_open(fit: &PredictionFit<'_>) -> bool {
     let p = fit.parameters();
     let known = |covariances: Covariances| {
@@ -118,7 +118,7 @@ fn is_open(fit: &PredictionFit<'_>) -> bool {
     fit.ridge > 0.0 || !covariances::covariances(fit).is_some_and(known)
 }
 
-/// True where the neuromuscular poles have become two lags, by prediction error or at the lines.
+/// True if the neuromuscular poles have become two lags, by prediction error or at the lines.
 fn has_lost_its_muscles(tried: &Tried<'_>) -> bool {
     let lags = |operator: &FamilyOperator| operator.neuromuscular().is_some_and(|(_, zeta)| zeta > MOST_DAMPED);
     let of_fit = tried
@@ -140,7 +140,7 @@ fn common_inflation(tried: &[Tried<'_>]) -> f64 {
 fn criteria(tried: &[Tried<'_>], prediction: &Prediction<'_>) -> Vec<Option<f64>> {
     let little_noise = prediction.little_noise.is_some();
     let inflation = if little_noise {
-        // That of others is their misfit.
+        // The value for others is their misfit.
         let fits = tried.iter().filter_map(|t| t.fit.as_ref().ok());
         let least = fits.min_by(|a, b| a.loss.total_cmp(&b.loss));
         least.map_or(1.0, |fit| fit.inflation)

@@ -39,7 +39,7 @@ pub(super) const BAND_RAD_S: [f64; 5] = [0.7, 1.3, 2.4, 4.3, 8.0];
 pub(super) struct Covariances {
     pub clustered: Vec<f64>,
     pub model_based: Vec<f64>,
-    /// Variances that single elements have besides. They are not a part of the covariance: the
+    /// Variances that single elements have in addition. They are not a part of the covariance: the
     /// response is known better than they are, since the elements err together.
     pub besides: Vec<f64>,
 }
@@ -123,14 +123,14 @@ fn differences(fit: &PredictionFit<'_>, other: &[f64]) -> Vec<(usize, f64)> {
     free.map(|place| (place, fit.eta()[place] - other[place])).collect()
 }
 
-/// By how much `J d` may exceed the difference of two responses before it does not correspond to
-/// any.
+/// Amount by which `J d` may exceed the difference of two responses before it does not correspond
+/// to any.
 const MOST_OVERSTATED: f64 = 2.0;
 /// Part of its diagonal that makes `J' J` regular.
 const RIDGE: f64 = 1e-9;
 
 /// The least squares solution of `J d = H - H_other` over the band of manual control and an octave next to it, relative
-/// to |H|; `None` where the differences of the elements explain it, or elements belong to single records.
+/// to |H|; `None` if the differences of the elements explain it, or elements belong to single records.
 fn responding(fit: &PredictionFit<'_>, other: &[f64], differences: &[(usize, f64)]) -> Option<Vec<(usize, f64)>> {
     let layout = fit.layout();
     let places = &layout.positions(0)[..layout.coordinates()];
@@ -190,7 +190,7 @@ fn inverse(fit: &PredictionFit<'_>) -> Option<Vec<f64>> {
     Some(inverse)
 }
 
-/// True where the data and the prior determine all parameters.
+/// True if the data and the prior determine all parameters.
 pub(super) fn is_regular(fit: &PredictionFit<'_>) -> bool {
     inverse(fit).is_some()
 }

@@ -22,7 +22,7 @@ const LARGEST_REDUCED_CHI_SQUARED: f64 = 3.0;
 const LEVEL: f64 = 0.01;
 /// Loss above that of a free model beyond which a refuted form is reported to be so.
 const LARGEST_EXCESS_LOSS: f64 = 0.01;
-/// Relative error of the response, at its best, beyond which nothing is known of the person.
+/// Relative error of the response, at its best, beyond which nothing is known about the person.
 pub(super) const LARGEST_RESPONSE_ERROR: f64 = 0.5;
 /// Damping ratio above which the two neuromuscular poles are lags of their own, far apart: no muscle
 /// is so damped.
@@ -136,7 +136,7 @@ fn unsettled(weighed: &[WeighedForm]) -> Option<Finding> {
     ))
 }
 
-/// True where it rests at the end of what is searched for: it has no error of its own.
+/// True if it rests at the end of what is searched for: it has no error of its own.
 fn at_bound(parameter: &Parameter) -> bool {
     parameter.standard_error.is_none()
 }

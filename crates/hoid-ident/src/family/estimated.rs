@@ -19,7 +19,7 @@ use crate::{
 
 /// How well eta is known.
 pub(super) struct Errors {
-    /// `None` where the information is singular.
+    /// `None` if the information is singular.
     pub covariances: Option<Covariances>,
     /// Intervals by profile likelihood, where there are such.
     pub profiles: Vec<Option<(f64, f64)>>,
@@ -107,7 +107,7 @@ impl Estimated {
         let covariances = errors.covariances.as_ref();
         let covariance = covariances.map(|c| part(&c.clustered));
         let model_based = covariances.map(|c| part(&c.model_based));
-        // Of single parameters: with what they are uncertain by besides.
+        // Of single parameters: with what they are uncertain by in addition.
         let of_parameters = covariances.zip(covariance.clone()).map(|(c, mut of_all)| {
             for (i, &place) in places.iter().enumerate() {
                 of_all[i * places.len() + i] += c.besides[place];
@@ -149,7 +149,7 @@ fn prior_share(fit: &PredictionFit<'_>, model_based: Option<&[f64]>, places: &[u
     let precision = penalty.curvature(fit.eta()) / fit.innovation_variance;
     let variance = c[i * places.len() + i];
     let ((low, high), x) = (fit.criterion.limits[place], fit.eta()[place]);
-    // At a bound nothing is known of it but the bound.
+    // At a bound nothing is known about it but the bound.
     if variance > 0.0 && low < x && x < high {
         (variance * precision).min(1.0)
     } else {

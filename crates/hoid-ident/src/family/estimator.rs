@@ -206,7 +206,7 @@ impl FamilyEstimator {
     }
 
     /// Where there is little noise: the records over the course of the error that they show, with a level where one was
-    /// taken out, and the starts where output errors end. `None` where there is more.
+    /// taken out, and the starts where output errors end. `None` if there is more.
     fn with_little_noise<'a>(
         &self,
         smooth: &Prediction<'_>,

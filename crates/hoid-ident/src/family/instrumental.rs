@@ -12,12 +12,11 @@
 //! `(Z' Psi + P)^-1 g`, `Psi = D dY/dx e`, halved until `g' (Z'Z + P)^-1 g` falls; a coordinate that it drives out of
 //! what is searched for goes to its bound.
 //!
-//! **The auxiliary operator** is that of the fit at the lines, and where its instruments lead to no
-//! zero that of the prediction error fit, or the middle of both. RIV-BJ as it is usually written takes
-//! the last estimate: where the lines end below the neuromuscular resonance, estimates from two sets
-//! of instruments answer each other without end, each the other's auxiliary operator (with four
-//! in ten virtual people). Any auxiliary operator gives a consistent estimate, and the instruments of
-//! one that is held are the optimal ones but for its own error.
+//! **The auxiliary operator** is that of the fit at the lines, and where its instruments lead to no zero that of the
+//! prediction error fit, or the middle of both. RIV-BJ as it is usually written takes the last estimate: where the
+//! lines end below the neuromuscular resonance, estimates from two sets of instruments answer each other without end,
+//! each the other's auxiliary operator (with four in ten virtual people). Any auxiliary operator gives a consistent
+//! estimate, and the instruments of one that is held are the optimal ones except for its own error.
 //!
 //! Free polynomials have more to lose: their poles are not known, as the lag lies below the lines and
 //! the resonance above, and run to the unit circle. Here the prior keeps them.
@@ -101,7 +100,7 @@ struct Zero {
 /// What the iteration needs at each of its points.
 pub(super) struct Instrumental<'p, 'a> {
     prediction: &'p Prediction<'a>,
-    /// Of the prediction error fit: its prior, weighed as there, its limits, its clusters.
+    /// For the prediction error fit: its prior, weighed as there, its limits, its clusters.
     fit: &'p PredictionFit<'a>,
     inputs: Vec<NoiseFreeInput>,
     order: usize,
@@ -109,7 +108,7 @@ pub(super) struct Instrumental<'p, 'a> {
 
 impl<'p, 'a> Instrumental<'p, 'a> {
     /// # Errors
-    /// Those of the channel: it is missing, constant, or a signal of the loop.
+    /// The entries of the channel: it is missing, constant, or a signal of the loop.
     pub fn new(
         prediction: &'p Prediction<'a>,
         fit: &'p PredictionFit<'a>,
@@ -244,7 +243,7 @@ impl<'p, 'a> Instrumental<'p, 'a> {
         Ok(Held { z, d, products })
     }
 
-    /// `eps` and `Psi` of all records; `None` where there is no model.
+    /// `eps` and `Psi` of all records; `None` if there is no model.
     fn equation(&self, x: &[f64], d: &[f64], workspace: &mut Workspace) -> Option<(Vec<f64>, Vec<Vec<f64>>)> {
         let eta = [x, d].concat();
         let (mut eps, mut psi) = (Vec::new(), vec![Vec::new(); x.len()]);
@@ -438,8 +437,8 @@ mod tests {
 
     #[test]
     fn the_truth_lies_within_its_errors() {
-        // Medians, as the first of these people has weak instruments (see above). That of twelve
-        // values of chi^2 has a standard error of 0.32 (1/(2 f sqrt(12)), f = 0.45 the density there).
+        // Medians, as the first of these people has weak instruments (see above). The value for twelve values of chi^2
+        // has a standard error of 0.32 (1/(2 f sqrt(12)), f = 0.45 the density there).
         let mut squares = [Vec::new(), Vec::new()];
         for number in 0..12 {
             let (person, records) = person(number);
@@ -504,8 +503,8 @@ mod tests {
         let (_, z) = method.equation(&minimum, &d, &mut workspace).unwrap();
         let products = z.iter().flat_map(|a| z.iter().map(move |b| dot(a, b))).collect();
         let of_held = method.held(&minimum, &mut workspace).unwrap();
-        // The autoregression of the remainder of u is that of the fit but for what the prior moves,
-        // the instruments Psi but for the states before the record.
+        // The autoregression of the remainder of u is that of the fit except for what the prior
+        // moves, the instruments Psi except for the states before the record.
         for (own, of_fit) in of_held.d.iter().zip(&d) {
             assert!((own - of_fit).abs() < 2e-3, "{:?} {d:?}", of_held.d);
         }

@@ -2,9 +2,9 @@
 //!
 //! In a closed loop the prediction error fit is biased by as much as its noise model is wrong; the fit at the lines is
 //! not, and has larger errors. With H_P and H_L their responses, V_P and V_L the variances of these, the difference
-//! `d = (H_L - H_P)/H_P` has the variance `V_L - V_P` where nothing is wrong, for what is efficient is not correlated with
-//! it (J. A. Hausman, *Econometrica* 46 (1978) 1251-1271). If a bias of variance `tau^2` is in it besides, the part of d to
-//! go by is the one that leaves the least mean square,
+//! `d = (H_L - H_P)/H_P` has the variance `V_L - V_P` if nothing is wrong, for what is efficient is not correlated with
+//! it (J. A. Hausman, *Econometrica* 46 (1978) 1251-1271). If a bias of variance `tau^2` is in it besides, the part of
+//! d to go by is the one that leaves the least mean square,
 //!
 //! `s = tau^2/(tau^2 + V_L - V_P)`, `tau^2 = max(0, D - (V_L - V_P))`, so that `s = max(0, 1 - 1/q)`,
 //! `q = mean of |d|^2/(V_L - V_P)`
@@ -85,7 +85,7 @@ pub(super) fn with_lines<'a>(
     Some(found)
 }
 
-/// w; `None` where it is zero, or a variance is not known.
+/// w; `None` if it is zero, or a variance is not known.
 fn weight(fit: &PredictionFit<'_>, lines: &LineFit, excess: f64) -> Option<f64> {
     let operator = fit.layout().operator(fit.eta(), 0).ok()?;
     let own = Covariances::of_operator(&covariances(fit)?.clustered, fit.layout(), 0);

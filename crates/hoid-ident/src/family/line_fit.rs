@@ -36,7 +36,7 @@ pub struct LineFit {
 }
 
 impl LineFit {
-    /// chi^2 per degree of freedom; `None` where there is none.
+    /// chi^2 per degree of freedom; `None` if there is none.
     pub fn reduced_chi_squared(&self) -> Option<f64> {
         (self.degrees_of_freedom > 0).then(|| self.chi_squared / self.degrees_of_freedom as f64)
     }

@@ -60,7 +60,7 @@ impl<'d> LineData<'d> {
         self.describing.runs.len()
     }
 
-    /// The points of all runs but one; their variances are those of so many runs.
+    /// The points of all runs but one; their variances are those of a given number of runs.
     pub fn without(&self, run: usize) -> Vec<MeasuredResponse> {
         let n = self.runs() as f64;
         let fewer = |(point, line): (&MeasuredResponse, &crate::frequency::Line)| MeasuredResponse {

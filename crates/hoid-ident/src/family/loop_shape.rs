@@ -20,13 +20,13 @@ use hoid_model::{
 
 use super::open_loop::{Crossover, followed_margin_deg};
 
-/// Where crossings are looked for, rad/s.
+/// Where crossings are searched for, rad/s.
 const RANGE_RAD_S: (f64, f64) = (0.05, 60.0);
 /// Largest phase margin that is trusted of a person, deg.
 const FARTHEST_MARGIN_DEG: f64 = 120.0;
 /// Quantile of 95 % of chi-squared with two degrees of freedom.
 const CHI_SQUARED: f64 = 5.991_464_547_107_979;
-/// Points at which the distance from -1 is looked for.
+/// Points at which the distance from -1 is searched for.
 const POINTS: usize = 400;
 
 /// Known properties of an operator at a frequency: its sampled response, and the covariance of real and imaginary part
@@ -35,7 +35,7 @@ const POINTS: usize = 400;
 pub struct KnownResponse {
     /// Y.
     pub value: Complex64,
-    /// Covariance of `dY/Y`; `None` where none is known.
+    /// Covariance of `dY/Y`; `None` if none is known.
     pub relative: Option<[[f64; 2]; 2]>,
 }
 
@@ -46,7 +46,7 @@ pub struct LoopShape {
     pub crossovers: Vec<(Estimate, Estimate)>,
     /// The frequency in rad/s at which L crosses the negative real axis nearest to -1, with the gain margin in dB.
     pub gain_margin: Option<(Estimate, Estimate)>,
-    /// Closed-loop poles in the right half plane; `None` where that cannot be determined.
+    /// Closed-loop poles in the right half plane; `None` if that cannot be determined.
     pub unstable_poles: Option<usize>,
     /// Least chi-squared of a loop at the limit of stability; `None` without a covariance.
     distance: Option<f64>,
@@ -55,7 +55,7 @@ pub struct LoopShape {
 }
 
 impl LoopShape {
-    /// Of an operator and its controlled element.
+    /// For an operator and its controlled element.
     pub fn of(
         operator: impl Fn(f64) -> KnownResponse,
         element: &ContinuousTransferFunction,
@@ -113,14 +113,14 @@ impl LoopShape {
         self.crossovers.iter().copied().min_by(nearest)
     }
 
-    /// True where the closed loop is stable; `None` where that cannot be determined.
+    /// True if the closed loop is stable; `None` if that cannot be determined.
     pub fn is_stable(&self) -> Option<bool> {
         self.unstable_poles.map(|count| count == 0)
     }
 
     /// Evidence of the loop against the assumed operator: a record that stays bounded was made in a stable loop, which
     /// has a crossover and no phase margin below zero, and a person's has none above 120 deg. `reach_deg` is half of
-    /// the 95 % interval of the margin at the lowest crossover. `None` where nothing is against it.
+    /// the 95 % interval of the margin at the lowest crossover. `None` if nothing is against it.
     pub fn doubt(&self, reach_deg: f64) -> Option<Finding> {
         let remedy = "check the controlled element, the signs and units of e and u and the time between them";
         let (Some((crossover, _)), Some(margin)) = (self.crossovers.first(), self.followed_deg) else {

@@ -30,7 +30,7 @@ const ROUNDING: f64 = 1e-25;
 /// next to the best that the first has found.
 const MORE_STARTS: usize = 4;
 const ROUNDS: usize = 2;
-/// Share that one course of the error leaves over that of another which decides. Of an error that is continuous the
+/// Share that one course of the error leaves over that of another which decides. For an error that is continuous the
 /// model of a hold misses `x^2/6` and that of straight lines `x^2/3`: a quarter of the squares, and neither is right.
 const DECIDES: f64 = 0.02;
 /// Share over the least one from which on a form may not have been found.
@@ -61,8 +61,8 @@ pub(super) struct LittleNoise {
 }
 
 impl LittleNoise {
-    /// The search of all forms; `None` where there is more noise. Where an ARX model of high order finds hardly any, `clean`,
-    /// the starts may be far off.
+    /// The search of all forms; `None` if there is more noise. Where an ARX model of high order finds hardly any,
+    /// `clean`, the starts may be far off.
     pub fn of(
         prediction: &Prediction<'_>,
         neuromuscular: bool,
@@ -98,7 +98,7 @@ impl LittleNoise {
             };
             // A response without noise is one of a form: where none has been found, not the best of them either.
             let none_is_found = clean && round > 0 && share >= NONE;
-            // Of a rest that is noise nothing is left to be found.
+            // For a rest that is noise nothing is left to be found.
             let beside = (starts[best].0, ends[best].clone()?.coordinates);
             for ((form, _), end) in starts.iter().zip(&mut ends) {
                 let known = end.as_ref().map_or(f64::INFINITY, |end| end.share);

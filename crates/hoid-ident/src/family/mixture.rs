@@ -43,7 +43,7 @@ pub(super) struct Mixture {
 }
 
 impl Mixture {
-    /// Of these forms; `None` for none. Errors rest on so many clusters.
+    /// For these forms; `None` for none. Errors rest on so many clusters.
     pub fn of(components: &[Component], clusters: usize) -> Option<Self> {
         let total: f64 = components.iter().map(|c| c.weight).sum();
         if let [only] = components {
@@ -76,7 +76,7 @@ impl Mixture {
 /// Weight, estimate and interval of a form.
 type Part = (f64, f64, (f64, f64));
 
-/// The interval of the mixture; `None` where a form has none.
+/// The interval of the mixture; `None` if a form has none.
 fn interval(components: &[Component], total: f64, clusters: usize) -> Option<(f64, f64)> {
     let student = StudentsT::new(0.0, 1.0, freedom(clusters)).ok()?;
     let quantile = quantile(clusters);

@@ -21,7 +21,7 @@ use super::{
     mixture::{Component, Mixture, widened},
 };
 
-/// Where crossovers are looked for, rad/s.
+/// Where crossovers are searched for, rad/s.
 const RANGE_RAD_S: (f64, f64) = (0.05, 60.0);
 /// Quantile of the normal distribution for 95 %.
 const NORMAL: f64 = 1.959_963_984_540_054;

@@ -35,17 +35,17 @@ pub struct Parameter {
     pub unit: hoid_model::interned::Name,
     /// Its value; infinite for T_I of a pure integration.
     pub value: f64,
-    /// Standard error, to first order, of the operator of these runs; `None` where there is none.
+    /// Standard error, to first order, of the operator of these runs; `None` if there is none.
     pub standard_error: Option<f64>,
-    /// That of the person, whose gain varies from one run to the next.
+    /// The value for the person, whose gain varies from one run to the next.
     pub standard_error_person: Option<f64>,
     /// Interval of 95 %; an end that is open is infinite.
     pub interval: Option<(f64, f64)>,
     /// Variance after the data over that before; 0 without a prior.
     pub prior_share: f64,
-    /// True where the data determine it.
+    /// True if the data determine it.
     pub determined: bool,
-    /// The forms whose estimates it is the mean of; empty where it is that of one form alone.
+    /// The forms whose estimates it is the mean of; empty if it is that of one form alone.
     pub averaged_over: Vec<Form>,
 }
 
@@ -69,7 +69,7 @@ impl Parameter {
         }
     }
 
-    /// The mean over forms of what has this name in each, with their weights, the form in front first.
+    /// The mean over forms of what has this name in each, with their weights, the best form first.
     pub(super) fn averaged(each: &[(Form, f64, &Self)], clusters: usize) -> Option<Self> {
         let (_, _, front) = *each.first()?;
         // At a bound it has no error of its own, and no part in the mean of those that have.
@@ -104,7 +104,7 @@ impl Parameter {
             })
             .collect();
         let share = |of: &dyn Fn(&Self) -> f64| each.iter().map(|(_, w, p)| w / total * of(p)).sum::<f64>();
-        // Of one sign, and within the factor that counts for a scale: in the mean as in a form.
+        // For one sign, and within the factor that counts for a scale: in the mean as in a form.
         let one_sign = interval.is_some_and(|(low, high)| low * high > 0.0);
         let known = match estimate.standard_error {
             Some(s) if matches!(front.name.as_str(), "omega_nm" | "zeta_nm") => s < LARGEST_LOG_ERROR * estimate.value,
@@ -268,7 +268,7 @@ impl CoordinateEstimate<'_> {
             }
             return made;
         }
-        // Of the logarithm: d ln y = dx_g/x_g +- dx_o/x_o.
+        // For the logarithm: d ln y = dx_g/x_g +- dx_o/x_o.
         let variance = c[gain * p + gain] / (x[gain] * x[gain])
             + c[other * p + other] / (x[other] * x[other])
             + 2.0 * sign * c[gain * p + other] / (x[gain] * x[other]);

@@ -1,7 +1,7 @@
 //! Which poles of a discrete model are the lag, and which the neuromuscular system.
 //!
 //! The poles are `s_i = ln z_i / Ts`: a pair of complex poles is the neuromuscular system, the real
-//! one that is left is the lag. Of three real poles each may be the lag; all three readings are
+//! one that is left is the lag. For three real poles each may be the lag; all three readings are
 //! tried by who asks, and what was read is reported ([`RealPole`]).
 
 use hoid_model::{NotConvertible, SampleTime, operator_family::Coordinate, polynomial, polynomial_model::monic};

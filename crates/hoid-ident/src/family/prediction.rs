@@ -182,7 +182,7 @@ impl<'a> Prediction<'a> {
     }
 
     /// Where the search ends with another noise model, from the operator of a fit and with its
-    /// weight of the prior; `None` where there is no end.
+    /// weight of the prior; `None` if there is no end.
     pub fn refit(
         &self,
         fit: &PredictionFit<'_>,
@@ -237,7 +237,7 @@ impl<'a> Prediction<'a> {
         self.little_noise.filter(|share| *share < NONE)
     }
 
-    /// Sum of squares below which one form does not fit better than another; zero where there is noise.
+    /// Sum of squares below which one form does not fit better than another; zero if there is noise.
     pub fn equal(&self) -> f64 {
         self.noise_free().map_or(0.0, |_| EQUAL * self.power())
     }

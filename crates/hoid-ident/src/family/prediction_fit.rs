@@ -23,7 +23,7 @@ pub(super) struct PredictionFit<'a> {
     /// Part of the diagonal of `G + P` that is added to it: zero, and [`OPEN`] where a combination of parameters
     /// is open. It then has an enormous error, and what does not depend on it has its own.
     pub ridge: f64,
-    /// w of [`super::joint`], zero where the lines are not a part of the criterion.
+    /// w of [`super::joint`], zero if the lines are not a part of the criterion.
     pub weight_of_lines: f64,
 }
 

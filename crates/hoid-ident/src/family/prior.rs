@@ -2,14 +2,15 @@
 //!
 //! Some seconds of tracking carry little information about the neuromuscular system: its resonance
 //! lies above the frequencies at which people are excited. A weak prior keeps its parameters where
-//! people's are, and does nothing where the data speak. A positive parameter x has a log-normal
-//! prior, `ln x ~ N(ln centre, spread)`, so that the spread is relative. In the criterion it stands
-//! as one more measurement of the parameter (a maximum a posteriori estimate; L. Ljung, *System
+//! people's are, and does nothing if the data speak. A positive parameter x has a log-normal prior,
+//! `ln x ~ N(ln centre, spread)`, so that the spread is relative. In the criterion it stands as one
+//! more measurement of the parameter (a maximum a posteriori estimate; L. Ljung, *System
 //! Identification*, 1999, section 7.4).
 //!
 //! How much of a result is prior is the ratio of its variance after the data to that before
 //! ([`prior share`](super::Parameter::prior_share)): one means that the data carried no
-//! information. By how much the prior moves the estimate follows from it ([`OperatorPrior::pull`]).
+//! information. Amount by which the prior moves the estimate follows from it
+//! ([`OperatorPrior::pull`]).
 
 use std::{fmt, str::FromStr};
 
@@ -151,9 +152,9 @@ impl OperatorPrior {
         &self.entries
     }
 
-    /// By how much the prior of a parameter moves the logarithm of its estimate. Two normal measurements
-    /// of x with the shares 1 - w and w of the information have the mean `(1 - w) x_data + w m`, so
-    /// that `x - x_data = w (m - x)/(1 - w)`; other priors stay. `None` where it has none, or nothing else.
+    /// Amount by which the prior of a parameter moves the logarithm of its estimate. Two normal measurements of x with
+    /// the shares 1 - w and w of the information have the mean `(1 - w) x_data + w m`, so that
+    /// `x - x_data = w (m - x)/(1 - w)`; other priors stay. `None` if it has none, or nothing else.
     pub fn pull(&self, parameter: &Parameter) -> Option<f64> {
         let name = parameter.name.split('[').next();
         let entry = self.entries.iter().find(|e| Some(e.parameter.as_str()) == name)?;

@@ -145,7 +145,7 @@ impl<'p> ResponseCriterion<'p> {
     }
 
     /// Covariance of the coordinates where the points have theirs, `information^-1`; zero for those
-    /// at a bound. `None` where it does not exist.
+    /// at a bound. `None` if it does not exist.
     pub fn covariance(&self, minimum: &ResponseMinimum) -> Option<Vec<f64>> {
         let p = minimum.coordinates.len();
         let free = self.inner(&minimum.coordinates);

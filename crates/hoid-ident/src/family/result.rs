@@ -27,8 +27,8 @@ use crate::{Fit, ResponsePoint, Termination};
 pub struct OperatorOfRecord {
     /// The operator.
     pub operator: FamilyOperator,
-    /// Covariance of its coordinates by rows: clustered, with what the prior leaves open. `None`
-    /// where the information is singular.
+    /// Covariance of its coordinates by rows: clustered, with what the prior leaves open. `None` if
+    /// the information is singular.
     pub covariance: Option<Vec<f64>>,
     /// The same from the model alone, as if residuals were white and nothing varied.
     pub model_based: Option<Vec<f64>>,
@@ -133,7 +133,7 @@ pub struct FamilyFit {
     /// ([`FamilyFit::delay_if_straight_s`]).
     #[serde(default)]
     pub course_is_known: bool,
-    /// By how much e was moved when its rate was lowered, for a hold that is longer than the recorded one, s.
+    /// Amount by which e was moved when its rate was lowered, for a hold that is longer than the recorded one, s.
     #[serde(default)]
     pub lead_s: f64,
     /// Share of the power of u that the operator leaves, where that is not noise.
@@ -166,8 +166,8 @@ impl FamilyFit {
         &self.operators[record.min(self.operators.len() - 1)]
     }
 
-    /// Crossover frequency and phase margin of a record with a controlled element, averaged over the forms; `None`
-    /// where the loop of the form in front has no crossover.
+    /// Crossover frequency and phase margin of a record with a controlled element, averaged over the forms; `None` if
+    /// the loop of the best form has no crossover.
     pub fn loop_measures(&self, record: usize, element: &ContinuousTransferFunction) -> Option<LoopMeasures> {
         let each = self.weighed.iter().map(|form| {
             let of = form.of(record)?;
@@ -179,7 +179,7 @@ impl FamilyFit {
         LoopMeasures::averaged(&each.into_iter().flatten().collect::<Vec<_>>(), self.clusters)
     }
 
-    /// The same by the form in front alone.
+    /// The same by the best form alone.
     pub fn loop_measures_in_front(&self, record: usize, element: &ContinuousTransferFunction) -> Option<LoopMeasures> {
         let of = self.operator(record);
         self.measured(&of.operator, of.covariance.as_deref(), element)
@@ -200,7 +200,7 @@ impl FamilyFit {
         let front = &self.operator(record).operator;
         let point = |&omega: &f64| {
             let middle = front.response(omega);
-            // Of each form ln of its response over that of the form in front, with variances of gain and phase.
+            // For each form ln of its response over that of the best form, with variances of gain and phase.
             let of = |form: &WeighedForm| {
                 let of = form.of(record)?;
                 let found = of.operator.response_and_gradient(omega);
@@ -237,7 +237,7 @@ impl FamilyFit {
 
     /// What the loop of a record with a controlled element reports against the result: a record that stays bounded was
     /// made in a stable loop, which has a crossover and no phase margin below zero, and a person's has none above 120
-    /// deg. `None` where nothing is against it.
+    /// deg. `None` if nothing is against it.
     pub fn loop_finding(&self, record: usize, element: &ContinuousTransferFunction) -> Option<Finding> {
         let reach = (self.loop_measures_in_front(record, element))
             .and_then(|found| found.phase_margin_interval)
@@ -245,8 +245,7 @@ impl FamilyFit {
         self.loop_shape(record, element).doubt(reach)
     }
 
-    /// Every crossing of the loop of a record with a controlled element, and whether it is stable, by the form in
-    /// front.
+    /// Every crossing of the loop of a record with a controlled element, and whether it is stable, by the best form.
     pub fn loop_shape(&self, record: usize, element: &ContinuousTransferFunction) -> LoopShape {
         let of = self.operator(record);
         let known = |omega: f64| {

@@ -13,8 +13,8 @@
 //!
 //! **Without lines** they do not determine all: where e is nearly the remnant alone, above the band of the forcing
 //! function, all noise models share most of the bias. Their squares count one and a half times, and the neuromuscular
-//! system has a variance besides. Both numbers, and the largest share of the prior with lines, were set on 160 virtual
-//! people and held on 160 others; the page *Error bars of people* has the coverage on a third set.
+//! system has a variance in addition. Both numbers, and the largest share of the prior with lines, were set on 160
+//! virtual people and held on 160 others; the page *Error bars of people* has the coverage on a third set.
 
 use hoid_model::operator_family::Coordinate;
 
@@ -27,9 +27,9 @@ use crate::criterion::Workspace;
 
 /// Orders (nc, nd) of the ARMA model.
 const MIXED: NoiseOrders = (4, 5);
-/// Share of the prior in the fit at the lines from which on other noise models speak besides.
+/// Share of the prior in the fit at the lines from which on other noise models speak in addition.
 pub(super) const LARGEST_SHARE_AT_LINES: f64 = 0.25;
-/// By how much the squares of the differences count more without lines.
+/// Amount by which the squares of the differences count more without lines.
 pub(super) const MORE_WITHOUT_LINES: f64 = 0.5;
 /// Standard deviations of what no rival shows without lines.
 pub(super) const UNSEEN_WITHOUT_LINES: [(Coordinate, f64); 2] =
@@ -37,7 +37,7 @@ pub(super) const UNSEEN_WITHOUT_LINES: [(Coordinate, f64); 2] =
 /// Iterations in which a rival need not converge: it represents a size.
 const SEARCH: (usize, f64) = (25, 1e-6);
 
-/// Coordinates of the operators of the same form with other noise models; none where there is no noise.
+/// Coordinates of the operators of the same form with other noise models; none if there is no noise.
 pub(super) fn rivals(
     prediction: &Prediction<'_>,
     fit: &PredictionFit<'_>,

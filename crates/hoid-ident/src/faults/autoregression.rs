@@ -29,7 +29,7 @@ pub(super) struct Autoregression {
 }
 
 impl Autoregression {
-    /// The fit to a centred channel of this deviation; `None` where it is too short or constant.
+    /// The fit to a centred channel of this deviation; `None` if it is too short or constant.
     pub fn of(x: &[f64], deviation: f64) -> Option<Self> {
         let p = ORDER.min(x.len() / 20);
         if p == 0 || deviation <= 0.0 {

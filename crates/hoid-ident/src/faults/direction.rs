@@ -63,7 +63,7 @@ struct CrossResponse {
 }
 
 impl CrossResponse {
-    /// Of y to x; `None` where the regression is singular.
+    /// Of y to x; `None` if the regression is singular.
     fn of(y: &[f64], x: &[f64]) -> Option<Self> {
         let first = OWN.max(OTHER);
         let size = OWN + OTHER + 1;

@@ -25,7 +25,7 @@ const LONGER: f64 = 20.0;
 const RESTING_S: f64 = 3.0;
 /// Shortest idle stretch, s.
 const IDLE_S: f64 = 1.5;
-/// Time in which the range of an idle channel is looked at, s.
+/// Time in which the range of an idle channel is examined, s.
 const BLOCK_S: f64 = 0.5;
 /// Range of an idle channel, of its deviation.
 const QUIET: f64 = 0.05;

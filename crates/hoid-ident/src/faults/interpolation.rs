@@ -68,7 +68,7 @@ impl Interpolation {
         self.y.len()
     }
 
-    /// By how much the sum of squares falls with m samples.
+    /// Amount by which the sum of squares falls with m samples.
     pub fn fall(&self, m: usize) -> f64 {
         self.y[..m].iter().map(|y| y * y).sum()
     }

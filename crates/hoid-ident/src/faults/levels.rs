@@ -5,7 +5,7 @@
 //!
 //! **Wrap.** A channel that is kept within a range of the modulus M leaves it at one end and comes in at the other:
 //! large changes that are all M within that quantile, which taken out leave no large change. M is 360, 2 pi, 180, pi or
-//! 65536 (or one less, or 4096), or what four changes or more agree in. Of these a pair of changes less than
+//! 65536 (or one less, or 4096), or what four changes or more agree in. For these a pair of changes less than
 //! [`BRIDGED_S`](super::limits::BRIDGED_S) apart is a spike; of a known modulus it is a turn there and back, and
 //! unwrapping repairs either.
 //!

@@ -1,8 +1,8 @@
 //! Faults of recorded data: found by stated statistics, and bridged or cut out before a fit.
 //!
-//! An estimator by prediction error takes each sample at its word: one sample of e that is off by 20
-//! of its deviations enters the criterion through the operator with a weight that no thousand good
-//! ones have. What is looked for, in this order:
+//! An estimator by prediction error takes each sample at its word: one sample of e that is off by 20 of its deviations
+//! enters the criterion through the operator with a weight that no thousand good ones have. What is searched for, in
+//! this order:
 //!
 //! | file | fault | statistic |
 //! |---|---|---|

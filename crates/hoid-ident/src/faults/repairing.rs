@@ -112,7 +112,7 @@ pub fn repair(record: &Record, handling: FaultHandling) -> Result<RepairedRecord
             .map(|s| whole.span(whole.time_s(s.start), whole.time_s(s.end)))
             .collect::<Result<_, _>>()?,
     };
-    // Of what is left: faults would states more than the channels do.
+    // Of what is left: faults would reveal more than the channels do.
     let longest = segments.iter().max_by_key(|segment: &&Record| segment.len());
     faults.extend(
         longest

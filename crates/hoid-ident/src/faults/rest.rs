@@ -30,7 +30,7 @@ pub struct Rest {
 }
 
 impl Rest {
-    /// The rest of a channel; `None` where it has none.
+    /// The rest of a channel; `None` if it has none.
     pub fn of(values: &[f64]) -> Option<Self> {
         let mut sorted = values.to_vec();
         sorted.sort_unstable_by(f64::total_cmp);

@@ -1,4 +1,4 @@
-//! The order in which faults are looked for, and what becomes of each.
+//! The order in which faults are searched for, and what becomes of each.
 //!
 //! Wraps first, since a channel without them has no jumps; then what lasts: stretches in other units,
 //! idle and frozen ones. Between these, on what is left, spikes and steps: an autoregression of a
@@ -14,7 +14,7 @@ use super::{
     spikes,
 };
 
-/// Samples between longer faults below which no spike is looked for.
+/// Samples between longer faults below which no spike is searched for.
 const FEWEST: usize = 100;
 
 /// A fault by its samples.

@@ -5,19 +5,19 @@
 //! results too low with small error bars. Both channels lose their line and the cosines `cos(pi k (t + 1/2)/N)`,
 //! `k = 1 .. 2 T/`[`PERIOD_S`], so all that is slower than that period. The two lose it by the same linear operation,
 //! so that what leads from e to u stays. A fit to the rest has lost the information of low frequencies, and differs
-//! from the first by chance with a variance of `var' - var` where nothing is wrong (J. A. Hausman, *Econometrica* 46
+//! from the first by chance with a variance of `var' - var` if nothing is wrong (J. A. Hausman, *Econometrica* 46
 //! (1978) 1251-1271); where it differs by more, what is slow carries the fit.
 
 use std::f64::consts::PI;
 
 use hoid_model::{Detrend, Record};
 
-/// Of a person what is slower than this is taken out, s.
+/// For a person what is slower than this is taken out, s.
 pub const PERIOD_S: f64 = 20.0;
 /// Most cosines, so that the time stays in proportion to a record's length.
 const MOST: usize = 64;
 
-/// The records without what is slower than a period in s; `None` where they are too short for anything slow.
+/// The records without what is slower than a period in s; `None` if they are too short for anything slow.
 pub fn without_slow(records: &[Record], period_s: f64) -> Option<Vec<Record>> {
     let count = |r: &Record| ((2.0 * r.len() as f64 * r.sample_time().s() / period_s) as usize).min(MOST);
     records.iter().any(|r| count(r) > 0).then(|| {

@@ -20,8 +20,8 @@
 //! 3. leaves nothing beyond [`CLEAN`] sigma (or a twentieth of S);
 //! 4. moves a sample by more than [`SMALLEST`] of the deviation of the channel, and by two of its steps.
 //!
-//! The first samples of a record are looked at backwards, where they are last: a normal autoregression
-//! is the same in both directions.
+//! The first samples of a record are examined backwards, where they are last: a normal autoregression is the same in
+//! both directions.
 //!
 //! A channel without memory, and the last sample of a record, distinguish the two: there a sample beyond [`WILD`]
 //! deviations is a fault. sigma is the median absolute innovation over 0.6745, of the record or of the second around
@@ -59,7 +59,7 @@ const ROUNDS: usize = 4;
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Spike {
     pub samples: Range<usize>,
-    /// By how much the worst of them is off.
+    /// Amount by which the worst of them is off.
     pub size: f64,
     /// Square root of the fall of the sum of squares.
     pub deviations: f64,

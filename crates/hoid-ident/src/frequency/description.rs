@@ -5,7 +5,7 @@
 //! |---|---|
 //! | excitation | the channel named; else the first of those that usually hold one in which there are lines |
 //! | lines | those of the options; else found in that channel |
-//! | average | `sum U_i D_i* / sum E_i D_i*` with D of the channel; the mean of `U_i/E_i` where there is none |
+//! | average | `sum U_i D_i* / sum E_i D_i*` with D of the channel; the mean of `U_i/E_i` if there is none |
 //! | runs | records, whatever number of periods they have, where there are three or more; else their periods |
 //! | delay | that of gain, lead and delay through the lines: it unwraps the phase, and the margin is interpolated without it |
 //!
@@ -27,7 +27,7 @@ use super::{
 };
 use crate::IdentError;
 
-/// Names of channels that usually hold the excitation, in the order in which they are looked for.
+/// Names of channels that usually hold the excitation, in the order in which they are searched for.
 pub const COMMON_EXCITATIONS: [&str; 8] = ["f_t", "d", "r", "f_d", "target", "disturbance", "reference", "forcing"];
 
 /// Runs from which on their scatter alone gives the errors.

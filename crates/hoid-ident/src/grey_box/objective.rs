@@ -28,7 +28,7 @@ pub(crate) struct PhysicalCriterion<'a, P> {
     /// none.
     pub samples: Option<Vec<usize>>,
     pub limits: Vec<(f64, f64)>,
-    /// Prior knowledge before the data, in units of the residuals; none where there is nothing.
+    /// Prior knowledge before the data, in units of the residuals; none if there is nothing.
     pub penalty: Vec<Penalty>,
     /// Common parts of else was measured of the operator that all records.
     pub beside: Option<Beside<'a>>,
@@ -138,7 +138,7 @@ impl<'a, P: Parametrisation> PhysicalCriterion<'a, P> {
         }
     }
 
-    /// Additional measurements, at eta: its part of the criterion; zeros where there is nothing.
+    /// Additional measurements, at eta: its part of the criterion; zeros if there is nothing.
     pub fn beside_at(&self, eta: &[f64], workspace: &mut Workspace) -> Linearisation {
         let mut own = Linearisation::empty(eta.len());
         if let Some(beside) = &self.beside {

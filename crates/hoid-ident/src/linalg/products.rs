@@ -3,7 +3,7 @@
 //! A normal matrix needs the product of each pair of its columns. One column against four others at
 //! a time reads five numbers for four products, where single products read eight; and a column that
 //! is the one before it, a sample later, needs no pass: `sum x(t-1) y(t-1)` over a span is
-//! `sum x(t) y(t)` but for the samples at both ends.
+//! `sum x(t) y(t)` except for the samples at both ends.
 //!
 //! Each product has partial sums of a fixed number and order, in registers that are chosen when the
 //! program runs ([`hoid_lanes::with_four_lanes`]): the bits are the same whatever the registers,

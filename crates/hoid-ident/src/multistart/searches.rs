@@ -1,8 +1,8 @@
 //! Searches from several starts of one criterion, one linearisation after the other.
 //!
 //! First what is left to find of each start, then the search from the best of them, and from the
-//! next ones. A start that turns out to lie in the basin of a minimum that is known is left out,
-//! and a search that comes close to one without a promise to end lower is stopped.
+//! next ones. A start that proves to lie in the basin of a minimum that is known is left out, and a
+//! search that comes close to one without a promise to end lower is stopped.
 //!
 //! The searches do not evaluate the criterion themselves: they name the theta at which they need
 //! its linearisation and are updated with it (reverse communication), so that those of several

@@ -42,7 +42,7 @@ impl Linearisation {
 /// search takes it as `dyn`: a call is nothing compared with a pass over a record, and it is
 /// compiled once for all models.
 pub(crate) trait Objective {
-    /// True where the predictor exists: finite theta, stable polynomials.
+    /// True if the predictor exists: finite theta, stable polynomials.
     fn is_feasible(&self, theta: &[f64]) -> bool;
     /// Sum of squares, `psi' eps` and `psi' psi` at a feasible theta; the workspace is room for
     /// signals, kept from one linearisation to the next.

@@ -126,7 +126,7 @@ fn columns<'a>(orders: &Orders, data: &Data<'a>, first: usize) -> Vec<Lagged<'a>
     outputs.chain(inputs).collect()
 }
 
-/// None where QR is to decide.
+/// None if QR is to decide.
 fn by_normal_equations(orders: &Orders, data: &[Data<'_>], first: usize) -> Option<Regression> {
     let p = orders.na + orders.nb;
     if p == 0 || first < orders.first_regressed_sample() {

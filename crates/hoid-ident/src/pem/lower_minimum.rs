@@ -34,7 +34,7 @@ const OF_LONG: [usize; 2] = [12, 3];
 const LOWER: f64 = 1e-7;
 
 /// A lower minimum with the name of its start. With a start that was given, or with a single start,
-/// no other is looked for.
+/// no other is searched for.
 pub(crate) fn lower_minimum(
     settings: &FitSettings,
     constrained: &ConstrainedCriterion<'_, '_>,

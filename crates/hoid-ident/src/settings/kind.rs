@@ -9,7 +9,7 @@ pub enum Kind {
     Flag,
     /// A whole number.
     Count,
-    /// A number; `inf` where the bounds allow it.
+    /// A number; `inf` if the bounds allow it.
     Number,
     /// Samples (`256`), seconds (`2.56s`) or `inf`.
     Memory,

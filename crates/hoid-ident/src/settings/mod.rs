@@ -58,6 +58,6 @@ pub trait Settings {
     /// bounds.
     fn set(&mut self, name: &str, text: &str) -> Result<bool, IdentError>;
 
-    /// The value of an option as text; `None` where it has none, or the name is not among them.
+    /// The value of an option as text; `None` if it has none, or the name is not among them.
     fn get(&self, name: &str) -> Option<String>;
 }

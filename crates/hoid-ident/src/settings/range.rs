@@ -138,7 +138,7 @@ impl FromStr for DelayRange {
 impl FromStr for OneOrSpan {
     type Err = String;
 
-    /// Of numbers that are not negative.
+    /// For numbers that are not negative.
     fn from_str(text: &str) -> Result<Self, String> {
         let read = Self::read(text).map_err(|expected| format!("{text:?}: expected {expected}"))?;
         match read.0 >= 0.0 {

@@ -15,9 +15,9 @@ pub struct Setting {
     pub name: &'static str,
     /// Type of its value.
     pub kind: Kind,
-    /// Unit of its value; empty where it has none.
+    /// Unit of its value; empty if it has none.
     pub unit: &'static str,
-    /// Default as text, or as text; empty where nothing represents it.
+    /// Default as text, or as text; empty if nothing represents it.
     pub default: String,
     /// What its numbers may be.
     pub bounds: Bounds,

@@ -229,7 +229,7 @@ impl SigmoidFit {
         self.rate_interval.map(|i| (i.low, i.high))
     }
 
-    /// True where the change is too fast for t_M to have an error that is normally distributed: a
+    /// True if the change is too fast for t_M to have an error that is normally distributed: a
     /// change point.
     pub fn is_change_point(&self) -> bool {
         self.change_point
@@ -255,7 +255,7 @@ impl SigmoidFit {
         self.comparison
     }
 
-    /// True where the change is worth its parameters by the BIC. Otherwise t_M and G mean nothing
+    /// True if the change is worth its parameters by the BIC. Otherwise t_M and G mean nothing
     /// ([`Remark::NoChange`]), and [`SigmoidFit::constant_operator`] describes the records.
     pub fn change_found(&self) -> bool {
         self.comparison.bic_difference > 0.0
@@ -307,7 +307,7 @@ impl SigmoidFit {
         self.innovation_variance
     }
 
-    /// Standard deviation of the innovations before and after the change; `None` where the same
+    /// Standard deviation of the innovations before and after the change; `None` if the same
     /// throughout was asked for, or the residuals have no size.
     pub fn noise_levels(&self) -> Option<[f64; 2]> {
         self.levels
@@ -356,8 +356,8 @@ impl SigmoidFit {
         })
     }
 
-    /// The level of u in a record, in the unit of u, with its standard error; `None` where it was not
-    /// estimated ([`crate::SigmoidChange::level`]), and of an exact fit.
+    /// The level of u in a record, in the unit of u, with its standard error; `None` if it was not estimated
+    /// ([`crate::SigmoidChange::level`]), and of an exact fit.
     pub fn level(&self, record: &Record) -> Option<Estimate> {
         let (criterion, covariance) = (self.criterion(self.layout, record).ok()?, self.covariance.as_ref()?);
         let (value, variance) = criterion.level_of(&self.theta, 0, self.innovation_variance, covariance)?;

@@ -1,6 +1,6 @@
 //! Poles, delay and noise model from which searches start.
 //!
-//! Of an operator of a gain and a lead they come from Box-Jenkins fits to the first and the last
+//! For an operator of a gain and a lead they come from Box-Jenkins fits to the first and the last
 //! third of the records; where those give no operator, from a small grid of poles. A form of the
 //! family has a grid throughout.
 

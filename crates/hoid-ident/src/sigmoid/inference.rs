@@ -90,7 +90,7 @@ pub(super) struct Inference {
     /// Why an element of theta has no standard error, where it has none.
     pub remarks: Vec<Option<Remark>>,
     pub comparison: Comparison,
-    /// True where the change is too fast for t_M to have a normal error.
+    /// True if the change is too fast for t_M to have a normal error.
     pub change_point: bool,
 }
 

@@ -118,7 +118,7 @@ impl Layout {
         usize::from(self.form.has_pole()) + if self.neuromuscular { 2 } else { 0 }
     }
 
-    /// True where the operator passes e on at once.
+    /// True if the operator passes e on at once.
     pub fn has_direct_part(&self) -> bool {
         self.form.degree() == self.order()
     }

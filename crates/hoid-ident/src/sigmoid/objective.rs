@@ -14,7 +14,7 @@
 //!
 //! **Initial states.** The state of the operator where a record starts is unknown, as many numbers as they have poles.
 //! Any state is reached from rest by as many held errors before it; those are the unknowns, so that the same filters
-//! give the responses to them and all derivatives. Of a gain and a lead they are before the record, of other forms
+//! give the responses to them and all derivatives. For a gain and a lead they are before the record, of other forms
 //! right before the first residual: there nothing of a fast pole has died away, and none of the responses is lost next
 //! to the others. They enter eps linearly and are eliminated exactly for each theta, as in
 //! [`crate::criterion::initial_state_responses`]: `eps = (I - Q Q') eps_0`, psi with the best
@@ -60,12 +60,12 @@ pub(crate) struct ChangeCriterion<'a> {
     pub piece: Option<usize>,
     /// False for the model whose first state holds throughout.
     pub changes: bool,
-    /// Weights of the residuals of each record, from the first residual on; none where all count
-    /// the same.
+    /// Weights of the residuals of each record, from the first residual on; none if all count the
+    /// same.
     pub weights: Option<Vec<Vec<f64>>>,
     /// Prior knowledge before the data.
     pub penalty: Vec<Penalty>,
-    /// True where u of each record has a level.
+    /// True if u of each record has a level.
     pub level: bool,
 }
 

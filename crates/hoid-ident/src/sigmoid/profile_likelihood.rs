@@ -68,7 +68,7 @@ pub(crate) fn profile_likelihood_interval(
     let options = SearchOptions {
         method: SearchMethod::LevenbergMarquardt,
         max_iterations: 30,
-        // Of the statistic, n times this: a thousandth of the quantile.
+        // For the statistic, n times this: a thousandth of the quantile.
         tolerance: 1e-3 * quantile / n,
     };
     let (low, high) = criterion.limits[place];

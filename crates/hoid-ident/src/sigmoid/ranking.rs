@@ -82,7 +82,7 @@ impl<'c, 'a> Ranking<'c, 'a> {
             if of_states > 0 {
                 columns.push(self.whitened(&self.slow_state(u.len())));
             }
-            // Those of the other records are zero here.
+            // The entries of the other records are zero here.
             let place = |i: usize| if i < ends * powers { i } else { i + record };
             let target = self.whitened(u);
             power += dot(&target, &target);

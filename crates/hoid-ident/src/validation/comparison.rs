@@ -219,7 +219,8 @@ impl Fit {
 }
 
 impl GoodnessOfFit {
-    /// That of several records together, as [`Fit::quality`], where their validations are at hand.
+    /// The value for several records together, as [`Fit::quality`], where their validations are
+    /// available.
     pub fn pooled<'a>(validated: impl Iterator<Item = (&'a Record, &'a Validation)>) -> Self {
         let with = |all: ErrorSums, (record, v): (&'a Record, &'a Validation)| {
             all.and(&record.output()[v.first..], &v.simulated, &v.predicted)

@@ -32,7 +32,7 @@ const CANCELS: f64 = 0.01;
 struct Outcome {
     number: u64,
     own: Option<Fit>,
-    /// Of the true parameters and the random starts.
+    /// For the true parameters and the random starts.
     lowest: Option<Fit>,
     own_s: f64,
 }
@@ -80,7 +80,7 @@ impl Outcome {
         self.above() <= REACHED
     }
 
-    /// True where the reference is a minimum that counts.
+    /// True if the reference is a minimum that counts.
     fn counts(&self) -> bool {
         let reference = if self.above() <= 0.0 { &self.own } else { &self.lowest };
         reference.as_ref().is_some_and(is_regular)

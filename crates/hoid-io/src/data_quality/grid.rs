@@ -12,7 +12,7 @@
 /// Rows of a part, and the fewest that make one.
 const PART: usize = 256;
 const LEAST_PART: usize = 5;
-/// A gap of so many rows is a pause, after which the grid starts again.
+/// A gap of a given number of rows is a pause, after which the grid starts again.
 const PAUSE: f64 = 10.0;
 /// Rows within which a step that was taken too far is set right.
 const NEAR: usize = 4;
@@ -25,7 +25,7 @@ pub(crate) struct Grid {
     pub(crate) rows: Vec<usize>,
     /// Steps of the grid from each of them to the one before; 1 where no row is missing.
     pub(crate) steps: Vec<f64>,
-    /// Sample time, s; NaN where fewer than two rows advance.
+    /// Sample time, s; NaN if fewer than two rows advance.
     pub(crate) sample_time_s: f64,
     /// Rows whose time stays constant.
     pub(super) standing: Vec<usize>,
@@ -90,8 +90,8 @@ impl Grid {
             .map(|i| (i - 1, self.steps[i] - 1.0))
     }
 
-    /// Deviation from lines over parts without a gap: RMS, and the largest with its row; none where
-    /// no part is long enough.
+    /// Deviation from lines over parts without a gap: RMS, and the largest with its row; none if no
+    /// part is long enough.
     pub(crate) fn jitter(&self, t: &[f64]) -> Option<(f64, f64, usize)> {
         let (mut squares, mut freedom) = (0.0, 0);
         let mut worst = (0.0, 0);

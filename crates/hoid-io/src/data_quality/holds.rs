@@ -27,7 +27,7 @@ pub(super) fn standing(signals: &Signals<'_>, grid: &Grid, found: &mut Vec<Quali
                 .all(|signal| signal.values[*row] == signal.values[row - 1] || signal.values[*row].is_nan())
     };
     let (repeated, others): (Vec<usize>, Vec<usize>) = grid.standing.iter().copied().partition(same);
-    // Of rows after a time that was set back the first alone is earlier than the row before.
+    // For rows after a time that was set back the first alone is earlier than the row before.
     let falls = |row: &usize| {
         signals
             .time

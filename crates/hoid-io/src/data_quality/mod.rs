@@ -4,7 +4,7 @@
 //! | module | what it holds |
 //! |---|---|
 //! | `issue` | [`QualityIssue`]: a finding |
-//! | `signals` | the columns that are looked at |
+//! | `signals` | the columns that are examined |
 //! | `grid` | the even grid after a time |
 //! | `timing` | jitter, missing rows, a time that stands or runs back, a clock that is off or drifts |
 //! | `holds` | rows that are there twice, and channels that all hold their values |

@@ -1,11 +1,11 @@
-//! Columns as they are looked at, and the prior knowledge of their time.
+//! Columns as they are examined, and the prior knowledge of their time.
 
 use std::ops::Range;
 
 use super::issue::RowSpan;
 use crate::table::Precision;
 
-/// A column as it is looked at.
+/// A column as it is examined.
 #[derive(Clone, Copy)]
 pub(crate) struct Signal<'a> {
     pub(crate) name: &'a str,

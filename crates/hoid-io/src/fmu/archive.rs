@@ -136,7 +136,7 @@ impl Library {
 /// Writes a unit whose sample time is `step_s`. The same parts give the same bytes.
 ///
 /// # Errors
-/// Those of files; [`IoError::NoLibrary`] for settings that contradict themselves, or two libraries of one
+/// The entries of files; [`IoError::NoLibrary`] for settings that contradict themselves, or two libraries of one
 /// platform.
 pub fn write_fmu(
     path: &Path,
@@ -287,7 +287,7 @@ mod tests {
             assert!(refused.contains("cargo xtask ffi"), "{refused}");
         }
         assert!(Library::read(&folder.path().join("nowhere")).is_err());
-        // Of one name a part is not the name.
+        // For one name a part is not the name.
         for (bytes, ..) in heads() {
             let text = String::from_utf8_lossy(FUNCTIONS[1].as_bytes()).into_owned();
             let place = bytes.windows(text.len()).position(|w| w == text.as_bytes()).unwrap();

@@ -116,7 +116,7 @@ fn tracker() -> Vec<FmuVariable> {
             text(""),
             "further options in JSON, by the keywords of pyhoid.Tracker",
         ),
-        parameter("with_excitation", "", Boolean(false), "true where f_t is connected"),
+        parameter("with_excitation", "", Boolean(false), "true if f_t is connected"),
         input("e", "tracking error"),
         input("u", "control output of the person"),
         input("f_t", "excitation: target or disturbance"),
@@ -151,7 +151,7 @@ fn tracker() -> Vec<FmuVariable> {
         all.push(output(error, unit, Real(f64::NAN), error_help));
     }
     for name in DETERMINED {
-        all.push(output(name, "", Boolean(false), "true where the data determine it"));
+        all.push(output(name, "", Boolean(false), "true if the data determine it"));
     }
     all.extend([
         output("innovation", "", Real(f64::NAN), "a-priori innovation"),

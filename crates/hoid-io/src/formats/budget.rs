@@ -28,7 +28,7 @@ pub(super) struct Budget {
 }
 
 impl Budget {
-    /// That of a file of so many bytes.
+    /// The value for a file of a given number of bytes.
     pub(super) fn of(file_bytes: usize) -> Self {
         let by_size = AT_LEAST.saturating_add(FACTOR.saturating_mul(file_bytes as u64));
         Self::up_to(by_size.min(CEILING).max(raised().unwrap_or(0)))
@@ -60,7 +60,7 @@ impl Budget {
         self.take(more.saturating_mul(count as u64), file)
     }
 
-    /// Takes what so many texts of so many bytes in all are held in, before they are.
+    /// Takes what so many texts of a given number of bytes in all are held in, before they are.
     pub(super) fn take_texts(&mut self, count: usize, bytes: usize, file: &str) -> Result<(), IoError> {
         self.take(TEXT.saturating_mul(count as u64).saturating_add(bytes as u64), file)
     }

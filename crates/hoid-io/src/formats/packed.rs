@@ -17,7 +17,7 @@ use crate::table::Cell;
 /// Bytes that are unpacked together.
 const PART: usize = 1 << 16;
 
-/// The name without `.gz`; `None` where it has no such end.
+/// The name without `.gz`; `None` if it has no such end.
 pub(super) fn inner(path: &Path) -> Option<PathBuf> {
     let packed = path.extension()?.eq_ignore_ascii_case("gz");
     packed.then(|| path.with_extension(""))

@@ -119,7 +119,7 @@ fn sweep_once(directory: &Path) {
     }
 }
 
-/// Removes the parts of processes that are gone. A part that cannot be looked at stays.
+/// Removes the parts of processes that are gone. A part that cannot be examined stays.
 fn sweep(directory: &Path) {
     let entries = fs::read_dir(directory).into_iter().flatten().flatten();
     for entry in entries {
@@ -174,7 +174,7 @@ mod tests {
     fn an_interrupt_leaves_nothing_on_its_way() {
         let dir = tempfile::tempdir().unwrap();
         let (_file, part) = Part::create_in(dir.path()).unwrap();
-        // Of this directory alone: other tests have parts on their way.
+        // For this directory alone: other tests have parts on their way.
         let own = part.path.as_ref().unwrap().to_path_buf();
         assert!(known().parts.contains(&own) && own.exists());
         drop(part);

@@ -11,11 +11,10 @@
 //! | run-in | `run_in` | the first seconds are dropped |
 //! | detrend | [`Record::detrended`](hoid_model::Record::detrended) | mean or straight line out of input and output |
 //!
-//! [`Preparation`] in `pipeline` takes them, on the channels of a record that `record_parts` has
-//! taken apart. The filter of the two steps that need one, and decimation itself, are those of
-//! [`hoid_model::resampling`]. Of an offset and of a new frequency, samples whose filter would
-//! reach beyond the record are cut, never invented; decimation keeps them all. Each step that was taken is a [`Step`], with
-//! its numbers; reading adds those of its repairs before.
+//! [`Preparation`] in `pipeline` takes them, on the channels of a record that `record_parts` has taken apart. The
+//! filter of the two steps that need one, and decimation itself, are those of [`hoid_model::resampling`]. For an offset
+//! and of a new frequency, samples whose filter would reach beyond the record are cut, never invented; decimation keeps
+//! them all. Each step that was taken is a [`Step`], with its numbers; reading adds those of its repairs before.
 
 mod offset;
 mod pipeline;

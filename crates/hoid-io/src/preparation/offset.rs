@@ -19,7 +19,7 @@ use crate::wording::decimal;
 /// Distance from a whole number of samples that is none.
 const WHOLE: f64 = 1e-6;
 
-/// By how much a channel was recorded later than it happened; negative when earlier.
+/// Amount by which a channel was recorded later than it happened; negative when earlier.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Offset {
     /// In samples of the record as it was read.

@@ -21,7 +21,7 @@ pub struct Preparation {
     pub units: BTreeMap<String, String>,
     /// Factors and units by channel.
     pub scale: BTreeMap<String, Scaling>,
-    /// By how much channels were recorded later than they happened.
+    /// Amount by which channels were recorded later than they happened.
     pub offset: BTreeMap<String, Offset>,
     /// Another sampling rate.
     pub rate: NewRate,

@@ -31,7 +31,7 @@ const LARGEST_FACTOR: f64 = 100.0;
 /// Another sampling rate.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum NewRate {
-    /// That of the record.
+    /// The value for the record.
     #[default]
     Kept,
     /// Every M-th sample.

@@ -62,7 +62,7 @@ pub enum Step {
     Offset {
         /// The channel.
         channel: String,
-        /// By how much it was late, samples.
+        /// Amount by which it was late, samples.
         samples: f64,
         /// The same in s.
         seconds: f64,
@@ -83,7 +83,7 @@ pub enum Step {
         to_hz: f64,
         /// End of the pass band, Hz.
         pass_hz: f64,
-        /// Start of the stop band, Hz; none where the frequency rises.
+        /// Start of the stop band, Hz; none if the frequency rises.
         stop_hz: Option<f64>,
         /// Attenuation in the stop band, dB.
         stop_db: f64,
@@ -91,10 +91,10 @@ pub enum Step {
         taps: usize,
         /// Time without samples at the start and at the end, s.
         cut_s: (f64, f64),
-        /// By how much the delay of a model with a hold is shorter than at the old rate, s.
+        /// Amount by which the delay of a model with a hold is shorter than at the old rate, s.
         delay_s: f64,
-        /// By how much a sample of the input is taken later than that of the output next to it, so that the delay is
-        /// the same at both rates, s.
+        /// Amount by which a sample of the input is taken later than that of the output next to it, so that the delay
+        /// is the same at both rates, s.
         input_lead_s: f64,
     },
     /// The first seconds were dropped.

@@ -20,7 +20,7 @@ use crate::preparation::{NewRate, Offset, Preparation, Step};
 /// Rows beyond the span for the interpolation of an offset between samples.
 const FOR_INTERPOLATION: f64 = 64.0;
 
-/// The record in a file, prepared, its output moved earlier by `late_samples` besides.
+/// The record in a file, prepared, its output moved earlier by `late_samples` in addition.
 ///
 /// # Errors
 /// As [`read_prepared`](crate::read_prepared).
@@ -75,7 +75,7 @@ pub(super) fn read_as_recorded(path: &Path, options: &ReadOptions, drop_repeated
     })
 }
 
-/// Most samples by which a channel is moved, with what an interpolation needs besides.
+/// Most samples by which a channel is moved, with what an interpolation needs in addition.
 fn reach(preparation: &Preparation, late_samples: f64, ts_s: f64) -> f64 {
     let samples = |offset: &Offset| match offset {
         Offset::Samples(samples) => *samples,
@@ -88,7 +88,7 @@ fn reach(preparation: &Preparation, late_samples: f64, ts_s: f64) -> f64 {
 }
 
 /// Moves the channels of a wide record, cuts out the span of a narrow one, and does what comes
-/// after the offsets; `None` where that is not possible, and the narrow record gives the reason.
+/// after the offsets; `None` if that is not possible, and the narrow record gives the reason.
 fn moved_within(
     wide: Record,
     narrow: &Record,

@@ -47,9 +47,9 @@ pub fn read_prepared(path: &Path, options: &ReadOptions, preparation: &Preparati
     read_aligned(path, options, preparation, 0.0)
 }
 
-/// Writes a record: t, then `f_t` where there is one, input, output, and the other channels in
-/// their order, all with the digits that give the same numbers back. Units and sample time are kept
-/// next to them as comments; the label is not written.
+/// Writes a record: t, then `f_t` if there is one, input, output, and the other channels in their
+/// order, all with the digits that give the same numbers back. Units and sample time are kept next
+/// to them as comments; the label is not written.
 ///
 /// # Errors
 /// [`IoError::UnknownFormat`], [`IoError::ChannelName`] for a channel that could not be read back,

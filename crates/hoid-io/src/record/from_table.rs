@@ -153,8 +153,8 @@ fn nothing() -> Channel {
     Channel::new("", "", Vec::new())
 }
 
-/// The signal that an expression makes of columns; nothing where it is a column by itself. Its name
-/// is the expression; a difference has a unit where both terms share it.
+/// The signal that an expression makes of columns; nothing if it is a column by itself. Its name is
+/// the expression; a difference has a unit where both terms share it.
 fn combine(signal: Signal, expression: &ColumnExpression, columns: &[Option<Channel>]) -> Channel {
     let nothing = nothing();
     let column = |index: usize| columns[index].as_ref().unwrap_or(&nothing);

@@ -26,7 +26,7 @@ pub(super) struct Bridged {
     pub(super) longest: usize,
 }
 
-/// Puts the straight line between its neighbours in place of each run of NaN, along `t` where it is
+/// Puts the straight line between its neighbours in place of each run of NaN, along `t` if it is
 /// known and else by rows.
 pub(super) fn fill(values: &mut [f64], t: Option<&[f64]>) -> Result<Bridged, OpenEnd> {
     let mut bridged = Bridged::default();

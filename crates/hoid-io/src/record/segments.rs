@@ -23,7 +23,7 @@ use crate::wording::{decimal, list};
 /// their order; the whole record where no kind is named. The first carries the problems of the file
 /// as a whole.
 ///
-/// Of a file with several trials each is read so, one after the other.
+/// For a file with several trials each is read so, one after the other.
 ///
 /// # Errors
 /// As [`read_prepared`]; [`IoError::Preparation`] for kinds that are not places (a clock, a

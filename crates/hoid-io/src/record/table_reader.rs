@@ -65,7 +65,7 @@ impl TableReader<'_> {
         first..last + 1
     }
 
-    /// The value of a column that is missing in a row, on the line between its neighbours; `None` where it is not missing,
+    /// The value of a column that is missing in a row, on the line between its neighbours; `None` if it is not missing,
     /// or there is none on a side.
     fn between(&self, column: usize, at: usize, rows: &Range<usize>, time: Option<usize>) -> Option<f64> {
         let source = &self.table.columns[column];

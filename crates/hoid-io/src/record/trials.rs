@@ -76,7 +76,7 @@ fn between(begins: &[usize], rows: usize) -> Vec<Range<usize>> {
     from.zip(to).map(|(from, to)| from..to).collect()
 }
 
-/// Content of a cell; nothing where it is empty.
+/// Content of a cell; nothing if it is empty.
 fn cell(table: &Table<'_>, at: usize, row: usize) -> Option<String> {
     let value = table.columns[at].values[row];
     if value.is_finite() {
@@ -126,8 +126,8 @@ fn named(parts: Vec<Range<usize>>, label: impl Fn(usize) -> Option<String>) -> P
     found.into_iter().map(name).collect()
 }
 
-/// The parts between the places where t starts again, and the column that counts them; `t` where
-/// there is none.
+/// The parts between the places where t starts again, and the column that counts them; `t` if there
+/// is none.
 fn restarts(table: &Table<'_>) -> Option<(String, Parts)> {
     let begins = falls(table);
     let t = &table.columns.iter().find(|column| column.name == "t")?.values;
@@ -205,7 +205,7 @@ pub(crate) fn of_contents(
                 available: list(&numbers),
             });
         }
-        // Of one array the paths are as clear as without a choice.
+        // For one array the paths are as clear as without a choice.
         None if numbers.len() < 2 => return Ok((contents, asked.is_some())),
         None => return Err(several(file.to_owned(), &array, numbers)),
     };

@@ -17,7 +17,7 @@ pub struct FitParameter {
     pub name: String,
     /// Its value with its standard error.
     pub estimate: Estimate,
-    /// True where the data determine it.
+    /// True if the data determine it.
     pub determined: bool,
 }
 

@@ -106,7 +106,7 @@ impl Source<'_> {
         Err(match given {
             Some(given) => self.value(key, given.span().start, &in_short(time_s), &expected),
             None => self.keys(&format!(
-                "{key} is {time_s} where the file does not give it, expected {expected}"
+                "{key} is {time_s} if the file does not give it, expected {expected}"
             )),
         })
     }

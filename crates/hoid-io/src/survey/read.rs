@@ -16,7 +16,7 @@ pub(super) struct RawColumn {
     pub(super) precision: Precision,
 }
 
-/// Those of a flat table, with what a reader of it should know.
+/// The entries of a flat table, with what a reader of it should know.
 pub(super) fn of_table(mut table: Table<'_>) -> (Vec<RawColumn>, Vec<String>) {
     let rows = table.rows;
     let commas = decimal_commas(&table);
@@ -71,7 +71,7 @@ fn unusable(table: &Table<'_>) -> Vec<String> {
     table.columns.iter().enumerate().filter_map(first).collect()
 }
 
-/// Those of a file of named arrays.
+/// The entries of a file of named arrays.
 pub(super) fn of_arrays(contents: &Contents) -> (Vec<RawColumn>, Vec<String>) {
     let column_paths = contents.column_paths();
     let read = |column_path: ColumnPath| {

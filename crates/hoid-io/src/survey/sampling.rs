@@ -28,7 +28,7 @@ pub struct SamplingSurvey {
     pub repeated: usize,
 }
 
-/// The sampling by a time; none where it holds fewer than two finite values.
+/// The sampling by a time; none if it holds fewer than two finite values.
 pub(super) fn sampling(time: &RawColumn, columns: &[RawColumn]) -> Option<SamplingSurvey> {
     let t: Vec<f64> = time
         .values

@@ -19,7 +19,7 @@ pub(crate) struct Column {
     pub(crate) name: String,
     /// Unit; empty when unknown.
     pub(crate) unit: String,
-    /// One value a row, NaN where there is no number.
+    /// One value a row, NaN if there is no number.
     pub(crate) values: Vec<f64>,
     /// Rows that hold text, in increasing order.
     pub(crate) texts: Vec<usize>,

@@ -18,8 +18,7 @@ struct Moment {
     decimals: usize,
 }
 
-/// The moment that a cell states; `None` where it is none. A date without a time is one of
-/// midnight.
+/// The moment that a cell states; `None` if it is none. A date without a time is one of midnight.
 fn parse(cell: &str) -> Option<Moment> {
     let cell = cell.trim();
     if !cell.starts_with(|c: char| c.is_ascii_digit()) || cell.len() > 40 {

@@ -2,7 +2,7 @@
 //!
 //! While there are none it waits for the next one. Else it takes what comes, looks at each once (a head that is whole,
 //! one that is too long or too late, a peer that is gone), and pauses for [`PAUSE`] where nothing has happened. Who has
-//! come is looked at before anyone gives way: so the page, whose head comes at once, is heard however many others come
+//! come is examined before anyone gives way: so the page, whose head comes at once, is heard however many others come
 //! and go, and the oldest of [`MOST`] that carry no information is closed for the next.
 
 use std::{
@@ -15,7 +15,7 @@ use std::{
 
 use super::http::{Reply, Request};
 
-/// Most of them at once, and those that are taken before all are looked at.
+/// Most of them at once, and those that are taken before all are examined.
 const MOST: usize = 256;
 const AT_ONCE: usize = 64;
 /// Longest time that the head of a request may take to come, all of it.

@@ -32,7 +32,7 @@ pub struct Stem {
 }
 
 impl Stem {
-    /// Of the run with this number in a session.
+    /// For the run with this number in a session.
     pub fn new(folder: &Path, subject: &str, session: usize, condition: &str, number: usize) -> Self {
         Self {
             folder: folder.to_owned(),

@@ -43,7 +43,7 @@ pub struct RunStart {
     pub input: InputMap,
     /// The device.
     pub device: String,
-    /// `browser`, or `injected` where a program gives the time.
+    /// `browser`, or `injected` if a program gives the time.
     pub clock: String,
     /// Time from frame to frame as measured before the run, ms.
     pub refresh_ms: f64,
@@ -160,7 +160,7 @@ impl Ended {
         write_json(&stem.file("end.json"), self)
     }
 
-    /// Reads it; nothing where the run has not ended.
+    /// Reads it; nothing if the run has not ended.
     ///
     /// # Errors
     /// [`LabError::Damaged`], [`LabError::Io`].

@@ -45,7 +45,7 @@ pub struct Facts {
     pub began: String,
     /// That the consent was confirmed, and when.
     pub consent: String,
-    /// `CC0-1.0` where the person gives the data away; empty otherwise.
+    /// `CC0-1.0` if the person gives the data away; empty otherwise.
     pub licence: String,
     /// Row of the Latin square.
     pub row: usize,
@@ -229,7 +229,7 @@ impl Session {
     /// Ends a run: seals its files, checks it and writes down what came out.
     ///
     /// # Errors
-    /// Those of files.
+    /// The entries of files.
     pub fn end(&mut self, stem: &Stem, how: How, counted: BTreeMap<String, f64>) -> Result<Checked, LabError> {
         if !APPENDED.iter().any(|end| stem.file(end).exists()) {
             // It was ended before its first tick.

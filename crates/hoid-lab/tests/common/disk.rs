@@ -11,7 +11,7 @@ use std::{
 pub struct Disk<'a>(&'a Path);
 
 impl<'a> Disk<'a> {
-    /// None where none can be mounted.
+    /// None if none can be mounted.
     pub fn mount(at: &'a Path, kilobytes: usize) -> Option<Self> {
         let size = format!("size={kilobytes}k");
         let mount = Command::new("mount")

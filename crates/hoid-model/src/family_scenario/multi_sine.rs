@@ -19,7 +19,7 @@ use crate::{
 pub struct Excitation {
     /// Its sinusoids; none is not a signal.
     pub function: ForcingFunction,
-    /// True where each run draws its phases again, uniform over the circle.
+    /// True if each run draws its phases again, uniform over the circle.
     pub random_phases: bool,
 }
 

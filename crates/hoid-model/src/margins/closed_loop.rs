@@ -29,7 +29,7 @@ const NO_HALF_TURN_RAD: f64 = 0.5;
 /// Number of closed-loop poles in the right half plane of a stable operator with the frequency response `operator`
 /// around a controlled element, in a loop with unit negative feedback.
 ///
-/// `None` where that cannot be determined: the response is not finite, `|L|` is not below one at `highest_rad_s`, or a
+/// `None` if that cannot be determined: the response is not finite, `|L|` is not below one at `highest_rad_s`, or a
 /// closed-loop pole lies on the imaginary axis.
 pub fn unstable_poles(
     operator: impl Fn(f64) -> Complex64,

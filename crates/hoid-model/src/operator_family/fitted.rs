@@ -16,7 +16,7 @@ pub struct FittedOperator {
     pub innovation_variance: f64,
     /// Sample time of the records.
     pub sample_time: SampleTime,
-    /// Units of e and u; empty where they were not declared.
+    /// Units of e and u; empty if they were not declared.
     pub units: [String; 2],
     /// Where it is from, for messages: the name of a file.
     pub source: String,

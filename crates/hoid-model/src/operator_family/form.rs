@@ -135,18 +135,18 @@ impl Form {
         }
     }
 
-    /// True where the form has a pole of its own: a lag or an integration.
+    /// True if the form has a pole of its own: a lag or an integration.
     pub fn has_pole(self) -> bool {
         !matches!(self, Self::Gain | Self::Lead | Self::Lead2)
     }
 
-    /// True where the pole is a lag with a time constant T_I.
+    /// True if the pole is a lag with a time constant T_I.
     pub fn has_lag(self) -> bool {
         matches!(self, Self::Lag | Self::LeadLag | Self::Lead2Lag)
     }
 
-    /// True where the numerator is of no higher degree than the denominator, so that the operator
-    /// has no pure derivative.
+    /// True if the numerator is of no higher degree than the denominator, so that the operator has
+    /// no pure derivative.
     pub fn is_proper(self, neuromuscular: bool) -> bool {
         self.degree() <= usize::from(self.has_pole()) + if neuromuscular { 2 } else { 0 }
     }

@@ -14,8 +14,8 @@
 //! computed with numbers that carry their derivatives along the coordinates ([`super::dual`]).
 //!
 //! **Direct part.** A form whose numerator has the degree of its denominator passes e on at once.
-//! Of the held error, at the instant of a sample, that would be one sample or the next, with a step
-//! where the delay is a whole number of samples. Its direct part is taken from the error
+//! For the held error, at the instant of a sample, that would be one sample or the next, with a
+//! step where the delay is a whole number of samples. Its direct part is taken from the error
 //! interpolated between the samples around `t - tau - Ts/2`: the delay that the hold gives to all
 //! other parts.
 

@@ -1,4 +1,4 @@
-//! By how much a record is decimated: a choice of the user, or of the rate.
+//! Amount by which a record is decimated: a choice of the user, or of the rate.
 
 use std::fmt;
 use std::str::FromStr;
@@ -104,15 +104,15 @@ pub struct Decimated {
     pub stop_db: f64,
     /// Length of the filter, samples of the old rate.
     pub taps: usize,
-    /// By how much a sample of the input is taken later than that of the output next to it, s.
+    /// Amount by which a sample of the input is taken later than that of the output next to it, s.
     pub lead_s: f64,
-    /// By how much a stream is behind, s.
+    /// Amount by which a stream is behind, s.
     pub lag_s: f64,
 }
 
 impl Decimated {
-    /// By a factor from a sample time, with its filter and the new sample time; none where the filter
-    /// would be longer than `longest` samples to each side.
+    /// By a factor from a sample time, with its filter and the new sample time; none if the filter would be longer than
+    /// `longest` samples to each side.
     pub(super) fn by(factor: usize, old: SampleTime, longest: usize) -> Option<(Self, Kernel, SampleTime)> {
         let kernel = Kernel::folding(1.0 / factor as f64, longest)?;
         let new = SampleTime::new(factor as f64 * old.s()).ok()?;

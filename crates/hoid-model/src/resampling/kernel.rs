@@ -48,7 +48,7 @@ impl Kernel {
     }
 
     /// Passes up to 0.8 `ratio` and stops from `ratio`, the new Nyquist frequency as a share of the
-    /// old one; none where the filter would be longer than `longest` to each side.
+    /// old one; none if the filter would be longer than `longest` to each side.
     pub fn limiting(ratio: f64, longest: usize) -> Option<Self> {
         let half = half_length(2.0 * HALF_TRANSITION * ratio);
         // Written so that NaN is none.
@@ -61,7 +61,7 @@ impl Kernel {
     /// Passes up to 0.8 `ratio` and stops from 1.2 `ratio`, with 6 dB at `ratio`, the new Nyquist
     /// frequency as a share of the old one: what folds down falls between 0.8 and 1 of it, where it
     /// takes the place of what the filter has taken, so that noise keeps a spectrum without a hole.
-    /// None where it would be longer than `longest` to each side.
+    /// None if it would be longer than `longest` to each side.
     pub fn folding(ratio: f64, longest: usize) -> Option<Self> {
         let half = half_length(2.0 * (1.0 - PASS) * ratio);
         // Written so that NaN is none.
@@ -98,7 +98,7 @@ impl Kernel {
     /// Values at `t_k = first + k step` for k = 0 .. n, in samples; every t lies [`Kernel::half`]
     /// samples inside.
     pub fn values(self, samples: &[f64], first: f64, step: f64, n: usize) -> Vec<f64> {
-        // Of a whole step all fractions are one, and the weights are made once.
+        // For a whole step all fractions are one, and the weights are made once.
         let (mut known, mut offset, mut weights) = (f64::NAN, 0, Vec::new());
         (0..n)
             .map(|k| {

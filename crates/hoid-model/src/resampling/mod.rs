@@ -1,6 +1,6 @@
 //! Other sampling rates: the filter, and decimation.
 //!
-//! Of a signal x that is sampled every Ts, decimation by M keeps, after a low-pass filter h of linear phase,
+//! For a signal x that is sampled every Ts, decimation by M keeps, after a low-pass filter h of linear phase,
 //!
 //! ```text
 //! x'(k) = sum_n h(n) x(k M - n),    k = 0 .. round(N/M) - 1

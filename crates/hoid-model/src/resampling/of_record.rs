@@ -5,7 +5,7 @@ use super::kernel::Kernel;
 use crate::{Channel, ModelError, Record};
 
 impl Decimation {
-    /// The record at its new rate, and the actions taken; none where nothing was.
+    /// The record at its new rate, and the actions taken; none if nothing was.
     ///
     /// # Errors
     /// As [`Record::decimated`].

@@ -68,7 +68,7 @@ impl BodeCurve {
         }
     }
 
-    /// Points with error bars of 1.96 standard errors, none where there is no standard error.
+    /// Points with error bars of 1.96 standard errors, none if there is no standard error.
     pub fn of_points(points: &BodePoints, shade: Shade) -> Self {
         let ends = |values: &[Estimate]| {
             let bar = |v: &Estimate| {

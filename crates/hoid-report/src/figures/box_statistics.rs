@@ -14,7 +14,7 @@ const REACH: f64 = 1.5;
 /// Content of a box for a sample.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct BoxStatistics {
-    /// Number of values; zero where there is none, and a cross is drawn in the place of the box.
+    /// Number of values; zero if there is none, and a cross is drawn in the place of the box.
     pub count: usize,
     /// The smallest value within 1.5 interquartile ranges of the box.
     pub lower_whisker: f64,
@@ -31,7 +31,7 @@ pub struct BoxStatistics {
 }
 
 impl BoxStatistics {
-    /// Of the values that are finite; quartiles by linear interpolation between ranks.
+    /// For the values that are finite; quartiles by linear interpolation between ranks.
     pub fn of(values: &[f64]) -> Self {
         let values = finite_sorted(values.iter().copied());
         let quartile = |q| quantile(&values, q).unwrap_or_default();

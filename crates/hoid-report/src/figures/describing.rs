@@ -75,7 +75,7 @@ impl ModelCurve {
         }
     }
 
-    /// The band of 1.96 standard errors around magnitude (0) or phase (1); empty where there is none.
+    /// The band of 1.96 standard errors around magnitude (0) or phase (1); empty if there is none.
     fn band(&self, part: usize, around: &[f64]) -> Vec<(f64, f64)> {
         let ends = |(value, errors): (&f64, &[f64; 2])| {
             let whole = Z_95 * errors[part];
@@ -203,7 +203,7 @@ fn kind_of(model: usize) -> LineKind {
 /// known, and a longer bar would press all others together.
 const LONGEST_BAR: f64 = 180.0;
 
-/// Half of the error bar, NaN where there is no error.
+/// Half of the error bar, NaN if there is no error.
 fn half_bar(v: &Estimate) -> f64 {
     v.standard_error.map_or(f64::NAN, |s| Z_95 * s)
 }

@@ -22,7 +22,7 @@ pub enum Mark {
     Down,
 }
 
-/// Whose colour a curve or box has.
+/// The item that gives a curve or box its colour.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Shade {
     /// Number of the method, which gives the hue: 0 (ARX) is blue, 1 (BJ) vermillion.

@@ -247,7 +247,7 @@ impl GroupReport<'_> {
         trace_panels(id, &format!("Estimates over time, condition {condition}"), &grid)
     }
 
-    /// One recursion of a subject and condition; none where it has no number.
+    /// One recursion of a subject and condition; none if it has no number.
     fn curve(
         &self,
         (subject, condition, method): (&str, &str, &str),

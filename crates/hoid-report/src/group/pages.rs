@@ -72,7 +72,7 @@ impl Tables {
 }
 
 /// The describing functions of a finished group with the operators through them, a figure for each
-/// condition: its name and the SVG text. None where no condition has a periodic excitation.
+/// condition: its name and the SVG text. None if no condition has a periodic excitation.
 ///
 /// # Errors
 /// As [`write_group_pages`].

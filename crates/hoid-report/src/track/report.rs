@@ -121,8 +121,8 @@ impl TrackReport<'_> {
         Ok(panels::operator_grid(&traces, self.record))
     }
 
-    /// Gain and phase, crossover and margin over time, as [`TrackReport::operator_grid`]; `None` where
-    /// the traces have none of them.
+    /// Gain and phase, crossover and margin over time, as [`TrackReport::operator_grid`]; `None` if the traces have
+    /// none of them.
     ///
     /// # Errors
     /// As there.

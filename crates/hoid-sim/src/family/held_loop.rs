@@ -25,7 +25,7 @@ const SMALLEST: f64 = 1e-9;
 #[derive(Debug, Clone)]
 pub(super) struct HeldLoop {
     operator: HeldSystem,
-    /// What passes of e(k), e(k-1), e(k-2) besides.
+    /// What passes of e(k), e(k-1), e(k-2) in addition.
     taps: [f64; 3],
     delay: usize,
     element: HeldSystem,
@@ -76,7 +76,7 @@ pub(super) struct OperatorOutput {
     past: f64,
     /// The same after the delay: what u has of it.
     pub known: f64,
-    /// What u has of the error of the sample besides.
+    /// What u has of the error of the sample in addition.
     tap: f64,
 }
 
@@ -138,7 +138,7 @@ impl HeldLoop {
         1.0 + self.element_direct() * if self.delay == 0 { self.taps[0] } else { 0.0 }
     }
 
-    /// True where u has something of the error of the same sample.
+    /// True if u has something of the error of the same sample.
     pub fn answers_at_once(&self) -> bool {
         self.delay == 0 && self.taps[0] != 0.0
     }

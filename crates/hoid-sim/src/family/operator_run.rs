@@ -87,7 +87,7 @@ impl FamilyOperatorRun {
     }
 
     /// Goes on from where an operator of the same scenario and run stood ([`FamilyOperatorRun::saved`]), with the same
-    /// digits. False where the numbers are of another; then nothing has changed.
+    /// digits. False if the numbers are of another; then nothing has changed.
     pub fn restore(&mut self, saved: &[f64]) -> bool {
         let Some((&[k, n], rest)) = saved.split_first_chunk::<2>() else {
             return false;

@@ -80,7 +80,8 @@ impl RemnantRun {
         new
     }
 
-    /// Draws the random numbers of so many samples where there are fewer; the first ones are the same for any number.
+    /// Draws the random numbers of a given number of samples where there are fewer; the first ones are the same for any
+    /// number.
     fn draw(&mut self, scenario: &ResolvedFamilyScenario, samples: usize) {
         if samples <= self.steps.len() {
             return;
@@ -119,7 +120,7 @@ impl RemnantRun {
     /// Takes the control of sample `k`, after its remnant.
     #[inline]
     pub fn follow(&mut self, scenario: &ResolvedFamilyScenario, of: &Remnants, k: usize, u: f64) {
-        // Of a run that was restored here nothing has been drawn yet.
+        // For a run that was restored here nothing has been drawn yet.
         self.draw(scenario, k + 1);
         for (i, part) in scenario.scenario().remnant.iter().enumerate() {
             if let Some(own) = part.signal_dependence {

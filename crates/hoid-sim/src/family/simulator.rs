@@ -28,7 +28,7 @@ pub struct FamilySimulator {
     pub(super) scenario: ResolvedFamilyScenario,
     /// Each with the state that it is of.
     loops: Vec<(FamilyState, HeldLoop)>,
-    /// Place in `loops` of each sample; empty where there is one for all.
+    /// Place in `loops` of each sample; empty if there is one for all.
     places: Vec<usize>,
     pub(super) remnants: Remnants,
 }

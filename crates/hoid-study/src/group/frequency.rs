@@ -84,7 +84,7 @@ struct Tables {
 }
 
 /// Describing functions of all subjects and conditions with an excitation, and how far the fits are
-/// from them; none where the manifest names none.
+/// from them; none if the manifest names none.
 pub(super) fn frequencies(manifest: &Manifest, base: &Path, fits: &ResponseAverages) -> Option<Frequencies> {
     manifest.conditions.values().find(|facts| facts.excitation.is_some())?;
     let with_errors: Vec<String> = MARGINS

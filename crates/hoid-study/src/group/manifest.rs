@@ -84,7 +84,7 @@ pub struct RunEntry {
     /// element changes at the seam.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub then: Option<PathBuf>,
-    /// Who it is.
+    /// Identity.
     pub subject: String,
     /// The controlled element.
     #[serde(default)]

@@ -24,7 +24,7 @@ pub struct Pattern(Vec<Part>);
 pub struct FileNameParts {
     /// `{subject}`.
     pub subject: String,
-    /// `{condition}`; empty where the pattern has none.
+    /// `{condition}`; empty if the pattern has none.
     pub condition: String,
     /// `{run}`.
     pub run: String,
@@ -88,7 +88,7 @@ impl Pattern {
         Ok(Self(parts))
     }
 
-    /// What the names represent in a file name; none where it does not match.
+    /// What the names represent in a file name; none if it does not match.
     pub fn matches(&self, name: &str) -> Option<FileNameParts> {
         let mut found = FileNameParts::default();
         found_in(&self.0, name, &mut found).then_some(found)

@@ -48,7 +48,7 @@ pub struct Person {
     pub runs: usize,
     /// Outcome of it.
     pub status: PersonStatus,
-    /// Why there is no result; empty where there is one.
+    /// Why there is no result; empty if there is one.
     pub reason: String,
     /// The form of the operator.
     pub form: String,
@@ -142,7 +142,7 @@ impl Person {
         self.parameters.iter().find(|p| p.name == name)
     }
 
-    /// Who and where: `P03 in fo`.
+    /// Person and place: `P03 in fo`.
     pub fn name(&self) -> String {
         let of_run = if self.is_of_all_runs() {
             String::new()
@@ -248,7 +248,7 @@ impl Person {
     }
 }
 
-/// Who and where, as text.
+/// Person and place, as text.
 pub(super) fn cell_name(subject: &str, condition: &str) -> String {
     if condition.is_empty() {
         subject.to_owned()

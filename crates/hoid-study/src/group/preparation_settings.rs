@@ -32,7 +32,8 @@ pub struct PreparationSettings {
     /// Factor, factor and unit, or two units by channel.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub scale: BTreeMap<String, NumberOrText>,
-    /// By how much a channel was recorded late, in samples, or in s as a text such as "0.0167s".
+    /// Amount by which a channel was recorded late, in samples, or in s as a text such as
+    /// "0.0167s".
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub offset: BTreeMap<String, NumberOrText>,
     /// Every M-th sample after a low-pass filter; "off" or 1 keeps the rate. Default: "auto", above 200 Hz by the M
@@ -83,7 +84,7 @@ impl PreparationSettings {
         (of.decimate.as_ref(), of.rate_hz)
     }
 
-    /// What a high rate by itself makes of the runs of a condition: nothing where the rate is named.
+    /// What a high rate by itself makes of the runs of a condition: nothing if the rate is named.
     ///
     /// # Errors
     /// The key that has no meaning, and why.

@@ -103,7 +103,7 @@ fn read_file(manifest: &Manifest, condition: &str, path: &Path, pairing: Pairing
 pub(super) struct CheckedRecord {
     read: ReadRecord,
     faults: Vec<Fault>,
-    /// By how much its rate was lowered after what counts samples as they were recorded.
+    /// Amount by which its rate was lowered after what counts samples as they were recorded.
     factor: usize,
     recorded: Recorded,
 }
@@ -172,9 +172,9 @@ pub(super) struct Run {
     pub record: Record,
     /// Where the second file starts, s, for a run that is joined of two.
     pub seam_s: Option<f64>,
-    /// By how much its rate was lowered: so many samples of the recording are one.
+    /// Amount by which its rate was lowered: so many samples of the recording are one.
     pub factor: usize,
-    /// By how much a sample of the input is taken later than that of the output next to it, s.
+    /// Amount by which a sample of the input is taken later than that of the output next to it, s.
     pub input_lead_s: f64,
     /// What an identification takes; nothing of a run that is joined of two, whose task changes at the seam.
     pub recorded: Option<Recorded>,

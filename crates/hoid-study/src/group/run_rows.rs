@@ -46,8 +46,8 @@ pub(super) struct RunRows<'a> {
     entry: &'a RunEntry,
     /// Known properties of its condition.
     pub condition: ConditionSettings,
-    /// By how much a sample of the input is taken later than that of the output next to it, s: a ratio of samples has
-    /// it as a phase, which is taken back.
+    /// Amount by which a sample of the input is taken later than that of the output next to it, s: a ratio of samples
+    /// has it as a phase, which is taken back.
     pub input_lead_s: f64,
     element: Option<ContinuousTransferFunction>,
     columns: TraceColumns,

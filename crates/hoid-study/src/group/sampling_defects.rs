@@ -35,7 +35,7 @@ impl SamplingDefect {
         Self::Stalled,
     ];
 
-    /// True where the times of the rows are no longer even.
+    /// True if the times of the rows are no longer even.
     pub(super) fn is_uneven(self) -> bool {
         matches!(self, Self::Jitter | Self::Missing | Self::Repeated)
     }

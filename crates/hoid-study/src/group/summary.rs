@@ -43,7 +43,7 @@ pub struct RunFailure {
 pub struct GroupSummary {
     /// Runs that count.
     pub runs: usize,
-    /// Those of them that could not be read.
+    /// The entries of them that could not be read.
     pub failures: Vec<RunFailure>,
     /// The people, by their first runs in the manifest.
     pub people: Vec<Person>,

@@ -36,7 +36,7 @@ pub struct PeopleExperiment {
     pub runs: u64,
     /// Spread of the parameters between the runs of a subject.
     pub between_runs: f64,
-    /// Who they are.
+    /// Identity.
     pub population: Population,
     /// Time between two samples.
     pub sample_time: SampleTime,

@@ -195,7 +195,7 @@ impl EstimatorCell {
             return Orders::default();
         };
         let (ts, table) = (scenario.scenario().sample_time.s() * self.decimate as f64, &self.orders);
-        // The delay in whole samples, but for the rounding of the quotient: what is left over is
+        // The delay in whole samples, except for the rounding of the quotient: what is left over is
         // for b0 and those after it.
         let delay = (scenario.scenario().initial.operator.tau_e_s / ts + 1e-9).floor() as usize;
         let of = |order: Option<Order>, default: usize, simulated: usize| match order {

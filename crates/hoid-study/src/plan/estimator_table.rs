@@ -38,7 +38,7 @@ pub(super) fn methods() -> Vec<MethodSpec> {
 pub(crate) enum Order {
     /// This one.
     Number(usize),
-    /// That of the scenario.
+    /// The value for the scenario.
     Scenario(OfScenario),
     /// One of a range, LO..HI.
     Range(#[schemars(with = "String")] OrderRange),
@@ -89,7 +89,7 @@ pub(crate) struct OrdersTable {
 }
 
 impl OrdersTable {
-    /// True where an order is a range.
+    /// True if an order is a range.
     fn has_range(&self) -> bool {
         [self.nc, self.nd, self.nk]
             .into_iter()

@@ -150,7 +150,7 @@ impl Filters {
         all.all(|x| x.is_finite())
     }
 
-    /// Keeps the parameters within their bounds; true where that changed one.
+    /// Keeps the parameters within their bounds; true if that changed one.
     pub fn bound(&mut self, bounds: &[[f64; 2]; LARGEST]) -> bool {
         let before = self.w.clone();
         for (w, bounds) in self.w.iter_mut().zip(bounds) {

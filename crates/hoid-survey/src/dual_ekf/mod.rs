@@ -217,7 +217,7 @@ impl DualEkf {
             slope: DMatrix::zeros(n, p),
         };
         let [k_e, k_e_dot, omega, zeta] = physical_bounds::<OPERATOR>(setup, sample_time)?;
-        // After a Padé approximation the delay is the filters' own, but for the hold.
+        // After a Padé approximation the delay is the filters' own, except for the hold.
         let late = if own.pade == 0 { setup.orders.nk } else { 1 };
         Ok(Self {
             first: filters.clone(),
@@ -288,7 +288,7 @@ impl State for DualEkf {
             &mut self.restarts,
         ];
         visit_all(parts, each);
-        // Of numbers that were changed none may leave its bounds.
+        // For numbers that were changed none may leave its bounds.
         self.filters.bound(&self.bounds);
     }
 }

@@ -94,7 +94,7 @@ impl JointFilter {
     }
 
     /// Keeps the parameters within their bounds and the prior knowledge of them within reason; true
-    /// where that changed something.
+    /// if that changed something.
     fn hold(&mut self) -> bool {
         let mut cut = false;
         let sound =

@@ -89,7 +89,7 @@ pub(crate) struct Joined {
     pub variance: f64,
 }
 
-/// Output and signals after the whitening filter; `None` where they are not known.
+/// Output and signals after the whitening filter; `None` if they are not known.
 type WhitenedSample = Option<(f64, Signals)>;
 
 /// The two-sided estimates of the rows of a causal run.
@@ -288,7 +288,7 @@ struct ForwardBackward<'a> {
 impl<'a> ForwardBackward<'a> {
     /// What the difference takes from the logarithm of the weight, at least: `z'z` is no less than
     /// the square of one difference over its variance. As S is larger than either covariance,
-    /// neither of these bounds is crossed but for rounding.
+    /// neither of these bounds is crossed except for rounding.
     fn half_square(f: &Side, b: &Side) -> f64 {
         let apart = b.level[0] - f.level[0];
         let mut square = 0.0_f64;
@@ -331,7 +331,7 @@ impl<'a> ForwardBackward<'a> {
 }
 
 /// L with `L L' = s`. Known products are added up before they are taken away, as [`cholesky::forward`] does;
-/// [`cholesky::factor`] is the same but for rounding.
+/// [`cholesky::factor`] is the same except for rounding.
 fn factor(s: &[[f64; OPERATOR]; OPERATOR]) -> Option<[[f64; OPERATOR]; OPERATOR]> {
     let mut l = [[0.0; OPERATOR]; OPERATOR];
     for i in 0..OPERATOR {

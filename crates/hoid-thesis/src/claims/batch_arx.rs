@@ -33,7 +33,7 @@ pub(super) const CLAIMS: &[Claim] = &[
     Claim {
         id: "arx-a-acceptable",
         theme: Theme::BatchArx,
-        statement: "For m0 >= 2 \"ARX bias is diminished to acceptable values\", but for b0 and b1.",
+        statement: "For m0 >= 2 \"ARX bias is diminished to acceptable values\", except for b0 and b1.",
         place: "V.A.1, Fig. 5; 6.1.1, Fig. C.1",
         measure: "Magnitude of the median bias of a1 and a2 over m0 = 2 to 4 and the noise levels, C1, n_k* = 29.",
         plans: PLANS,

@@ -70,7 +70,7 @@ pub(super) const CLAIMS: &[Claim] = &[
 
 /// The reference value of the innovation variance (eq. B.12).
 fn backward_euler_variance(study: Study<'_>, at: Setting) -> Result<f64, String> {
-    // Of all scenarios of the plan.
+    // For all scenarios of the plan.
     const TS_S: f64 = 0.01;
     const T_N_S: f64 = 0.06;
     let k_n = study.truth(&at.bj("loss", at.m0, TRUE_DELAY))?.k_n;

@@ -36,7 +36,7 @@ pub struct Task<'a> {
     pub nk: usize,
     /// A second run of the same person in the same task, where there is one.
     pub validation: Option<&'a Record>,
-    /// When the controlled element changes, s, and how fast, 1/s; none where it does not.
+    /// When the controlled element changes, s, and how fast, 1/s; none if it does not.
     pub change: Option<(f64, f64)>,
 }
 
@@ -50,7 +50,7 @@ pub struct Followed {
 }
 
 impl Followed {
-    /// Of a method that gives a response alone.
+    /// For a method that gives a response alone.
     pub fn without_operator(response: Vec<Vec<Complex64>>) -> Self {
         Self {
             operator: vec![None; response.len()],
@@ -58,8 +58,8 @@ impl Followed {
         }
     }
 
-    /// What a method with an operator found at the next sample that was asked for; its response is that
-    /// of the operator, NaN where there is none.
+    /// What a method with an operator found at the next sample that was asked for; its response is that of the
+    /// operator, NaN if there is none.
     pub(super) fn push(&mut self, task: &Task<'_>, operator: Option<OperatorParameters>) -> Result<(), ThesisError> {
         self.response.push(match &operator {
             Some(operator) => response_of(operator, task.record.sample_time(), task.omega_rad_s)?,

@@ -2,8 +2,8 @@
 //! Paassen and M. Mulder, *Identification of human operator control behaviour in multiple-loop
 //! tracking tasks*, IFAC Man-Machine Systems, 1998).
 //!
-//! The forcing function is a sum of sines, and so are e and u but for the remnant. In a window of
-//! length T around t,
+//! The forcing function is a sum of sines, and so are e and u except for the remnant. In a window
+//! of length T around t,
 //!
 //! `x(k) = sum_i (a_i cos omega_i t_k + b_i sin omega_i t_k) + r(k)`
 //!
@@ -127,7 +127,7 @@ mod tests {
         let run = Run::of(hoid_model::scenario::Condition::C1, 1, 0.0);
         let whole = FourierCoefficients { window: 1e4 }.follow(&run.task()).unwrap();
         let truth = run.responses();
-        // 81.92 s are a period: without remnant each line is exact but for the ridge.
+        // 81.92 s are a period: without remnant each line is exact except for the ridge.
         for (found, expected) in whole.response[0].iter().zip(&truth[0]) {
             assert!((found / expected - 1.0).norm() < 1e-3, "{found} {expected}");
         }

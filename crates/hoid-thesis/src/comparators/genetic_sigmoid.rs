@@ -8,7 +8,7 @@
 //! population of parameter vectors drawn from wide ranges, of which each generation keeps the best,
 //! and makes the others from two parents each, the better of three drawn ones (a *tournament*),
 //! every gene from a range that reaches half of the parents' distance beyond both (*blend
-//! crossover*, L. J. Eshelman and J. D. Schaffer 1993), now and then moved by a normal deviate. What
+//! crossover*, L. J. Eshelman and J. D. Schaffer 1993), at intervals moved by a normal deviate. What
 //! it minimises is the one-step prediction error,
 //!
 //! `eps(k) = v(k) + d1 v(k-1)`, `v = u - K_e(t) y_0 - K_e_dot(t) y_1`, `K_e_dot = K_e T_L`,

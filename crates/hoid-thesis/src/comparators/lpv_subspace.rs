@@ -6,9 +6,9 @@
 //!
 //! `x(k+1) = A x(k) + (B_0 + mu(k) B_1) v(k) + K eps(k)`, `u(k) = C x(k) + eps(k)`.
 //!
-//! At 100 Hz a state reports the next one but for hundredths, and B is lost in them; so every d-th
-//! sample of u is taken, and v(k) is the mean of the d values of e, nk - 1 samples before, that act
-//! until the next. The scheduling mu is the sigmoid of the controlled element, which the
+//! At 100 Hz a state reports the next one except for hundredths, and B is lost in them; so every
+//! d-th sample of u is taken, and v(k) is the mean of the d values of e, nk - 1 samples before, that
+//! act until the next. The scheduling mu is the sigmoid of the controlled element, which the
 //! experimenter knows (the analytical scheduling of the source). Only the gains of an operator
 //! change, so that A, C and K do not depend on mu and the number of coefficients grows with the
 //! window p and not with 2^p. Steps:

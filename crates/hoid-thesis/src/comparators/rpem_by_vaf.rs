@@ -27,7 +27,7 @@ settings! {
         /// Time between two looks at the validation set
         #[setting(unit("s"), bounds(Bounds::PositiveFinite))]
         pub interval: f64 = 0.5,
-        /// Length of the validation set that is looked at
+        /// Length of the validation set that is examined
         #[setting(unit("s"), bounds(Bounds::PositiveFinite))]
         pub window: f64 = 5.12,
         /// Smallest factor of P

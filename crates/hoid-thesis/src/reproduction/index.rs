@@ -31,7 +31,7 @@ pub struct StudyEntry {
     pub name: String,
     /// Its title.
     pub title: String,
-    /// Where its directory is, from the page; empty where nothing of it is kept.
+    /// Where its directory is, from the page; empty if nothing of it is kept.
     pub directory: String,
     /// Estimates that were made.
     pub estimates: u64,

@@ -38,7 +38,7 @@ pub struct Item {
     pub title: String,
     /// Notes for the reader.
     pub caption: String,
-    /// The plan whose results it shows; none where nothing is simulated.
+    /// The plan whose results it shows; none if nothing is simulated.
     pub plan: Option<&'static str>,
     pub(super) shared: Option<SharedRuns>,
     make: Maker,

@@ -66,7 +66,7 @@ pub struct ReproductionSummary {
     pub index: PathBuf,
     /// Tables and figures.
     pub items: usize,
-    /// Claims that hold, hold and more so, hold in part, do not hold, cannot be tested; none where
+    /// Claims that hold, hold and more so, hold in part, do not hold, cannot be tested; none if
     /// they were not chosen.
     pub tally: Option<[usize; 5]>,
     /// Time that the studies took, s.

@@ -220,8 +220,8 @@ fn make(
 /// From where on the estimates set the range of their panels, s: before, they leave their start.
 const SETTLED_S: f64 = 15.0;
 
-/// Every curve from [`SETTLED_S`] on but for its highest and lowest three per cent: no estimator is
-/// missing because another is better.
+/// Every curve from [`SETTLED_S`] on except for its highest and lowest three per cent: no estimator
+/// is missing because another is better.
 fn ordinate(curves: &[TraceCurve]) -> Ordinate {
     let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
     for curve in curves {

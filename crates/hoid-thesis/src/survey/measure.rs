@@ -11,8 +11,8 @@
 //! | through | the 5.12 s after it |
 //! | after | the last 20.48 s |
 //!
-//! Of the operator's parameters it is the root mean square of the relative error from 10 s on, as in
-//! the studies.
+//! For the operator's parameters it is the root mean square of the relative error from 10 s on, as
+//! in the studies.
 
 use std::ops::Range;
 
@@ -23,7 +23,7 @@ use crate::{ThesisError, comparators::Followed, comparators::response_of};
 
 /// Spans, s.
 const SPANS_S: [(f64, f64); 3] = [(30.72, 40.96), (40.96, 46.08), (61.44, 81.93)];
-/// Parameters are looked at from here on, s.
+/// Parameters are examined from here on, s.
 const PARAMETERS_FROM_S: f64 = 10.0;
 /// Which lines of the forcing function.
 pub(super) const LINES: Range<usize> = 2..9;
@@ -31,7 +31,7 @@ pub(super) const LINES: Range<usize> = 2..9;
 /// Errors of one run, %; no number where there is no estimate.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Errors {
-    /// Of the response: before, through, after.
+    /// For the response: before, through, after.
     pub response: [f64; 3],
     /// Of K_e, T_L, K_e_dot, omega_nm, zeta_nm.
     pub operator: [f64; 5],

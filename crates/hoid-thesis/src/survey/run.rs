@@ -32,7 +32,7 @@ pub struct MethodErrors {
     pub name: String,
     /// What it was reported next to e and u; empty for nothing.
     pub told: &'static str,
-    /// Errors by run; why there are none where it failed.
+    /// Errors by run; why there are none if it failed.
     pub runs: Vec<Result<Errors, String>>,
     /// Processor time of one run, s, the median.
     pub seconds: f64,

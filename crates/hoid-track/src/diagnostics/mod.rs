@@ -1,9 +1,9 @@
 //! Findings for and against a trace, and what the estimate of one sample is worth.
 //!
-//! A trace is as good as its start and as its rows. Of the start fit all findings of
-//! [`hoid_ident::diagnostics`] count, none as more than a doubt: the recursion may leave it. A change
-//! inside the start span is a note for methods that forget, a doubt for those that do not. Of the
-//! rows from which the estimate moves on, at most [`ROWS`] are looked at, evenly apart:
+//! A trace is as good as its start and as its rows. For the start fit all findings of [`hoid_ident::diagnostics`]
+//! count, none as more than a doubt: the recursion may leave it. A change inside the start span is a note for methods
+//! that forget, a doubt for those that do not. For the rows from which the estimate moves on, at most [`ROWS`] are
+//! examined, evenly apart:
 //!
 //! | kind | what was observed |
 //! |---|---|
@@ -55,7 +55,7 @@ use hoid_numerics::statistics::upper_median;
 use self::operators::{Operator, operator_findings};
 use crate::trace::Trace;
 
-/// Rows that are looked at.
+/// Rows that are examined.
 const ROWS: usize = 400;
 /// VAF in % of the simulated start fit below which it explains little.
 const LEAST_START_VAF: f64 = 20.0;
@@ -70,7 +70,7 @@ impl Trace {
     /// orders, where there was one.
     ///
     /// # Errors
-    /// Those of the residuals of the start fit.
+    /// The entries of the residuals of the start fit.
     pub fn verdict(&self, record: &Record, choice: Option<&Choice>) -> Result<Verdict, IdentError> {
         let mut all = self.start_findings(record, choice)?;
         let rows = self.rows_judged();

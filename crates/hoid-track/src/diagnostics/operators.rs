@@ -9,10 +9,10 @@ use hoid_model::{
 
 use crate::trace::Trace;
 
-/// Of one row, or why there is none.
+/// For one row, or why there is none.
 pub(super) type Operator = Result<OperatorEstimate, NotConvertible>;
 
-/// True where the coefficients are not meant to be an operator.
+/// True if the coefficients are not meant to be an operator.
 pub(super) fn is_other(operator: &Operator) -> bool {
     matches!(
         operator,

@@ -91,7 +91,7 @@ impl Trace {
             ),
             Course::Drift => (
                 "drifting",
-                format!("their {name} drifts by {size} where the trace declares no change (p = {p:.0e})"),
+                format!("their {name} drifts by {size} if the trace declares no change (p = {p:.0e})"),
             ),
             Course::Sway(period) => (
                 "swaying",

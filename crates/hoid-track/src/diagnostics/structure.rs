@@ -15,7 +15,7 @@ use crate::{guard::GuardKind, trace::Trace};
 const UNLIKELY: f64 = 1e-3;
 /// Probability from which another lag explains what is left.
 const OF_LAG: f64 = 0.02;
-/// Seconds that are looked at, at most, and at the start not: the filter is at rest there.
+/// Seconds that are examined, at most, and at the start not: the filter is at rest there.
 const LONGEST_S: f64 = 120.0;
 const SETTLING_S: f64 = 10.0;
 /// Lag of the basis where the method has none of its own, s.

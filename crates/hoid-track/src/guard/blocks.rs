@@ -66,7 +66,7 @@ impl Guard {
         }
     }
 
-    /// The tails of signals of which nothing is known start to be learnt.
+    /// The tails of signals without prior knowledge start to be learnt.
     fn learn_tails(&mut self, block: &Block) {
         if !self.profile.is_known() {
             for (channel, means) in self.channels.iter_mut().zip(block.differences) {

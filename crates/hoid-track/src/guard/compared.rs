@@ -73,7 +73,7 @@ impl Reference {
         }
     }
 
-    /// A block is over; true where the estimate has gone diverged.
+    /// A block is over; true if the estimate has gone diverged.
     pub fn end_block(&mut self, block: &Block, length: u32) -> bool {
         self.over += 1;
         // Blocks with samples that were held back carry no information.

@@ -92,7 +92,7 @@ pub struct GuardEvent {
     /// Samples of it so far.
     pub samples: u64,
     /// Largest distance from the prediction for outliers and steps, largest magnitude for levels, in
-    /// the unit of the signal; zero where it has no size.
+    /// the unit of the signal; zero if it has no size.
     pub size: f64,
     /// The actions taken.
     pub action: GuardAction,

@@ -92,7 +92,7 @@ const GIVEN_UP_S: f64 = 120.0;
 pub(crate) struct Guarded {
     /// Report of the recursion; no innovation where the sample did not reach it as it came.
     pub outcome: Option<StepOutcome>,
-    /// True where the sample was held back or the estimate is paused.
+    /// True if the sample was held back or the estimate is paused.
     pub held: bool,
 }
 
@@ -114,7 +114,7 @@ struct Pause {
     channel: usize,
     first: u64,
     size: f64,
-    /// True where the last block was not as it should be.
+    /// True if the last block was not as it should be.
     bad_block: bool,
     /// Samples in a row that are as they should be.
     good: u64,
@@ -249,7 +249,7 @@ impl Guard {
         guard
     }
 
-    /// Takes a sample, whose values are NaN where they are not numbers, to the recursion or not.
+    /// Takes a sample, whose values are NaN if they are not numbers, to the recursion or not.
     #[inline]
     pub fn take(&mut self, recursion: &mut dyn Recursion, sample: Sample, moves: bool) -> Guarded {
         self.samples += 1;

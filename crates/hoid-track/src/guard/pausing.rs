@@ -105,7 +105,7 @@ impl Guard {
         self.tell(kind, channel, self.samples - first, size, action, 0);
     }
 
-    /// The recursion starts again from its start, and nothing is known of the signals.
+    /// The recursion starts again from its start, and nothing is known about the signals.
     pub(super) fn learn_anew(&mut self, recursion: &mut dyn Recursion) {
         self.start.restore(recursion);
         self.former = std::mem::take(&mut self.profile);

@@ -1,6 +1,6 @@
 //! Typical values, from the record of the start span.
 //!
-//! Of each mean of a block ([`hoid_core::guard::profile`]) the median over all blocks is taken, and of each difference
+//! For each mean of a block ([`hoid_core::guard::profile`]) the median over all blocks is taken, and of each difference
 //! the largest of three estimates of its 99 % quantile: itself, and those that follow from the 50 and 95 % quantiles of
 //! Gaussian errors. A few outliers in the span change neither; heavy tails count. Samples at which a signal stays
 //! constant are left out of the quantiles, as they are while it runs ([`hoid_core::guard::channel`]); where u rested is

@@ -49,7 +49,7 @@ pub(super) struct White {
     pub t_s: f64,
     pub x: Gains,
     pub y: f64,
-    /// True where it moves nothing: something is missing, or it is history.
+    /// True if it moves nothing: something is missing, or it is history.
     pub is_void: bool,
 }
 

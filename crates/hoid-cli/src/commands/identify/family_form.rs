@@ -144,7 +144,7 @@ impl FamilyReport<'_> {
         match all.as_slice() {
             [] => String::new(),
             all => format!(
-                "Errors are those of {runs}. Of the person, whose gain varies by some {:.0} % beyond: {}.\n",
+                "Errors are those of {runs}. For the person, whose gain varies by some {:.0} % beyond: {}.\n",
                 100.0 * fit.run_to_run,
                 all.join(", ")
             ),

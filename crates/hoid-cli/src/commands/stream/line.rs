@@ -19,7 +19,7 @@ pub struct Counts {
     pub held: u64,
     /// How often the guard started the estimate again.
     pub restarts: u64,
-    /// Of these, samples that were missing by the column t.
+    /// For these, samples that were missing by the column t.
     #[serde(skip)]
     pub bridged: u64,
     /// Steps that stability or a bound made shorter.
@@ -145,7 +145,7 @@ impl StreamStatus<'_> {
     /// Writes the line into a buffer, its end included.
     ///
     /// # Errors
-    /// Those of the serialiser, which a buffer in memory does not have.
+    /// The entries of the serialiser, which a buffer in memory does not have.
     pub fn write(&self, buffer: &mut Vec<u8>) -> serde_json::Result<()> {
         let tracker: Option<&Tracker> = match self.live {
             Live::Tracking(tracker) => Some(tracker),

@@ -9,8 +9,8 @@ use serde_json::{Map, Value};
 
 use crate::error::CliError;
 
-/// Longest line that is looked at, bytes; of a longer one the rest is left out, so that memory
-/// stays bounded.
+/// Longest line that is examined, bytes; of a longer one the rest is left out, so that memory stays
+/// bounded.
 const LONGEST: usize = 1 << 16;
 /// Characters of a faulty cell that are shown.
 const SHOWN: usize = 24;

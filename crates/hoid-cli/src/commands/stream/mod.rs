@@ -48,7 +48,7 @@ pub fn run(args: &StreamArgs) -> Result<(), CliError> {
     let decimation = args.rate.of(asked.counts_samples());
     let decimator = match decimation.factor(sample_time) {
         1 => None,
-        // Of the output alone nothing is held.
+        // For the output alone nothing is held.
         factor => Some(Decimator::new(factor, sample_time, [true, false, false])?),
     };
     let tracked = decimator.as_ref().map_or(sample_time, Decimator::sample_time);

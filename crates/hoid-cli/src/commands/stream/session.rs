@@ -153,7 +153,7 @@ impl Session {
     /// one by one. What is not a sample is dropped: it may come from anyone.
     ///
     /// # Errors
-    /// Those of the answers.
+    /// The entries of the answers.
     pub fn take_datagram(
         &mut self,
         bytes: &[u8],

@@ -19,7 +19,7 @@ use std::{
 
 pub use draw::Draw;
 
-/// e and u at t: sinusoids, and what they have besides.
+/// e and u at t: sinusoids, and what they have in addition.
 pub fn sample(t_s: f64, draw: &mut Draw) -> (f64, f64) {
     let waves = |at: f64| (0.9 * at).sin() + 0.5 * (2.3 * at).sin() + 0.2 * (7.1 * at).sin();
     (waves(t_s), 0.1 * waves(t_s - 0.3) + 0.05 * (2.0 * draw.share() - 1.0))

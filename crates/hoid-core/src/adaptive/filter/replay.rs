@@ -1,6 +1,6 @@
-//! The replays that repair the estimate of now.
+//! The replays that repair the current estimate.
 //!
-//! The candidate of now (`candidate`) takes each sample as it comes. In addition, another candidate reads the record
+//! The current candidate (`candidate`) takes each sample as it comes. In addition, another candidate reads the record
 //! again from the start of the memory, [`REPLAYED`] samples with each new one, until it has caught up. It has the basis
 //! where the estimate now points, the noise model of its residuals, and the dispersion of its innovations. When it has
 //! caught up it takes over, and the next one starts. So the estimate is, a few seconds late, that of a prediction error
@@ -10,8 +10,8 @@
 //! Every second replay starts elsewhere. It is repeated [`STAGES`] times from where it ended, and takes over
 //! only if its evidence is better by [`TAKEOVER_NATS`].
 //!
-//! With no more memory than the longest delay needs nothing is replayed: basis and noise model are then
-//! those of the start, but for corrections, and the noise model is renewed in place.
+//! With no more memory than the longest delay needs nothing is replayed: basis and noise model are then those of the
+//! start, except for corrections, and the noise model is renewed in place.
 
 use core::ops::Range;
 
@@ -75,7 +75,7 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         }
     }
 
-    /// Logarithm of the prior density of a point, but for a constant.
+    /// Logarithm of the prior density of a point, except for a constant.
     fn log_prior(&self, point: Point) -> f64 {
         let (p, is) = (self.prior.person, variances(&self.prior));
         let away = [point.omega - p.omega, point.zeta - p.zeta, point.tau - p.tau];
@@ -179,7 +179,7 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
     }
 }
 
-/// Reads samples of the history; false where a number has overflowed.
+/// Reads samples of the history; false if a number has overflowed.
 fn read<E: AsRef<[f64]> + AsMut<[f64]>>(
     history: &History<E>,
     saturation: &Saturation,

@@ -33,7 +33,7 @@ pub(crate) struct ScoreBlock {
 /// Residuals of a piece of a record, and the columns of psi with their places.
 pub(crate) type Scores = (Vec<f64>, Vec<(usize, Vec<f64>)>);
 
-/// The blocks of records whose residuals start at sample `first`, with p places; `None` where there
+/// The blocks of records whose residuals start at sample `first`, with p places; `None` if there
 /// are no scores.
 pub(crate) fn score_blocks(
     data: &[Data<'_>],

@@ -4,8 +4,8 @@
 //! `-db/dt`, `-b_i` at `z_{i+1}`. A lead that grows by so much is a delay that falls by it, to first order.
 //!
 //! The scores are those of least squares in columns that are known ([`crate::diagnostics::whitened`]), and the test is
-//! that of fits. A drift is `t/T - 1/2` in place of the share of a jump, a sway a sine of one of some periods in
-//! four phases; all that are looked at are counted (Bonferroni).
+//! that of fits. A drift is `t/T - 1/2` in place of the share of a jump, a sway a sine of one of some periods in four
+//! phases; all that are examined are counted (Bonferroni).
 
 use std::ops::Range;
 
@@ -27,7 +27,7 @@ pub struct Unsteady {
     pub name: &'static str,
     /// First sample after a jump.
     pub at: usize,
-    /// By how much, of a sway its amplitude: the gain as a share of it, the delay in s; and the standard error.
+    /// Amount by which, of a sway its amplitude: the gain as a share of it, the delay in s; and the standard error.
     pub by: [f64; 2],
     /// Probability of so much by chance, among all of its course.
     pub p_value: f64,
@@ -153,7 +153,7 @@ mod tests {
 
     #[test]
     fn who_is_steady_is_called_so() {
-        // Of three courses and 100 people, each below its limit in less than one of a hundred.
+        // For three courses and 100 people, each below its limit in less than one of a hundred.
         let told = (0..100)
             .map(|seed| of(1000 + seed, |_| 1.0))
             .filter(|found| found.iter().any(|found| found.p_value < 0.01))

@@ -5,12 +5,11 @@
 //!
 //! `delta_c = -(A - A_c)^-1 h_c`, `A = J' G J`, `h = J' g`
 //!
-//! with the columns of J the directions that are looked at (the jackknife of a group, to first order: B.
-//! Efron, *The Jackknife, the Bootstrap and Other Resampling Plans*, 1982, chapter 3). By chance a block
-//! of n moves a parameter by about `1/sqrt n` of its standard error. One that moves it by [`MOVED`] of
-//! them, and by as much of what all the others do together, `sqrt(sum delta^2)`, is named: the sum of
-//! squares over all blocks is the variance of the estimate, which that block alone makes several times
-//! the stated one.
+//! with the columns of J the directions that are examined (the jackknife of a group, to first order: B. Efron, *The
+//! Jackknife, the Bootstrap and Other Resampling Plans*, 1982, chapter 3). By chance a block of n moves a parameter by
+//! about `1/sqrt n` of its standard error. One that moves it by [`MOVED`] of them, and by as much of what all the
+//! others do together, `sqrt(sum delta^2)`, is named: the sum of squares over all blocks is the variance of the
+//! estimate, which that block alone makes several times the stated one.
 
 use nalgebra::{DMatrix, DVector};
 

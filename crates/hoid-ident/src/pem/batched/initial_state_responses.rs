@@ -7,8 +7,8 @@
 //! twice, as once leaves what rounding makes of columns that are nearly parallel (Y. Yamamoto et
 //! al., *Electronic Trans. Numerical Analysis* 44 (2015) 306-326). As they are shifts of one, the
 //! first matrix takes nf products. The criterion alone has an orthonormal basis by Gram and Schmidt
-//! ([`crate::criterion::initial_state_responses`]), the same but for rounding; a lane whose columns
-//! depend on each other is left to it.
+//! ([`crate::criterion::initial_state_responses`]), the same except for rounding; a lane whose
+//! columns depend on each other is left to it.
 
 use hoid_lanes::Number;
 
@@ -41,7 +41,7 @@ pub(super) struct InitialStateResponses<R> {
 }
 
 impl<R: Number> InitialStateResponses<R> {
-    /// Those of so many residuals.
+    /// The entries of a given number of residuals.
     #[inline(always)]
     pub fn of(
         zero: R,

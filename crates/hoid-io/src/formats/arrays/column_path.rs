@@ -1,8 +1,8 @@
 //! Arrays as columns.
 //!
-//! An array with one long side is a column. Of a matrix, time runs along the longer side, and each
+//! An array with one long side is a column. For a matrix, time runs along the longer side, and each
 //! line along it is a column with a path of its own: `x(:,2)` or `x(2,:)` in MATLAB's words,
-//! counted from 1, `x[:,1]` or `x[1,:]` in Python's, counted from 0. Of a square one the first
+//! counted from 1, `x[:,1]` or `x[1,:]` in Python's, counted from 0. For a square one the first
 //! index is time.
 
 use super::contents::{Contents, Entry, Indexing, OBJECT, Value};

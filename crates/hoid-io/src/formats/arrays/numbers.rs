@@ -127,7 +127,7 @@ impl Numbers {
         }
     }
 
-    /// The number at a place; NaN where there is none.
+    /// The number at a place; NaN if there is none.
     pub(crate) fn value(&self, at: usize) -> f64 {
         let Some(bytes) = self.bytes_of(at) else {
             return f64::NAN;

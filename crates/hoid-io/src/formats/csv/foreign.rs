@@ -6,7 +6,7 @@
 use super::text::{is_aside, separator};
 use crate::table::{Cell, with_decimal_point};
 
-/// Lines among which the header is looked for.
+/// Lines among which the header is searched for.
 const LINES: usize = 60;
 
 /// Letters and signs of Latin 1 that units and names of columns have; other bytes are damage.

@@ -173,7 +173,7 @@ fn run(bytes: &[u8], part: Range<usize>, layout: Layout<'_>) -> Plain {
     found
 }
 
-/// The numbers of a row and where they are printed, and where the row ends; `None` where it is not plain.
+/// The numbers of a row and where they are printed, and where the row ends; `None` if it is not plain.
 #[inline]
 fn plain_row(
     bytes: &[u8],

@@ -168,7 +168,7 @@ fn first_record(bytes: &[u8], separator: u8) -> Option<(csv::ByteRecord, Range<u
     None
 }
 
-/// Rows that are read as whole CSV before plain ones are looked for again.
+/// Rows that are read as whole CSV before plain ones are searched for again.
 const WHOLE: usize = 256;
 
 /// The rows of a table on their way into its columns.

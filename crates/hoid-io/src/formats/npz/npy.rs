@@ -190,7 +190,7 @@ fn header_of(bytes: &[u8]) -> Result<(Header, usize), NpyError> {
     let text = bytes
         .get(before..before + length)
         .ok_or_else(|| damaged("the array ends in its header"))?;
-    // Latin 1 before version 3; what hoid needs is ASCII in both, but for names.
+    // Latin 1 before version 3; what hoid needs is ASCII in both, except for names.
     let text = String::from_utf8_lossy(text);
     let header = header::parse(&text)
         .ok_or_else(|| NpyError::Damaged(format!("the header of an array reads {}", shown(&text))))?;

@@ -46,8 +46,8 @@ struct PageHeader {
     is_packed: bool,
 }
 
-/// Bytes that the pages of a column state to unpack to; `None` where a header is none, or a page in gzip is
-/// longer than it states. `column` holds the pages, and `values` are in all of them.
+/// Bytes that the pages of a column state to unpack to; `None` if a header is none, or a page in gzip is longer than it
+/// states. `column` holds the pages, and `values` are in all of them.
 pub(super) fn unpacked(column: &[u8], compression: Compression, values: u64) -> Option<u64> {
     let (mut rest, mut all, mut seen) = (column, 0_u64, 0_u64);
     while !rest.is_empty() && seen < values {
@@ -241,7 +241,7 @@ mod tests {
     fn pages_say_what_they_unpack_to_and_gzip_is_held_to_it() {
         let honest = page(800, 100, &zipped(&[0; 800]));
         assert_eq!(unpacked(&honest, GZIP(), 100), Some(800));
-        // Of two pages, the second after the last value is not looked at.
+        // For two pages, the second after the last value is not looked at.
         let two = [honest.clone(), vec![0xff; 40]].concat();
         assert_eq!(unpacked(&two, GZIP(), 100), Some(800));
         assert_eq!(unpacked(&two, GZIP(), 101), None);

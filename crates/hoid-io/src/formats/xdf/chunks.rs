@@ -25,7 +25,7 @@ pub(super) struct Stream {
     pub(super) samples: Samples,
     /// When the offset to the clock of the recorder was measured, and the offset, s.
     pub(super) offsets: Vec<(f64, f64)>,
-    /// None where the recorder has not closed the file, or its end is lost.
+    /// None if the recorder has not closed the file, or its end is lost.
     pub(super) footer: Option<Footer>,
     /// Why a footer that is there cannot be read.
     pub(super) unread_footer: Option<String>,

@@ -133,7 +133,7 @@ fn median(values: &[f64]) -> f64 {
     }
 }
 
-/// First and last of `count` where there are breaks after some.
+/// First and last of `count` if there are breaks after some.
 fn parts(breaks: impl Iterator<Item = usize>, count: usize) -> Vec<(usize, usize)> {
     let mut parts = Vec::new();
     let mut first = 0;
@@ -145,7 +145,7 @@ fn parts(breaks: impl Iterator<Item = usize>, count: usize) -> Vec<(usize, usize
     parts
 }
 
-/// The line `b_0 + b_1 c` through offsets under Huber's loss; none where they carry no information.
+/// The line `b_0 + b_1 c` through offsets under Huber's loss; none if they carry no information.
 fn line(offsets: &[(f64, f64)]) -> (f64, f64) {
     if let [(_, offset)] = offsets {
         return (*offset, 0.0);

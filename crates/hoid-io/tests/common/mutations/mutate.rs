@@ -159,7 +159,7 @@ fn place(length: usize, draw: &mut Draw) -> usize {
     }
 }
 
-/// A part of so many bytes, short mostly.
+/// A part of a given number of bytes, short mostly.
 fn part(length: usize, draw: &mut Draw) -> (usize, usize) {
     let at = place(length, draw).min(length);
     let most = if draw.below(4) == 0 { length } else { 64 };

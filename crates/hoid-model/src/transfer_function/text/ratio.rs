@@ -39,7 +39,7 @@ impl Ratio {
         }
     }
 
-    /// `self + sign other`; none where their delays differ.
+    /// `self + sign other`; none if their delays differ.
     pub fn plus(&self, other: &Self, sign: f64) -> Option<Self> {
         if self.delay_s != other.delay_s {
             return None;

@@ -18,7 +18,7 @@ pub use evidence::Evidence;
 use super::{condition_settings::ConditionSettings, manifest::Manifest};
 use crate::StudyError;
 
-/// Completes a manifest by what its files state: the first run of each condition is looked at.
+/// Completes a manifest by what its files state: the first run of each condition is examined.
 ///
 /// # Errors
 /// [`StudyError::Io`] where the first file cannot be read at all; what cannot be found is reported

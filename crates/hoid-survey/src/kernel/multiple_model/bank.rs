@@ -106,7 +106,7 @@ impl<const M: usize> Bank<M> {
         Some(bank)
     }
 
-    /// The update by a sample: output and signals after the whitening filter, `None` where they are
+    /// The update by a sample: output and signals after the whitening filter, `None` if they are
     /// not known. Returns the innovation.
     pub fn update(&mut self, sample: Option<(f64, DelayedSignals<'_>)>, point: [f64; 2]) -> f64 {
         let innovation = self.update_hypotheses(sample, point);

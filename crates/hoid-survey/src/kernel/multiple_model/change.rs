@@ -6,8 +6,8 @@
 //! instead of maximised, so that its expectation does not grow with the number of times that are tried. A change is
 //! declared when Lambda is over the threshold and the likeliest of the recent hypotheses is old enough to report what
 //! changed. The next is declared only after Lambda has been below zero, when the new values have become the established
-//! ones, or when more turns out to have changed: the neuromuscular system, by the same odds of such hypotheses against
-//! all others, or the delay, by three standard errors.
+//! ones, or when more proves to have changed: the neuromuscular system, by the same odds of such hypotheses against all
+//! others, or the delay, by three standard errors.
 //!
 //! The likeliest of the recent hypotheses assumes since when, and what held before: the change of each quantity over
 //! its standard error reports in what the operator changed. For the innovation variance that is `ln(s2/s1)/sqrt(2/n)`
@@ -86,7 +86,7 @@ const DELAY_THRESHOLD: f64 = 3.0;
 const REGULARISATION: f64 = 1e-12;
 
 impl ChangeDetector {
-    /// The update by the hypotheses after a sample. True where Lambda rises above zero: a change
+    /// The update by the hypotheses after a sample. True if Lambda rises above zero: a change
     /// starts.
     pub fn update(&mut self, hypotheses: &[Option<Hypothesis>], now: u64, prior: &ChangePrior) -> bool {
         let sums = Sums::over(hypotheses, now, prior);
@@ -143,7 +143,7 @@ impl ChangeDetector {
 struct Sums<'a> {
     recent: f64,
     older: f64,
-    /// Of the recent ones in which omega_nm and zeta_nm changed too.
+    /// For the recent ones in which omega_nm and zeta_nm changed too.
     neuromuscular: f64,
     likeliest: Option<&'a Hypothesis>,
 }

@@ -14,7 +14,7 @@ pub struct DelayedSignals<'a> {
 }
 
 impl<'a> DelayedSignals<'a> {
-    /// Of a delay that is known.
+    /// For a delay that is known.
     pub fn known(signals: &'a Signals) -> Self {
         Self {
             ring: std::slice::from_ref(signals),

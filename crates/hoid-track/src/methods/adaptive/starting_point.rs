@@ -6,9 +6,9 @@
 //!
 //! `theta = argmin sum_k |(sum_i theta_i h_i(w_k) - Y(w_k))/Y(w_k)|^2`,
 //!
-//! and the derivatives of the state s = (theta, level, corrections) along x follow from the same
-//! problem for dY/dx, but for those that are corrections: `S = J C J'`. Of the forms with a lag, and
-//! of a gain with a lead, the nearest is the operator itself.
+//! and the derivatives of the state s = (theta, level, corrections) along x follow from the same problem for dY/dx,
+//! except for those that are corrections: `S = J C J'`. For the forms with a lag, and of a gain with a lead, the
+//! nearest is the operator itself.
 //!
 //! The remnant of the fit is `v = (C/D) eps` with the impulse response g, whose autocovariances over
 //! the variance of eps are `r_k = sum_j g_j g_{j+k}`.
@@ -182,7 +182,7 @@ fn symmetric(c: &[[f64; STATES]; STATES]) -> [[f64; STATES]; STATES] {
     std::array::from_fn(|i| std::array::from_fn(|j| 0.5 * (c[i][j] + c[j][i])))
 }
 
-/// Autocovariances of `C/D` over the variance of eps; `None` where it does not die out.
+/// Autocovariances of `C/D` over the variance of eps; `None` if it does not die out.
 fn remnant(fit: &FittedOperator, sample_time: SampleTime) -> Option<Lags> {
     let (c, d) = &fit.noise;
     let longest = (LONGEST_S / sample_time.s()) as usize;
@@ -209,15 +209,15 @@ fn remnant(fit: &FittedOperator, sample_time: SampleTime) -> Option<Lags> {
 
 /// The problem of the nearest gains.
 struct Nearest {
-    /// Of the operator, held.
+    /// For the operator, held.
     responses: Vec<hoid_model::operator_family::FamilyResponse>,
-    /// Of the basis, over the operator's.
+    /// For the basis, over the operator's.
     basis: Vec<[Complex64; GAINS]>,
 }
 
 impl Nearest {
-    /// By how much the covariance of the state is to be larger, so that the response is nowhere better known than by
-    /// the fit: gains of one lag cannot report how a lag that is not known goes with the frequency.
+    /// Amount by which the covariance of the state is to be larger, so that the response is nowhere better known than
+    /// by the fit: gains of one lag cannot report how a lag that is not known goes with the frequency.
     fn lost(&self, fit: &FittedOperator, coordinates: &[Coordinate], columns: &[[f64; STATES]]) -> f64 {
         let p = coordinates.len();
         let sizes = |g: &[Complex64]| -> [f64; 2] {

@@ -16,7 +16,7 @@ use super::bases::Truth;
 pub const WRONG: f64 = 4.0;
 /// How near a report must be to its fault, s.
 pub const NEAR_S: f64 = 1.0;
-/// When a trace is looked at once more, s after the fault.
+/// When a trace is examined once more, s after the fault.
 pub const LATER_S: f64 = 20.0;
 const NEAR_ERRORS: f64 = 2.5;
 const NEAR_SHARE: f64 = 0.1;

@@ -65,7 +65,7 @@ pub enum What {
     Duplicated,
     /// u later by some samples from here on.
     Late,
-    /// A record of so many samples.
+    /// A record of a given number of samples.
     Short,
     /// Another person from two thirds of the record on.
     SecondOperator,

@@ -9,7 +9,7 @@ use hoid::model::Record;
 pub struct Table {
     /// Time between two samples, s.
     pub h: f64,
-    /// Time as the file has it, s but for a fault of its unit.
+    /// Time as the file has it, s except for a fault of its unit.
     pub t: Vec<f64>,
     pub e: Vec<f64>,
     pub u: Vec<f64>,
@@ -45,7 +45,8 @@ impl Table {
         [&mut self.e, &mut self.u].into_iter().chain(self.d.as_mut())
     }
 
-    /// Counts the time again, as a recorder does that knows nothing of rows that are gone or twice.
+    /// Counts the time again, as a recorder does that has no information about rows that are gone
+    /// or twice.
     pub fn renumber(&mut self) {
         let (n, h) = (self.e.len(), self.h);
         self.t = (0..n).map(|k| k as f64 * h).collect();

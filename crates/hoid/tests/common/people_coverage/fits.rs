@@ -58,7 +58,7 @@ pub struct Quantity {
 }
 
 impl Quantity {
-    /// Whether the interval holds the truth; `None` where there is no interval.
+    /// Whether the interval holds the truth; `None` if there is no interval.
     pub fn holds(&self) -> Option<bool> {
         self.interval.map(|(low, high)| low <= self.truth && self.truth <= high)
     }
@@ -92,7 +92,7 @@ pub struct Outcome {
 /// The fits of one person.
 ///
 /// # Errors
-/// Those of the simulation.
+/// The entries of the simulation.
 pub fn outcomes(seed: u64, number: u64, variants: &[Variant]) -> Result<Vec<Outcome>, SimError> {
     let (cell, person, records) = recorded(seed, number)?;
     let true_form = person.state.operator.form();

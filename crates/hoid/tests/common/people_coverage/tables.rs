@@ -27,7 +27,7 @@ pub struct Share {
 }
 
 impl Share {
-    /// Of these answers.
+    /// For these answers.
     pub fn over(answers: impl IntoIterator<Item = bool>) -> Self {
         answers.into_iter().fold(Self::default(), |share, yes| Self {
             of: share.of + usize::from(yes),

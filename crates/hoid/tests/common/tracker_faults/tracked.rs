@@ -93,12 +93,12 @@ pub struct Effect {
     /// one second after it on, in the standard errors of that.
     pub shift: f64,
     /// Time after the fault from which on the distance is at most twice the larger standard error;
-    /// none where that is never so.
+    /// none if that is never so.
     pub recovery_s: Option<f64>,
     pub held: u64,
     pub skipped: u64,
     pub restarts: u64,
-    /// True where the guard told of something within the fault or the time after it.
+    /// True if the guard told of something within the fault or the time after it.
     pub told: bool,
 }
 
