@@ -44,6 +44,6 @@ def test_the_digits_are_those_of_track(place: Place, tools: Tools, run: Run, tra
         pytest.skip(str(reason))
     off = told.compared(traces[place.options]).off
     assert set(off) <= set(place.other_functions) and all(by <= place.off for by in off.values())
-    # A row each sample, and not only what is not known yet.
+    # A row each sample, and not only unknown quantities yet.
     assert len(told.rows) == len(run.e) or told.at is not None
     assert len(told.rows) >= 3 and not np.isnan(told.rows[-1]).any()

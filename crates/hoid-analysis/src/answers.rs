@@ -2,9 +2,9 @@
 //!
 //! What speaks against the data or against the fit speaks against all answers. In addition, an answer can be open by
 //! itself: a parameter that the data do not determine, a crossover whose interval holds zero. The level of the whole is
-//! that of the answers that were asked for: a result whose delay is open is trustworthy in what it reports about the
-//! crossover, and not determined for who asks for the delay. By default it is that of the response, and a loop that is
-//! open is a doubt.
+//! that of the answers that were asked for: a result whose delay is open is trustworthy in its report on the crossover,
+//! and not determined for a request for the delay. By default it is that of the response, and a loop that is open is a
+//! doubt.
 
 use hoid_ident::{Fit, GreyBoxFit, SigmoidFit, diagnostics::is_open, family::FamilyFit};
 use hoid_model::{ContinuousTransferFunction, Finding, Verdict, operator_family::PARAMETERS, uncertainty::Estimate};

@@ -1,4 +1,4 @@
-//! From recordings to a result of any batch estimator: what is done, in its order, and what is found.
+//! From recordings to a result of any batch estimator: what is done, in its order, and the findings.
 
 use std::fmt;
 

@@ -1,4 +1,4 @@
-//! How files are read, as a value that goes with what was read.
+//! How files are read, as a value that goes with the read data.
 
 use std::path::PathBuf;
 

@@ -1,5 +1,5 @@
-//! `hoid fmu`: what goes into a unit, and what is refused. That it runs in a simulator is tested with
-//! the Python package.
+//! `hoid fmu`: what goes into a unit, and the refused input. That it runs in a simulator is tested with the Python
+//! package.
 #![allow(clippy::unwrap_used)]
 
 mod common;

@@ -1,4 +1,4 @@
-//! Contents of a file, and what is reported where it or the command line is not as it should be.
+//! Contents of a file, and the report where it or the command line is not as it should be.
 #![allow(clippy::unwrap_used)]
 
 mod common;

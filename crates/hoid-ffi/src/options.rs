@@ -67,9 +67,7 @@ impl TrackerRequest {
         }
         set(&mut method, options, self.fit.as_deref())?;
         if method.smooths() {
-            return Err(Failure::option(
-                "smooth: what is still to come cannot carry any information about a stream; drop it",
-            ));
+            return Err(Failure::option("smooth: a stream has no future samples; drop it"));
         }
 
         let asked = TrackRequest {

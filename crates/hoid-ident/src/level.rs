@@ -12,7 +12,7 @@
 //!
 //! `c = eps'z / z'z`, z the residuals of u = 1 at e = 0.
 //!
-//! Its variance is `sigma^2 |H(1)|^2/n`, H = C/(A D) the noise model, and what is not known of G(1),
+//! Its variance is `sigma^2 |H(1)|^2/n`, H = C/(A D) the noise model, and the uncertainty of G(1),
 //! `mean(e)^2 var G(1)`.
 
 use hoid_model::{

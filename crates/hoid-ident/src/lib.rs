@@ -62,7 +62,7 @@
 //! | [`SigmoidChange`] | gains that follow a sigmoid, with the time and the rate of the change |
 //! | [`faults`] | faults of recorded data, found and repaired before a fit |
 //! | [`frequency`] | describing function, coherence, remnant spectrum and margins by Fourier coefficients |
-//! | [`judgement`] | what speaks for and against a fit: [`Fit::verdict`] |
+//! | [`diagnostics`] | what speaks for and against a fit: [`Fit::verdict`] |
 //! | [`progress`] | how far a fit is, for the caller that waits |
 //! | [`linalg`] | sums of products, least squares by QR, the inverse of an information matrix |
 //!

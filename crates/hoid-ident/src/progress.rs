@@ -50,7 +50,8 @@ pub(crate) fn step(what: &'static str, done: usize, total: usize) {
     }
 }
 
-/// Counts what is done on many threads for who watches this one: each call is one more of `total`.
+/// Counts what is done on many threads for callers that watches this one: each call is one more of
+/// `total`.
 pub fn counter(what: &'static str, total: usize) -> impl Fn() + Send + Sync {
     let watcher = WATCHER.with_borrow(Clone::clone);
     let done = AtomicUsize::new(0);

@@ -1,5 +1,5 @@
 //! An operator of the family whose numerator changes once: recovery without noise, errors over
-//! simulated runs, and what is reported where there is nothing to see.
+//! simulated runs, and the report where there is nothing to see.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 use std::collections::BTreeMap;

@@ -6,9 +6,9 @@
 //! ([`hoid_analysis::identify`]). For a form without a lag, or one whose interval reaches a pure integration, T_I is
 //! not determined, and no number is reported.
 //!
-//! A form with a lag is chosen at intervals for who has none, a short lag next to a longer lead: for 13 of 60 runs of
-//! C1 and 2 of 20 of C2, 30 and 80 s long, with T_I up to 6.3 standard errors from zero. A lag of 1 s that is there is
-//! 25 of them from zero and more. So a lag counts from ten on.
+//! A form with a lag is chosen at intervals for callers that has none, a short lag next to a longer lead: for 13 of 60
+//! runs of C1 and 2 of 20 of C2, 30 and 80 s long, with T_I up to 6.3 standard errors from zero. A lag of 1 s that is
+//! there is 25 of them from zero and more. So a lag counts from ten on.
 
 use std::{
     sync::mpsc::{Receiver, Sender, channel},

@@ -1,4 +1,4 @@
-//! A session without a page: batches as a page sends them, what becomes of them, and what is found
+//! A session without a page: batches as a page sends them, what becomes of them, and the findings
 //! when something of them is changed.
 #![allow(clippy::unwrap_used)]
 

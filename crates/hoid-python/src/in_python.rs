@@ -72,7 +72,7 @@ pub fn in_python(message: &str) -> String {
     text
 }
 
-/// The value that follows an option, and what comes after it.
+/// The value that follows an option, and anything after it.
 fn value_behind(rest: &str) -> Option<(&str, &str)> {
     let word = rest.strip_prefix(' ')?;
     let end = word.find([' ', ';', ')']).unwrap_or(word.len());

@@ -125,7 +125,7 @@ impl PyTracker {
         let plan = asked.plan(tracked)?;
         if plan.options().method.smooths() {
             return Err(bad_option(
-                "smooth belongs to pyhoid.track: what is still to come cannot carry any information about a stream",
+                "smooth belongs to pyhoid.track: a stream has no future samples",
             ));
         }
         if !(1..=LONGEST_WARM_UP).contains(&warm_up) {

@@ -66,7 +66,7 @@ impl<'a> EstimateRows<'a> {
         self.vafs.clear();
     }
 
-    /// What was simulated and what is estimated.
+    /// The simulated and the estimated quantities.
     pub fn begin(&mut self, estimator: &EstimatorCell, replication: u64) {
         let (cell, rows) = (self.cell, &mut self.fits);
         let scenario = cell.resolved.scenario();

@@ -2,7 +2,7 @@
 //!
 //! - Quantiles interpolate linearly between order statistics (type 7 of Hyndman and Fan, *The
 //!   American Statistician* 50, 1996; the default of NumPy and R).
-//! - Whiskers reach to the last value within 1.5 interquartile ranges of the box; what lies beyond
+//! - Whiskers reach to the last value within 1.5 interquartile ranges of the box; anything beyond
 //!   is an outlier (Tukey, 1977).
 //! - Monte Carlo errors: `s / sqrt(n)` of the mean; `sqrt((m4 - s^4 (n-3)/(n-1)) / n) / (2 s)` of
 //!   the standard deviation, with the fourth central moment m4 (Rao, *Linear Statistical

@@ -1,4 +1,4 @@
-//! The true values of what is estimated.
+//! The true values of the estimated quantities.
 
 use hoid_analysis::ResolvedRequest;
 use hoid_model::{

@@ -50,7 +50,7 @@ fn manifest(directory: &Path) -> Manifest {
     assert_eq!((manifest.runs.len(), others.len()), (8, 1));
     manifest.analysis.delay_s = (0.25, 0.32);
     manifest.analysis.form = "lead".to_owned();
-    // What was written is what is read.
+    // The data read are the data written.
     assert_eq!(Manifest::parse(&manifest.text(), "group.toml").unwrap(), manifest);
     manifest
 }
@@ -283,7 +283,7 @@ fn a_bad_file_is_a_row_and_a_bad_manifest_an_error() {
     );
 }
 
-/// Runs of two people who change at the seam are joined, and what is found in the frequency domain
+/// Runs of two people who change at the seam are joined, and the findings in the frequency domain
 /// is the simulated scenario.
 #[test]
 fn joined_runs_settle_and_fits_agree_with_the_describing_function() {

@@ -242,6 +242,6 @@ fn virtual_people_have_their_truth_beside_them() {
         let directory = directory.path().join("bad");
         let refused = simulate_people(&bad, &directory, &|| ());
         assert!(matches!(refused, Err(StudyError::Virtual { .. })));
-        assert!(!directory.exists(), "nothing is written of what is refused");
+        assert!(!directory.exists(), "nothing is written of the refused input");
     }
 }

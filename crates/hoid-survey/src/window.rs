@@ -61,7 +61,7 @@ impl RecursiveMethod for WindowOptions {
         }
     }
 
-    /// Not used: the window is what it remembers.
+    /// Not used: the window is its memory.
     fn default_memory(&self, parameter: &str) -> Memory {
         short_for_b(parameter)
     }

@@ -49,7 +49,7 @@ impl Change {
         1.0 / (1.0 + (-self.odds).exp())
     }
 
-    /// Names of what changed by more than two standard errors: `K_e`, `K_e_dot`, `omega_nm`, `zeta_nm`, `remnant`,
+    /// Names of the change by more than two standard errors: `K_e`, `K_e_dot`, `omega_nm`, `zeta_nm`, `remnant`,
     /// `tau_e`. Where the operator as a whole was found to have changed, and no single quantity of theirs did by so
     /// much, `response` represents them.
     pub fn changed(&self) -> Vec<&'static str> {

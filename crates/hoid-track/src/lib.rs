@@ -33,7 +33,7 @@
 //! | `request`, `plan` | [`TrackRequest`]: what is asked for; [`TrackPlan`]: orders that are still open, searched on the start span |
 //! | `setup`, `start`, `start_noise`, `gain` | what a recursion is built of: structure, start, way of forgetting |
 //! | `kernel`, `recursion` | RLS and RPEM of the real-time kernel; what every recursion does |
-//! | `predictor`, `past`, `reported` | signals and reports for methods that are not of the kernel |
+//! | `predictor`, `history`, `reported` | signals and reports for methods that are not of the kernel |
 //! | `response` | [`Response`]: gain and phase of an estimate at a frequency |
 //! | `open_loop` | [`OpenLoop`]: crossover and phase margin of an estimate with the controlled element |
 //! | `tracker`, `outcome`, `saved` | [`Tracker`]: one sample at a time; a tracker as numbers, to go on elsewhere |
@@ -43,7 +43,7 @@
 //! | `idle` | what was recorded before a run started |
 //! | `over_record`, `two_sided` | [`track()`]: a record; the two-sided estimate of a recorded run |
 //! | `trace`, `columns`, `summary`, `as_text` | [`Trace`]: the estimate at every sample, as columns and as text |
-//! | `judgement` | what a trace, and the estimate of a moment, is worth: [`Trace::verdict`] |
+//! | `diagnostics` | what a trace, and the estimate of a moment, is worth: [`Trace::verdict`] |
 //! | `determined` | which parameters the data determine |
 //! | `delay_bank` | a delay in whole samples, followed next to any recursion |
 //! | `validation` | what a trace explains of another run; the covariance at the start that this chooses |

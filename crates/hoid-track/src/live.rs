@@ -83,8 +83,8 @@ impl Live {
         Ok(Self::Tracking(Box::new(tracker)))
     }
 
-    /// Takes a sample; NaN represents what is faulty or missing. The fit of the warm-up is made
-    /// when its last sample comes, with the options that `choose` gives for it.
+    /// Takes a sample; NaN represents faulty values or missing. The fit of the warm-up is made when
+    /// its last sample comes, with the options that `choose` gives for it.
     pub fn update(&mut self, sample: Sample, choose: Choose<'_>) -> LiveOutcome {
         let warm_up = match self {
             Self::Tracking(tracker) => {

@@ -113,7 +113,7 @@ impl TrackRequest {
         let structure = self.structure();
         let ranges = ranges_of(&self.method, structure, &orders, &names, sample_time)?;
         let combinations = ranges.combinations()?;
-        // The largest of each order: what is not known there is not known at all.
+        // The largest of each order: a quantity that is not known there is not known at all.
         let largest = combinations[combinations.len() - 1];
         let start = match &self.start {
             RequestedStart::Default => StartAt::Span(None),

@@ -70,7 +70,7 @@ mod tests {
             .unwrap();
         let noise = StartNoise::of(&fit, &span, 4).unwrap();
         assert_eq!((noise.d.len(), noise.covariance.len()), (4, 16));
-        // The batch twin: the normal equations hold for the residuals of D on what is left.
+        // The batch twin: the normal equations hold for the residuals of D on the residual.
         let w = fit.simulate(&span).unwrap();
         let v: Vec<f64> = span.output()[w.first..]
             .iter()

@@ -1,5 +1,5 @@
 //! The grey box on simulated runs: bias, spread against the Cramér-Rao bound, coverage, choice of
-//! m, delays between samples, constraints, several records, and what is refused.
+//! m, delays between samples, constraints, several records, and the refused input.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 use hoid::{

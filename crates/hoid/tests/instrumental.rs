@@ -1,6 +1,6 @@
 //! Instrumental variables: open loop against the truth and the prediction error method, the closed
 //! loops of the reference task and a faster one in which the input is strongly correlated with the
-//! noise, and what is refused.
+//! noise, and the refused input.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 use hoid::{

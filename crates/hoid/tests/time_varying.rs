@@ -1,5 +1,5 @@
 //! The fit of an operator who changes once: recovery without noise, bias, spread and coverage over
-//! simulated runs, and what is reported when nothing changes.
+//! simulated runs, and the report when nothing changes.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 use std::collections::BTreeMap;

@@ -413,7 +413,7 @@ def trace(
 
 
 def _mark_changes(ax: Axes, traces: Iterable[Trace], *, words: bool) -> None:
-    """A dashed line where a change was declared, with what changed."""
+    """A dashed line where a change was declared, with the change."""
     for change in (change for one in traces for change in one.changes):
         ax.axvline(change["t"], color="#444444", linestyle=(0, (6, 3)), linewidth=0.9)
         if words:

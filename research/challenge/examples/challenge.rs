@@ -1,7 +1,7 @@
 //! The challenge (`hoid_challenge`): methods of tracking in cases that can refute them.
 //!
 //! `cargo xtask slow challenge [--cases NAME,...] [--methods NAME,...] [--seeds open|sealed] [--runs N] [--part I/N] [--out DIRECTORY] [--page FILE --measured TEXT] [--list]`:
-//! 4 runs of every case, all contestants, the open seeds, and lines of JSON in `challenge-results/` by default. What is
+//! 4 runs of every case, all entrants, the open seeds, and lines of JSON in `challenge-results/` by default. What is
 //! there is not computed again. A case is named by its name, its start (`none-`) or its theme. `--page` writes the page
 //! of the book; `--list` reports the cases alone.
 #![allow(clippy::print_stdout, clippy::print_stderr)]

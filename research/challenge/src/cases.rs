@@ -300,7 +300,7 @@ fn delays() -> Vec<Case> {
     vec![
         Case {
             delay: DelayKnown::Fraction,
-            ..default("delay-half", "half a sample next to what is reported")
+            ..default("delay-half", "half a sample next to the report")
         },
         Case {
             rate_hz: 60.0,

@@ -98,7 +98,7 @@ pub struct Alarm {
     pub of_remnant: bool,
 }
 
-/// What a contestant answers.
+/// What an entrant answers.
 #[derive(Debug, Clone, Default)]
 pub struct EntrantResult {
     /// The report at each time that was asked for.

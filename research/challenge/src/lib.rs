@@ -17,7 +17,7 @@
 //! | `simulate` | [`simulate()`]: the loop of a case |
 //! | `entrant`, `entrants` | [`Entrant`]: one who takes part; the methods, and plain ones |
 //! | `oracle` | what could be known |
-//! | `measure` | [`Line`]: what a contestant was worth in a run |
+//! | `measure` | [`Line`]: what an entrant was worth in a run |
 //! | `run` | [`challenge()`]: all of it, kept on disk |
 //! | `people` | [`challenge_people`]: the same on recorded people |
 //! | `tables`, `page` | [`tables()`], [`page()`] |

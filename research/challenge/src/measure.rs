@@ -1,4 +1,4 @@
-//! Reliability of an answer: the line of a contestant in a run.
+//! Reliability of an answer: the line of an entrant in a run.
 //!
 //! The response is asked for at seven lines from .5 to 6 rad/s, at +2, +4, +8, +13, +18 and +28 s after each change,
 //! once before the first, and every 10 s without a change. The error is the mean of `|dH|/|H|` over the lines; who
@@ -39,14 +39,14 @@ pub const FOUND_S: [f64; 2] = [5.0, 8.0];
 /// The name of the batch fit that knows the changes.
 pub const BATCH: &str = "batch (oracle)";
 
-/// A contestant in a run.
+/// An entrant in a run.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Line {
     /// The case.
     pub case: String,
     /// Its number in the seeds.
     pub run: u64,
-    /// The contestant.
+    /// The entrant.
     pub method: String,
     /// Why it could not follow.
     pub failed: Option<String>,
@@ -172,7 +172,7 @@ impl Posed {
         })
     }
 
-    /// The line of a contestant.
+    /// The line of an entrant.
     pub fn line(&self, entrant: &dyn Entrant) -> Line {
         let mut line = self.measured(entrant.name(), entrant.follow(&self.task));
         if !self.case.changes_at_once() {
@@ -312,7 +312,7 @@ fn of_response(said: &ReportedResponse, truths: &[Complex64]) -> (f64, [usize; 2
     (error, covered)
 }
 
-/// What is asked in a run, for tests of contestants.
+/// What is asked in a run, for tests of entrants.
 #[cfg(test)]
 pub(super) fn posed_task(case: &Case, of: RunOf) -> Task {
     Posed::new(case, of).unwrap_or_else(|e| panic!("{e}")).task

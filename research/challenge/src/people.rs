@@ -19,7 +19,7 @@ use super::{
     draw::Portion,
     entrant::{Entrant, Seam, Task},
     measure::{ChangeOutcome, Line, asked, scored},
-    run::{chosen_contestants, kept, refused},
+    run::{chosen_entrants, kept, refused},
 };
 use crate::ChallengeError;
 
@@ -48,7 +48,7 @@ pub struct PeopleOptions {
     pub runs: usize,
     /// Kinds: `fo-so`, `so-fo`, `fo-fo`, `so-so`, `fo`, `so`; none for all.
     pub kinds: Vec<String>,
-    /// Names of contestants; none for all.
+    /// Names of entrants; none for all.
     pub methods: Vec<String>,
     /// Part of the runs.
     pub portion: Portion,
@@ -71,7 +71,7 @@ type Cells = BTreeMap<(String, String), Vec<Trial>>;
 /// [`ChallengeError`] for recordings that cannot be read, names that are none, files.
 pub fn challenge_people(options: &PeopleOptions, each: &(dyn Fn(&str) + Sync)) -> Result<Vec<Line>, ChallengeError> {
     let cells = read_all(&options.recordings)?;
-    let (entrants, _) = chosen_contestants(&options.methods)?;
+    let (entrants, _) = chosen_entrants(&options.methods)?;
     let mut all = Vec::new();
     for (person, plant) in cells.keys() {
         let count = cells[&(person.clone(), plant.clone())].len();

@@ -1,8 +1,8 @@
 //! Runs of the challenge, on all threads, kept on disk.
 //!
-//! Each run of a case is a file, a line of JSON for each contestant. It is written next to and
+//! Each run of a case is a file, a line of JSON for each entrant. It is written next to and
 //! renamed; what is there is not computed again, so that a challenge can be stopped, go on, take in
-//! another contestant, or be done in parts on several machines. Nothing depends on the number of
+//! another entrant, or be done in parts on several machines. Nothing depends on the number of
 //! threads.
 
 use std::path::{Path, PathBuf};
@@ -30,22 +30,22 @@ pub struct ChallengeOptions {
     pub runs: u64,
     /// Names of cases, their starts (`none-`), or themes; none for all.
     pub cases: Vec<String>,
-    /// Names of contestants; none for all. `batch` is the batch fit that knows the changes.
+    /// Names of entrants; none for all. `batch` is the batch fit that knows the changes.
     pub methods: Vec<String>,
     /// Part of the runs.
     pub portion: Portion,
 }
 
-/// The contestants of these names, all where there are none, and whether the batch fit is among them.
+/// The entrants of these names, all where there are none, and whether the batch fit is among them.
 ///
 /// # Errors
 /// [`ChallengeError::Refused`] for a name that is none.
-pub(super) fn chosen_contestants(names: &[String]) -> Result<(Vec<Box<dyn Entrant>>, bool), ChallengeError> {
+pub(super) fn chosen_entrants(names: &[String]) -> Result<(Vec<Box<dyn Entrant>>, bool), ChallengeError> {
     let mut all = entrants();
     let known: Vec<String> = all.iter().map(|c| c.name()).chain(["batch".to_owned()]).collect();
     if let Some(unknown) = names.iter().find(|name| !known.contains(name)) {
         return Err(refused(format!(
-            "no contestant is called {unknown}; there is {}",
+            "no entrant is called {unknown}; there is {}",
             known.join(", ")
         )));
     }
@@ -80,13 +80,13 @@ pub(super) fn refused(reason: String) -> ChallengeError {
 }
 
 /// Runs what is not there yet; the lines of all that was chosen, in the order of cases, runs and
-/// contestants. `each` is called after every run.
+/// entrants. `each` is called after every run.
 ///
 /// # Errors
 /// [`ChallengeError`] for names that are none, files, and cases that no person can stabilise.
 pub fn challenge(options: &ChallengeOptions, each: &(dyn Fn(&str) + Sync)) -> Result<Vec<Line>, ChallengeError> {
     let cases = chosen_cases(&options.cases)?;
-    let (entrants, batch) = chosen_contestants(&options.methods)?;
+    let (entrants, batch) = chosen_entrants(&options.methods)?;
     let all: Vec<(&Case, u64)> = (cases.iter())
         .flat_map(|case| (0..options.runs).map(move |number| (case, number)))
         .collect();
@@ -116,7 +116,7 @@ pub fn challenge(options: &ChallengeOptions, each: &(dyn Fn(&str) + Sync)) -> Re
     Ok(lines.concat())
 }
 
-/// Gives the line of a contestant, or of the batch fit.
+/// Gives the line of an entrant, or of the batch fit.
 pub(super) type LineOf = Box<dyn Fn(Option<&dyn Entrant>) -> Line>;
 
 /// The lines of a run: those of the file, and those that are not there computed and added.
@@ -141,7 +141,7 @@ pub(super) fn kept(
         let line_of = pose()?;
         lines.extend(missing.into_iter().map(|(_, entrant)| line_of(*entrant)));
         write(&path, folder, &lines)?;
-        // As they will be read: the last digit of a number may differ from what was written.
+        // As they will be read: the last digit of a number may differ from the written data.
         lines = read(&path)?;
     }
     let of = |(name, _): &(String, _)| lines.iter().find(|line| line.method == *name).cloned();
@@ -219,8 +219,8 @@ mod tests {
             refused.contains("nothing") && refused.contains("none-lag-1"),
             "{refused}"
         );
-        assert!(chosen_contestants(&["oracle".to_owned()]).is_err());
-        let (all, batch) = chosen_contestants(&[]).unwrap();
+        assert!(chosen_entrants(&["oracle".to_owned()]).is_err());
+        let (all, batch) = chosen_entrants(&[]).unwrap();
         assert!(batch && all.iter().any(|c| c.name() == "chow"));
     }
 }

@@ -164,7 +164,7 @@ fn of_person(case: &Case, run: RunOf, operator: Operator, sample_time: SampleTim
         Blemish::IdleStart(s) => s,
         _ => f64::NEG_INFINITY,
     };
-    // One sample more, for what lies between two.
+    // One sample more, for anything between two.
     let mut excitation = lines.samples(time(0), sample_time, total + 1);
     for (k, value) in excitation.iter_mut().enumerate() {
         if time(k) < idle_s {

@@ -161,7 +161,7 @@ pub fn tables(lines: &[Line]) -> String {
     text
 }
 
-/// Each contestant in a row.
+/// Each entrant in a row.
 fn overview(lines: &[Line], methods: &[&str], cases: &[&str]) -> String {
     let mut text = "\n### In a row each\n\nError of H from 8 s after a change on or without a change: median and largest of the cases. Coverage of its bands in percent. Alarms an hour in runs without a change, those of the remnant alone after the plus sign. Changes found of those that the oracle finds with certainty, within 5 and 8 s.\n\n".to_owned();
     head(

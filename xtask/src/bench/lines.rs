@@ -52,7 +52,7 @@ impl Line {
     }
 }
 
-/// The lines among what was printed; libraries print much else.
+/// The lines among the printed data; libraries print much else.
 pub fn of(printed: &str) -> Vec<Line> {
     printed.lines().filter_map(Line::read).collect()
 }

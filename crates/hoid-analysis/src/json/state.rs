@@ -1,8 +1,8 @@
 //! Definition of a result, as text: so that it comes back as it was and predicts again.
 //!
 //! The numbers of the contract are for people and other programs; a model has more (covariances of what is not printed,
-//! states, what was held). All of it is written as TOML, which has what JSON lacks, infinite numbers and NaN, and is in
-//! JSON as one text; floats are written with as many digits as give back every bit. The first eight bytes of its
+//! states, fixed parameters). All of it is written as TOML, which has what JSON lacks, infinite numbers and NaN, and is
+//! in JSON as one text; floats are written with as many digits as give back every bit. The first eight bytes of its
 //! SHA-256 are before it: a file that was cut or changed by hand is refused. They guard against damage, not against a
 //! person who means to deceive.
 

@@ -2,7 +2,7 @@
 
 use hoid_io::{control_among, error_among};
 
-/// Names of what is followed.
+/// Names of the tracked signals.
 const TARGETS: [&str; 7] = ["r", "ref", "reference", "target", "track", "setpoint", "f_t"];
 /// Names of what is steered.
 const OUTPUTS: [&str; 7] = ["y", "output", "position", "state", "cursor", "response", "x"];

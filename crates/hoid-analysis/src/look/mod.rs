@@ -7,7 +7,7 @@
 //!
 //! | file | what it finds |
 //! |---|---|
-//! | `known` | what is known already |
+//! | `options` | what is known already |
 //! | `columns` | error and control by the names that people give them |
 //! | `periods` | the excitation, its period and lines, and the longest span of whole periods |
 //! | `lag` | by how many samples the control was recorded later than the output of the controlled element |

@@ -82,7 +82,7 @@ pub fn other_columns(error: &IoError, path: &Path, options: &ReadOptions) -> Opt
     };
     let found = survey(path).ok()?;
     let names = names(&found);
-    // Only the common names represent what is not known; another name was meant as it was typed.
+    // Only the common names represent unknown quantities; another name was meant as it was typed.
     let of = |column: &ColumnExpression, default: &str| {
         let found = column.is_among(&names).then(|| column.to_string());
         (found.is_some() || column.to_string() == default).then_some(found)

@@ -69,7 +69,7 @@ pub struct PrepareArgs {
     /// all channels alike
     #[arg(long, value_name = "HZ", conflicts_with = "decimate")]
     pub new_fs: Option<f64>,
-    /// Drop the first seconds of what is read
+    /// Drop the first seconds of the data read
     #[arg(long, value_name = "S")]
     pub run_in: Option<f64>,
 }

@@ -21,7 +21,7 @@
 //! | `residuals` | how far residuals are from white; also for the family |
 //! | `constancy` | whether parameters change; also for the family |
 //! | `residual_response` | whether a response is left that a model does not have |
-//! | `answer` | whether e answers to u, as it does in a loop |
+//! | `loop_response` | whether e answers to u, as it does in a loop |
 //! | `no_response` | whether u responds to e at all |
 //! | `operator` | gains, poles and delay of an operator |
 //! | `operator_step` | what a stretch of data shows against an operator |

@@ -1,4 +1,4 @@
-//! Second fits to the records with something taken out, and what they report about the first.
+//! Second fits to the records with something taken out, and their report on the first.
 //!
 //! | without | where the fit differs, this carries it | finding |
 //! |---|---|---|

@@ -26,7 +26,7 @@ pub struct FormFigures {
     pub chi_squared: Option<f64>,
     /// Its degrees of freedom.
     pub degrees_of_freedom: Option<usize>,
-    /// True when the prediction error search converged off the border of what is searched for.
+    /// True when the prediction error search converged off the border of the search range.
     pub converged: bool,
 }
 

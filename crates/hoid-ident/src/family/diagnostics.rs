@@ -136,7 +136,7 @@ fn unsettled(weighed: &[WeighedForm]) -> Option<Finding> {
     ))
 }
 
-/// True if it rests at the end of what is searched for: it has no error of its own.
+/// True if it rests at the end of the search range: it has no error of its own.
 fn at_bound(parameter: &Parameter) -> bool {
     parameter.standard_error.is_none()
 }
@@ -191,7 +191,7 @@ fn determined(judged: &DiagnosticInputs<'_>, all: &mut Vec<Finding>) {
             true => "tau_e is determined by the prior alone".to_owned(),
             false => "tau_e is not determined".to_owned(),
         };
-        // As with other parameters: it has no digits, and what is reported next to it stands.
+        // As with other parameters: it has no digits, and the report next to it stands.
         all.push(Finding::note("delay", words));
     }
     if let Some((t_i, (low, high))) = find("T_I").and_then(|t| Some((t, t.interval?)))

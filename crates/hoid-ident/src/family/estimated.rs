@@ -60,8 +60,8 @@ impl Errors {
     }
 }
 
-/// Intervals by profile likelihood of the elements whose interval reaches the end of what is
-/// searched for: there the criterion is not a parabola.
+/// Intervals by profile likelihood of the elements whose interval reaches the end of the search
+/// range: there the criterion is not a parabola.
 fn profiles(
     fit: &PredictionFit<'_>,
     covariances: Option<&Covariances>,

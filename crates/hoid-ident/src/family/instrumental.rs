@@ -10,7 +10,7 @@
 //! with xi the part of e that follows the excitation ([`crate::iv`]), D the autoregression of what Y leaves of u, and
 //! the second term the prior. Z and D belong to an auxiliary operator; for given Z and D, Newton's step is
 //! `(Z' Psi + P)^-1 g`, `Psi = D dY/dx e`, halved until `g' (Z'Z + P)^-1 g` falls; a coordinate that it drives out of
-//! what is searched for goes to its bound.
+//! the search range goes to its bound.
 //!
 //! **The auxiliary operator** is that of the fit at the lines, and where its instruments lead to no zero that of the
 //! prediction error fit, or the middle of both. RIV-BJ as it is usually written takes the last estimate: where the

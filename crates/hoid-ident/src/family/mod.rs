@@ -50,7 +50,7 @@
 //! | `open_loop` | crossover and phase margin |
 //! | `loop_shape` | every crossing, and whether the closed loop is stable |
 //! | `of_polynomials`, `pole_reading` | polynomials back to an operator; which pole is what |
-//! | `judgement` | what makes a result doubtful |
+//! | `diagnostics` | what makes a result doubtful |
 
 mod agreement;
 mod arx_response;

@@ -6,7 +6,7 @@
 //! and carried over; one that reaches `1/T_I = 0` is open above in T_I and in K.
 //!
 //! **Determined** is what the data show: less than half of the variance before the data is left of
-//! it ([`Parameter::prior_share`]), it does not rest at a bound of what is searched for, and its
+//! it ([`Parameter::prior_share`]), it does not rest at a bound of the search range, and its
 //! interval excludes zero; for omega_nm and zeta_nm, whose prior has a scale, that it is known
 //! within a factor of two.
 
@@ -20,7 +20,7 @@ use super::mixture::{Component, Mixture, widened};
 
 /// Weight of the forms that have a parameter, below which it is not determined.
 const LEAST_WEIGHT: f64 = 0.5;
-/// Largest part of the prior's variance in what is determined.
+/// Largest part of the prior's variance in the determined parameters.
 const LARGEST_PRIOR_SHARE: f64 = 0.5;
 /// Largest standard error of a logarithm that is determined.
 const LARGEST_LOG_ERROR: f64 = 0.35;
@@ -225,7 +225,7 @@ impl CoordinateEstimate<'_> {
         let interval = self.interval(i);
         match coordinate {
             Coordinate::LagRate => {
-                // Zero up to the bound of what is searched for is a pure integration.
+                // Zero up to the bound of the search range is a pure integration.
                 let end = |rate: f64| {
                     if rate <= self.limits[i].0 {
                         f64::INFINITY

@@ -16,7 +16,7 @@ const DOUBLINGS: usize = 8;
 /// The profile need not be known better than the interval.
 const SEARCH: (usize, f64) = (15, 1e-7);
 
-/// The interval of one element of eta, within what is searched for; `None` if a search fails.
+/// The interval of one element of eta, within the search range; `None` if a search fails.
 pub(super) fn profile_interval(
     fit: &PredictionFit<'_>,
     place: usize,

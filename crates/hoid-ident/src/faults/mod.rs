@@ -14,7 +14,7 @@
 //! | `direction` | input and output exchanged, the wrong sign | lags at which each answers the other |
 //! | `resistant` | | a record that no single sample can carry, for a second opinion |
 //! | `slow` | | a record without drifts and steps of a sensor, for a second opinion |
-//! | `search`, `mending`, `limits` | | their order, and what becomes of the record |
+//! | `search`, `repairing`, `limits` | | their order, and the treatment of the record |
 //! | `autoregression`, `robust` | | fits and scales that faults cannot carry |
 //!
 //! Each channel is judged by itself, since its own neighbours know a sample better than any other channel does; only

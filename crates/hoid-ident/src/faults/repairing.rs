@@ -1,5 +1,4 @@
-//! Treatment of a record with faults: segments, the actions taken, and what it reports about a
-//! result.
+//! Treatment of a record with faults: segments, the actions taken, and its report on a result.
 
 use std::ops::Range;
 

@@ -1,8 +1,8 @@
-//! The order in which faults are searched for, and what becomes of each.
+//! The order in which faults are searched for, and the treatment of each.
 //!
-//! Wraps first, since a channel without them has no jumps; then what lasts: stretches in other units,
-//! idle and frozen ones. Between these, on what is left, spikes and steps: an autoregression of a
-//! record with an idle half is one of neither half.
+//! Wraps first, since a channel without them has no jumps; then what lasts: stretches in other units, idle and frozen
+//! ones. Between these, on the residual, spikes and steps: an autoregression of a record with an idle half is one of
+//! neither half.
 
 use std::ops::Range;
 

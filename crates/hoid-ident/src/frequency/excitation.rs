@@ -91,7 +91,7 @@ impl Excitation {
         let mut harmonics = Vec::with_capacity(omega_rad_s.len());
         for &omega in omega_rad_s {
             let n = omega * period_s / TAU;
-            // Also refuses what is not a number.
+            // Also refuses a value that is not a number.
             if !((n - n.round()).abs() <= ROUNDING && (0.5..1e9).contains(&n)) {
                 let nearest = n.round().max(1.0) * TAU / period_s;
                 return refuse(

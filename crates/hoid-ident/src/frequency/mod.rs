@@ -36,7 +36,7 @@
 //! | `remnant` | power off the lines: spectrum, share, noise ratio |
 //! | `open_loop` | crossover frequency and phase margin by interpolation, with their spread |
 //! | `description` | [`describe_runs()`]: all of it with every choice that the records decide, and its verdict |
-//! | `doubts` | what makes a describing function doubtful |
+//! | `diagnostics` | what makes a describing function doubtful |
 //! | `unwrapping` | [`unwrapped_deg()`]: phase without jumps |
 //! | `gain_lead_delay` | gain, lead and delay by weighted least squares |
 

@@ -38,7 +38,7 @@ pub struct OrderFigures {
 pub struct GreyBoxFit {
     pub(crate) layout: Layout,
     pub(crate) eta: Vec<f64>,
-    /// Covariance of eta by rows; zero for what was fixed or rests at a bound.
+    /// Covariance of eta by rows; zero for parameters that are fixed or at a bound.
     pub(crate) covariance: Option<Vec<f64>>,
     /// Elements of eta with a variance of their own.
     pub(crate) free: Vec<usize>,
@@ -71,7 +71,7 @@ impl GreyBoxFit {
             .collect()
     }
 
-    /// Covariance of [`GreyBoxFit::parameters`] by rows, zero for what was fixed or rests at a
+    /// Covariance of [`GreyBoxFit::parameters`] by rows, zero for parameters that are fixed or at a
     /// bound; `None` for an exact fit.
     pub fn covariance(&self) -> Option<&[f64]> {
         self.covariance.as_deref()

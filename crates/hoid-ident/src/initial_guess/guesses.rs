@@ -155,7 +155,7 @@ fn ranked_grid(
 }
 
 /// Theta and sum of squares for a given F: A and B by least squares, the noise model by
-/// autoregression of what is left, and A and B once more with that noise model. With A in the model
+/// autoregression of the residual, and A and B once more with that noise model. With A in the model
 /// that is repeated: A and the noise model depend on each other (generalised least squares; D. W.
 /// Clarke, *IFAC Symposium on Identification*, Prague 1967).
 fn complete(criterion: &Criterion<'_>, f: &[f64], workspace: &mut Workspace) -> Option<(Vec<f64>, f64)> {

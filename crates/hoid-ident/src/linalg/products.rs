@@ -88,7 +88,7 @@ impl<F: FourLanes> Tile<F> {
         self.sums = [s0, s1, s2, s3];
     }
 
-    /// The product of x with the k-th of ys over whole columns: the sums, and what lies after the
+    /// The product of x with the k-th of ys over whole columns: the sums, and anything after the
     /// last whole block.
     #[inline(always)]
     fn total<'a>(&self, k: usize, column: impl Fn(usize) -> &'a [f64]) -> f64 {

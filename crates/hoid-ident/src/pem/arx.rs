@@ -1,8 +1,7 @@
 //! ARX by linear least squares.
 //!
-//! `u(t) = phi(t)' theta + eps(t)` with `phi = [-u(t-1) .. -u(t-na), e(t-nk) .. e(t-nk-nb+1)]` (eq.
-//! 5.31), from the first sample at which phi lies inside the record (eq. 5.33) in each record, or
-//! with zeros for what lies before it.
+//! `u(t) = phi(t)' theta + eps(t)` with `phi = [-u(t-1) .. -u(t-na), e(t-nk) .. e(t-nk-nb+1)]` (eq. 5.31), from the
+//! first sample at which phi lies inside the record (eq. 5.33) in each record, or with zeros for anything before it.
 //!
 //! **How it is solved.** The columns are shifts of two signals, so that `Phi' Phi` costs a few passes over the record,
 //! a tenth of an orthogonal factorisation. A solution of the normal equations has an error of `cond(Phi' Phi) eps`; one

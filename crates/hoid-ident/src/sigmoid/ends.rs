@@ -29,7 +29,7 @@ pub struct NamedEstimate {
 pub struct ChangedOperator {
     /// The operator.
     pub operator: FamilyOperator,
-    /// Its parameters: those of the numerator, products of them, and what does not change.
+    /// Its parameters: those of the numerator, products of them, and the constant part.
     pub parameters: Vec<NamedEstimate>,
 }
 
@@ -117,7 +117,7 @@ impl ThetaEstimate<'_> {
         self.named(&operator, changes, of)
     }
 
-    /// The part of a gradient that belongs to what does not change.
+    /// The part of a gradient that belongs to the constant part.
     fn constant_part(&self, gradient: &[f64]) -> Vec<f64> {
         let mut whole = vec![0.0; self.theta.len()];
         for (place, slope) in self.layout.poles().into_iter().zip(&gradient[self.layout.varying..]) {
@@ -163,7 +163,7 @@ impl ThetaEstimate<'_> {
     }
 }
 
-/// No variance, no standard error: what was held has none.
+/// No variance, no standard error: fixed parameters has none.
 pub(super) fn estimate(value: f64, variance: f64) -> Estimate {
     if variance > 0.0 {
         Estimate::with_variance(value, variance)

@@ -167,7 +167,7 @@ impl SigmoidFit {
     }
 
     /// Covariance of the parameters in the order and the units of [`SigmoidFit::parameters`], by
-    /// rows; zero for what was held, `None` for an exact fit.
+    /// rows; zero for fixed parameters, `None` for an exact fit.
     pub fn covariance(&self) -> Option<Vec<f64>> {
         let p = self.theta.len();
         let scale: Vec<f64> = (0..p).map(|i| self.layout.typed_slope(i, self.theta[i])).collect();

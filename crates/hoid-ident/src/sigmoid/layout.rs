@@ -129,7 +129,7 @@ impl Layout {
     }
 
     /// Pieces of a sample within which the response is a smooth function of the delay: the direct
-    /// part has a kink in the middle ([`hoid_model::operator_family`], `hold`).
+    /// part has a kink in the middle ([`hoid_model::operator_family`], `zoh`).
     pub fn pieces(&self) -> usize {
         if self.has_direct_part() { 2 } else { 1 }
     }
@@ -216,7 +216,7 @@ impl Layout {
         }
     }
 
-    /// Derivative of what is reported along an element of theta.
+    /// Derivative of the report along an element of theta.
     pub fn typed_slope(&self, place: usize, value: f64) -> f64 {
         match place {
             _ if place == self.log_rate => value.exp(),

@@ -226,9 +226,9 @@ impl ChangeCriterion<'_> {
         })
     }
 
-    /// The level of u in one record at a minimum, and its variance for this variance of the
-    /// innovations and covariance of theta: `sigma^2/r^2` for given theta, with r the length of its
-    /// column q r off those of the states, and what is not known of theta, along `dc/dtheta = -q' psi/r`.
+    /// The level of u in one record at a minimum, and its variance for this variance of the innovations and covariance
+    /// of theta: `sigma^2/r^2` for given theta, with r the length of its column q r off those of the states, and the
+    /// uncertainty of theta, along `dc/dtheta = -q' psi/r`.
     pub fn level_of(&self, theta: &[f64], record: usize, variance: f64, covariance: &[f64]) -> Option<(f64, f64)> {
         let pass = self.pass(theta, record)?;
         let (value, length) = pass.level.filter(|(_, length)| *length > 0.0)?;

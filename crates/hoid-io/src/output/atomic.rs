@@ -77,7 +77,7 @@ impl WholeFile {
         }
     }
 
-    /// Writes through `write`, after what is there.
+    /// Writes through `write`, after the existing data.
     pub(crate) fn write<T>(&mut self, write: impl FnOnce(&mut dyn Write) -> io::Result<T>) -> Result<T, IoError> {
         write(&mut self.buffer).map_err(|source| IoError::Unwritable {
             file: self.name.clone(),

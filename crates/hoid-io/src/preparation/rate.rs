@@ -6,7 +6,7 @@
 //! **A new sampling frequency** is taken from the record by the windowed sinc of [`Kernel`]. Its pass band ends at 0.8
 //! of the lower one of the old and the new Nyquist frequency, where the ripple is below 1e-4 (0.001 dB). When the
 //! frequency falls, its stop band starts at the new Nyquist frequency: what would fold down is 80 dB below. The filter
-//! has linear phase, its delay is compensated, and it is the same for all channels, so that what is between e and u
+//! has linear phase, its delay is compensated, and it is the same for all channels, so that anything between e and u
 //! stays between them. New samples lie on the grid that starts with the first sample of the record; those whose filter
 //! would reach beyond the record are cut.
 //!

@@ -1,6 +1,6 @@
 //! Channels that were recorded late, put next to the others without losing an end of the span.
 //!
-//! A channel that is moved by d samples has no value for d rows at one end of what was read. A span
+//! A channel that is moved by d samples has no value for d rows at one end of the read data. A span
 //! of whole periods would lose its last period with them. Where the file reaches beyond the span,
 //! as much of it is read as the offsets need, channels are moved, and the span is cut out
 //! afterwards: it keeps its length. Where it does not, or where the rate changes (whose filters cut

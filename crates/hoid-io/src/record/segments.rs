@@ -2,7 +2,7 @@
 //! or are clipped, and each segment is a record.
 //!
 //! Nothing is invented, and each segment has initial states of its own in a fit. But what is left
-//! out is chosen by what was recorded: without the samples at a rail the largest answers are gone,
+//! out is chosen by the recorded data: without the samples at a rail the largest answers are gone,
 //! which biases what is left (the lead of C1 clipped at 1.5 standard deviations by 9 %, where the
 //! clipped record itself has its gain 12 % too small).
 

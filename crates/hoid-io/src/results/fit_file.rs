@@ -1,7 +1,7 @@
 //! A fit of a person as `hoid identify --json` prints it: read again as a prior or a start.
 //!
-//! The object has more than what is read here; keys that are not known are left alone, so that a file
-//! of a later version is read too.
+//! The object has more than the data read here; keys that are not known are left alone, so that a file of a later
+//! version is read too.
 
 use std::path::Path;
 

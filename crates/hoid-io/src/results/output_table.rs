@@ -7,7 +7,7 @@
 //! | text | quoted where that is needed | BYTE_ARRAY in UTF-8 |
 //! | comments | lines above the header, behind `# ` | lines under the key `hoid.comments` |
 //!
-//! Parquet gives back what was written. CSV keeps no types: a column is whole where each cell is, real where each cell
+//! Parquet gives back the written data. CSV keeps no types: a column is whole where each cell is, real where each cell
 //! is a number or empty, else text. What hoid writes comes back the same except for a column of text that looks like
 //! numbers, and one of no rows.
 

@@ -22,7 +22,7 @@
 //! | file | what it holds |
 //! |---|---|
 //! | `folder` | the names of files and folders |
-//! | `begun` | [`RunStart`]: what is known before a run; [`Ended`]: what is known after it |
+//! | `run_start` | [`RunStart`]: what is known before a run; [`Ended`]: what is known after it |
 //! | `log` | [`RunLog`]: what is appended |
 //! | `logged` | [`Logged`]: what was appended, read back |
 //! | `state` | [`Session`]: the session as a whole |

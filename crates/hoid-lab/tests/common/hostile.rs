@@ -58,7 +58,7 @@ const EXTREMES: [f64; 16] = [
     f64::NEG_INFINITY,
 ];
 
-/// The same, and what is not a number, as JSON has them.
+/// The same, and a value that is not a number, as JSON has them.
 fn extreme(draw: &mut Draw) -> Value {
     match draw.below(12) {
         0 => Value::Null,

@@ -15,7 +15,7 @@
 //! | `form` | [`Form`], [`Coordinate`] |
 //! | `operator` | [`FamilyOperator`]: one operator, its response, its named parameters |
 //! | `fitted` | [`FittedOperator`]: an operator as a fit left it |
-//! | `hold` | its exact discrete model for a held input, with the derivatives |
+//! | `zoh` | its exact discrete model for a held input, with the derivatives |
 //! | `interpolate` | the same for an error that is smooth between samples |
 //! | `matrices` | the matrix exponential |
 //! | `dual` | numbers with their derivatives |

@@ -19,12 +19,11 @@
 //! that stopped there already would leave a hole in the spectrum of the remnant, which no noise model
 //! of a low order has: the form of an operator is then refuted that is true.
 //!
-//! **Held inputs.** A model of this project holds e between two samples. One with `T = M Ts` delays
-//! by T/2 where the person saw what was held over Ts, and the delay that is found would be shorter by
-//! `(T - Ts)/2`: at 1000 Hz and M = 10 by 4.5 ms. So the value of e that is held over M old samples is
-//! taken in the middle of them, at `k M + (M - 1)/2`: `e'(k)` is ahead of `u'(k)` by `(T - Ts)/2`
-//! ([`Decimated::lead_s`]), and the delay is the same at both rates. A ratio u/e of samples has this
-//! lead as a phase, which [`Decimated::lead_s`] takes back.
+//! **Held inputs.** A model of this project holds e between two samples. One with `T = M Ts` delays by T/2 where the
+//! person saw the error held over Ts, and the delay that is found would be shorter by `(T - Ts)/2`: at 1000 Hz and M =
+//! 10 by 4.5 ms. So the value of e that is held over M old samples is taken in the middle of them, at
+//! `k M + (M - 1)/2`: `e'(k)` is ahead of `u'(k)` by `(T - Ts)/2` ([`Decimated::lead_s`]), and the delay is the same at
+//! both rates. A ratio u/e of samples has this lead as a phase, which [`Decimated::lead_s`] takes back.
 //!
 //! **When.** People respond below 10 rad/s and their muscles up to 20 rad/s; at 1000 Hz a neighbouring sample carries
 //! almost no new information, and the poles of every model lie within 2 % of 1. [`Decimation::Auto`] takes what is

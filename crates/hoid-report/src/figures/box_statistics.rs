@@ -1,7 +1,7 @@
 //! The numbers of a box plot.
 //!
 //! A box reaches from the first to the third quartile with a line at the median; whiskers end at
-//! the last value within 1.5 interquartile ranges of the box, and what lies beyond is a point
+//! the last value within 1.5 interquartile ranges of the box, and anything beyond is a point
 //! (Tukey, *Exploratory Data Analysis*, 1977).
 
 use hoid_numerics::statistics::{finite_sorted, quantile};

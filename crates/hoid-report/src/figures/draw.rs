@@ -11,7 +11,7 @@ use super::{
     style::{GREY, TEXT},
 };
 
-/// Outlines, whiskers, and the marks of what is missing.
+/// Outlines, whiskers, and the marks of missing values.
 pub const INK: &str = "#333333";
 /// Size of labels that would be too long.
 const SMALL: u32 = 10;

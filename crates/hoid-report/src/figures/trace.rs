@@ -47,8 +47,7 @@ pub struct TraceGrid {
     pub shaded_s: Vec<(f64, f64)>,
     /// Times with a dotted line, s.
     pub marks_s: Vec<f64>,
-    /// Changes that were declared: when, s, and what changed. Each has a dashed line, with its number
-    /// in the first panel.
+    /// Changes that were declared: when, s, and the change. Each has a dashed line, with its number in the first panel.
     pub changes: Vec<(f64, String)>,
     /// True when panels of a row have one ordinate, which is labelled once.
     pub shared_ordinates: bool,

@@ -74,7 +74,7 @@ fn truth_curve(record: &Record, values: Vec<f64>) -> TraceCurve {
     }
 }
 
-/// The name of what changed with its subscript.
+/// The name of the change with its subscript.
 fn in_legend(name: &str) -> &str {
     match name {
         "K_e_dot" => "K_\u{117}",

@@ -70,7 +70,7 @@ settings! {
         #[setting(bounds(Bounds::NonNegative))]
         pub state_noise: f64 = 0.1,
         /// Root mean square of e
-        #[setting(bounds(Bounds::NonNegative), default("that of the record; in a stream of what has come so far"))]
+        #[setting(bounds(Bounds::NonNegative), default("that of the record; in a stream of the data so far"))]
         pub error_size: Option<f64> = None,
         /// Order of the Padé approximation of the delay, 1 to 3; 0 for whole samples
         pub pade: usize = 0,

@@ -1,4 +1,4 @@
-//! A statement of the text and what it needs to be tested.
+//! A statement of the text and its requirements to be tested.
 
 use super::{evidence::Evidence, rules::Part};
 

@@ -10,7 +10,7 @@
 //! for x = e and x = u, all lines at once by least squares: over a whole period of the forcing
 //! function these are its Fourier coefficients, over less than one the lines are distinguished as
 //! far as their distances allow. `H(j omega_i) = U(j omega_i)/E(j omega_i)`, `X = a_i - j b_i`. The
-//! window reaches T/2 into what comes after t; at the ends of the record it is the first or last T.
+//! window reaches T/2 into anything after t; at the ends of the record it is the first or last T.
 
 use hoid_ident::{settings, settings::Bounds};
 use num_complex::Complex64;
@@ -63,7 +63,7 @@ impl Comparator for FourierCoefficients {
             name: NAME,
             help: "Fourier coefficients at the lines, in a window that moves",
             source: "van Paassen and Mulder 1998",
-            told: "the lines of the forcing function; half a window of what comes after",
+            told: "the lines of the forcing function; half a window of anything after",
         }
     }
 

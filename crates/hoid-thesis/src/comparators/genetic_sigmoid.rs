@@ -72,7 +72,7 @@ settings! {
     }
 }
 
-/// A member: its genes within 0 and 1, and what it costs.
+/// A member: its genes within 0 and 1, and its cost.
 #[derive(Debug, Clone, Copy)]
 struct Member {
     genes: [f64; N],

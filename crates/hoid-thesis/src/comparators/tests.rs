@@ -135,7 +135,7 @@ fn names_lead_to_comparators_and_all_say_where_they_are_from() {
 }
 
 /// All of them on one run with a small remnant: before the change and long after it the response is
-/// that of the operator within half of it, and what is not a number is reported to be none.
+/// that of the operator within half of it, and a value that is not a number is reported to be none.
 #[test]
 fn all_follow_a_run_of_the_text() {
     let run = Run::of(Condition::C4, 1, 0.01);

@@ -1,4 +1,4 @@
-//! Samples that are held back, and what becomes of them: taken again, or taken as they came.
+//! Samples that are held back, and the treatment of them: taken again, or taken as they came.
 
 use hoid_core::guard::profile::CHANNELS;
 

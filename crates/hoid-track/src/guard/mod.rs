@@ -32,7 +32,7 @@
 //!
 //! | file | what it holds |
 //! |---|---|
-//! | `holding` | samples that are held back, and what becomes of them |
+//! | `holding` | samples that are held back, and the treatment of them |
 //! | `pausing` | pauses, from their start to their end |
 //! | `blocks` | what is judged, learnt and kept once a second |
 //! | `prime` | the default, from the record of the start span |
@@ -96,7 +96,7 @@ pub(crate) struct Guarded {
     pub held: bool,
 }
 
-/// A sample as it came; NaN for what is not a number.
+/// A sample as it came; NaN for a value that is not a number.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 struct Raw {
     values: [f64; CHANNELS],

@@ -5,7 +5,7 @@
 //! at that of nk, .2 s where nothing is specified, and at half a sample more, for an error that is held.
 //!
 //! **What is known of the person** before the first sample is `prior`: the default, next to nothing, some parameters,
-//! or an earlier fit, whose estimate and covariance it starts with (`beginning`).
+//! or an earlier fit, whose estimate and covariance it starts with (`starting_point`).
 //!
 //! **What it reports.** The gain and lead that are nearest to the gains of the basis
 //! ([`AdaptiveFilter::operator`]). The polynomials are the hold of that, with the delay of nk.

@@ -256,7 +256,7 @@ impl Columns {
         }
     }
 
-    /// ", as --input err --output stick" for what is missing and there by another name.
+    /// ", as --input err --output stick" for missing values and there by another name.
     fn hint(&self, cells: &[&str], (no_input, no_output): (bool, bool)) -> String {
         let input = error_among(cells).filter(|_| no_input && self.with_input);
         let output = control_among(cells).filter(|_| no_output);

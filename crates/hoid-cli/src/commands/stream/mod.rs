@@ -55,8 +55,7 @@ pub fn run(args: &StreamArgs) -> Result<(), CliError> {
     let plan = plan_of(&asked, tracked)?;
     if plan.options().method.smooths() {
         return Err(CliError::Usage(
-            "--smooth belongs to hoid track: what is still to come cannot carry any information about a stream"
-                .to_owned(),
+            "--smooth belongs to hoid track: a stream has no future samples".to_owned(),
         ));
     }
     if args.warm_up.is_some() && plan.options().method.starts_itself() {

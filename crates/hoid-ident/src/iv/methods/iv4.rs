@@ -3,7 +3,7 @@
 //!
 //! 1. Least squares of `A u = B q^-nk e + v`.
 //! 2. Instruments simulated with that A and B; first IV estimate.
-//! 3. Autoregression `L v = eps` of what is left.
+//! 3. Autoregression `L v = eps` of the residual.
 //! 4. Instruments simulated with the second A and B; IV estimate of the equation filtered with L.
 //!
 //! Consistent whatever v is; of the smallest variance where L makes v white. In the closed-loop

@@ -6,7 +6,7 @@
 //! rounded by both (D. Lemire, *Software: Practice and Experience* 51 (2021) 1700-1727).
 //!
 //! A long text is taken in parts that end with a line, side by side. Each part reports how far it
-//! was plain; what is after the first that was not is left.
+//! was plain; anything after the first that was not is left.
 
 use std::ops::Range;
 use std::thread;

@@ -17,7 +17,7 @@ pub(super) struct Header {
 pub(super) enum Descr {
     /// Such as `<f8`.
     Plain(String),
-    /// The fields of a structured array, each with what is after its type, if anything does.
+    /// The fields of a structured array, each with anything after its type, if anything does.
     Fields(Vec<(String, Option<String>)>),
 }
 

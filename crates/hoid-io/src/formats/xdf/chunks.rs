@@ -150,7 +150,7 @@ fn empty(format: &str) -> Option<Samples> {
 }
 
 impl Stream {
-    /// What the footer states against what was read.
+    /// What the footer states against the read data.
     ///
     /// # Errors
     /// What is not there.
