@@ -1,18 +1,19 @@
 //! Other operators that predict u about as well.
 //!
-//! The covariance of an estimate is that about one top of the likelihood. Poles and delay have others, and what people
-//! do below 10 rad/s carries little information about which is right. So the operators at which the starts elsewhere
-//! have ended count too, each with the weight `w = exp(-deficit/TEMPERATURE_NATS) f^2`, where `deficit` is by how much
-//! its evidence was less and f the share of the current samples that there were then: the scatter about the estimate is
-//! `sum w d d'/(1 + sum w)`. The evidence is tempered, for it supposes that the model is right (P. Grunwald and T. van
-//! Ommen, *Bayesian Analysis* 12 (2017) 1069-1103); and what they left open, more samples have made narrower.
+//! The covariance of an estimate describes one mode of the likelihood. Poles and delay have several, and the response of
+//! people below 10 rad/s carries little information about the right one. The operators at which the trials from other
+//! starting points ended therefore widen the errors, each with the weight `w = exp(-deficit/TEMPERATURE_NATS) f^2`, where
+//! `deficit` is its evidence below that of the estimate, and f the share of the current samples that it was fitted to. The
+//! scatter about the estimate is `sum w d d'/(1 + sum w)`. The evidence is tempered, since it assumes that the model is
+//! right (P. Grunwald and T. van Ommen, *Bayesian Analysis* 12 (2017) 1069-1103); f removes results that later samples have
+//! overtaken.
 
 use super::sizes::{PARAMETERS, STARTS};
 
-/// Evidence by which another is worse when it counts for 1/e of the estimate, nats.
+/// Deficit of evidence at which an alternative has the weight 1/e, nats.
 const TEMPERATURE_NATS: f64 = 3.0;
 
-/// Where a start has ended.
+/// The result of a trial from another starting point.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Alternative {
     operator: [f64; PARAMETERS],
@@ -23,7 +24,7 @@ struct Alternative {
 
 crate::state!([] Alternative { operator, deficit, samples, known });
 
-/// The entries of all starts.
+/// The results of all starting points.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Alternatives {
     all: [Alternative; STARTS],
@@ -41,8 +42,7 @@ impl Alternatives {
         }; STARTS],
     };
 
-    /// Where a start has ended after so many samples, and by how much its evidence is less than that of the
-    /// estimate.
+    /// Stores the result of a starting point: its operator, its deficit of evidence, and the number of samples then.
     pub fn put(&mut self, start: usize, operator: [f64; PARAMETERS], deficit: f64, samples: u64) {
         if let Some(place) = self.all.get_mut(start) {
             *place = Alternative {
@@ -54,7 +54,7 @@ impl Alternatives {
         }
     }
 
-    /// Their scatter about an operator after so many samples, of which the last `window` are read again.
+    /// Their scatter about an operator, for a current number of samples of which the last `window` are replayed.
     pub fn scatter(&self, about: &[f64; PARAMETERS], samples: u64, window: u64) -> [[f64; PARAMETERS]; PARAMETERS] {
         let mut scatter = [[0.0; PARAMETERS]; PARAMETERS];
         let mut weights = 1.0;

@@ -1,9 +1,9 @@
-//! Default values for people, in seconds: where the recursion starts for a person of whom nothing is known.
+//! Defaults for people, in seconds: the prior of a person without an earlier fit.
 //!
-//! The default person (lag 3 s, neuromuscular system of 11 rad/s and .25, their form `(T_L s + 1)^2/(T_I s + 1)`) is
-//! what recorded people have been found to be. All other numbers were set on simulated people: those whose operator has
-//! a lag, whose delay is not a whole number of samples, and whose remnant is an autoregression with a level that may
-//! change, and those of the conditions C1 to C6, seed 9000; none on recorded people.
+//! The default operator (lag 3 s, neuromuscular system of 11 rad/s and .25, form `(T_L s + 1)^2/(T_I s + 1)`) is typical of
+//! recorded people. All other numbers were set on simulated people (whose operator has a lag, whose delay is not a whole
+//! number of samples, and whose remnant is an autoregression with a level that may change) and on the conditions C1 to C6,
+//! seed 9000; none on recorded people.
 
 use super::{
     basis::Point,
@@ -20,22 +20,21 @@ pub const LAG_S: f64 = 3.0;
 pub const OMEGA_RAD_S: f64 = 11.0;
 /// Its damping.
 pub const ZETA: f64 = 0.25;
-/// How far people are from that: shares of omega and zeta, and s for the delay, where that is not given
-/// and where it is.
+/// Prior standard deviations: relative for omega and zeta, in s for a delay that is not given.
 pub const SPREAD: [f64; DYNAMICS] = [0.3, 0.5, 0.1];
-/// See [`SPREAD`].
+/// Prior standard deviation of a given delay, s.
 pub const GIVEN_DELAY_S: f64 = 0.02;
 /// Order of the noise model.
 pub const ORDER: usize = 16;
-/// Limit of an innovation in standard deviations: of people with a dead zone the pulses are the response, so
-/// that it is far out.
+/// Limit of an innovation, in standard deviations. It is large because people with a dead zone act in pulses, which are
+/// their response and not outliers.
 pub const LIMIT: f64 = 8.0;
 /// Time after which the estimate starts, s.
 pub const HOLD_S: f64 = 1.0;
-/// Time that is replayed, s.
+/// Span of the replays, s.
 pub const REPLAYED_S: f64 = 100.0;
 
-/// How the operator changes.
+/// Prior of changes.
 const CHANGES: ChangePrior = ChangePrior {
     block: 0.32,
     between: 180.0,
@@ -54,8 +53,8 @@ const CHANGES: ChangePrior = ChangePrior {
 const NOISE_MEMORY_S: f64 = 100.0;
 /// Limit of an innovation in the detector, in standard deviations.
 const DETECTOR_LIMIT: f64 = 3.5;
-/// Where estimates start: delay, s more than that of the person; natural frequency, rad/s; damping. A delay
-/// that is given is kept.
+/// Starting points of the first estimate: delay, s more than that of the person; natural frequency, rad/s; damping. A
+/// given delay is kept.
 const STARTING_POINTS: [[f64; 3]; STARTS] = [
     [0.0, OMEGA_RAD_S, ZETA],
     [0.1, 11.0, 0.3],
@@ -66,39 +65,38 @@ const STARTING_POINTS: [[f64; 3]; STARTS] = [
     [0.0, 16.0, 0.25],
     [0.1, 16.0, 0.3],
 ];
-/// Shortest delay of them, s.
+/// Shortest delay of a starting point, s.
 const EARLIEST_S: f64 = 0.03;
-/// Seconds that are now, a short and a long present; seconds before, at least and at most; seconds after a change
-/// in which none is declared.
+/// Length of the short and of the long present, s; least and largest length of the past, s; time after a change in
+/// which no other is declared, s.
 const NOW_S: [f64; 2] = [4.0, 8.0];
 const BEFORE_S: [f64; 2] = [15.0, 40.0];
 const REFRACTORY_S: f64 = 8.0;
-/// What must have as log significance at one false alarm an hour, nats, and by how much it falls with each logarithm of
-/// the rate. By chance alone 7200 blocks an hour pass 8.9 nats once; people vary more. In 3.8 hours of three pilots
-/// without a change 12.5 and 11.0 nats were passed 2.6 and 3.9 times an hour.
+/// Threshold at one false alarm per hour, nats, and its decrease per logarithm of the rate. By chance alone 7200 blocks
+/// an hour pass 8.9 nats once; people vary more. In 3.8 hours of three pilots without a change 12.5 and 11.0 nats were
+/// passed 2.6 and 3.9 times an hour.
 const THRESHOLD: f64 = 12.5;
 const SLOPE: f64 = 2.2;
-/// Standard deviation of a change of the delay, s.
+/// Prior standard deviation of a change of the delay, s.
 const DELAY_CHANGE_S: f64 = 0.05;
 
-/// A person before the first sample.
+/// The operator before the first sample.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DefaultOperator {
-    /// Where the basis is made.
+    /// Point of the basis.
     pub point: Point,
-    /// How far the person may be from that: shares of omega and zeta, and s for the delay.
+    /// Prior standard deviations: relative for omega and zeta, in s for the delay.
     pub spread: [f64; DYNAMICS],
     /// Order of the noise model.
     pub order: usize,
-    /// Standard deviations beyond which an innovation moves the estimate no further.
+    /// Limit of an innovation, in standard deviations.
     pub limit: f64,
-    /// False alarms in an hour that are accepted.
+    /// Accepted false alarms per hour.
     pub false_alarms: f64,
 }
 
 impl DefaultOperator {
-    /// Someone with this delay, s, for an error that is straight between samples: one that is held comes half a sample
-    /// later.
+    /// Defaults with this delay, s, for an error that is linear between samples; a held error adds half a sample.
     pub fn with_delay(tau: f64) -> Self {
         Self {
             point: Point {
@@ -119,7 +117,7 @@ impl DefaultOperator {
         (THRESHOLD - SLOPE * libm::log(self.false_alarms)).max(1.0)
     }
 
-    /// What is supposed of them, at a sample time in s.
+    /// The prior for a sample time in s.
     pub fn prior(&self, sample_time: f64) -> AdaptivePrior {
         let blocks = |seconds: f64| libm::round(seconds / BLOCK_S) as usize;
         let given = self.spread[2] < SPREAD[2];

@@ -1,32 +1,30 @@
-//! Has the person changed? Now against before, over blocks of half a second (`blocks`).
+//! Has the operator changed? A Wald test of the last seconds against the time before, over blocks of half a second
+//! (`blocks`).
 //!
-//! Least squares over the last blocks and over those before, with gains, natural frequency, damping, delay and
-//! level free in both, give a difference d with the covariance C that the scores of the blocks show
-//! (`contrast`). Of gains, natural frequency, damping and delay, the level not,
+//! Least squares over the last blocks and over those before, with gains, natural frequency, damping, delay and level free
+//! in both, give a difference d with the covariance C of the scores (`contrast`). For gains, natural frequency, damping
+//! and delay, but not for the level,
 //!
 //! `T = d' C^-1 d`
 //!
-//! is a chi-square with `nu = 6` degrees of freedom where nothing changes. It is examined over a short and over a long
-//! present: small changes need more data than large ones. A second between present and past is left out: no one changes
-//! at the end of a block.
+//! is chi-square with `nu = 6` degrees of freedom without a change (G. C. Chow, *Econometrica* 28 (1960) 591-605). It is
+//! computed for a short and for a long present: small changes need more data than large ones. One second between past and
+//! present is left out, since a change need not be at the border of a block.
 //!
-//! Some people vary more than others, so T is divided by the root of the level c at which it has been so far, from the
-//! mean of log T, whose expectation for a chi-square is `ln 2 + psi(nu/2)`; c is at least one, and what is supposed of
-//! it counts for half a minute. T is then reported as what it has against chance, in nats: with
-//! `x = T/2 sqrt c`
+//! **Normalisation.** Operators vary to different degrees. T is therefore divided by the root of its level c without a
+//! change, from the mean of `ln T`, whose expectation for a chi-square is `ln 2 + psi(nu/2)`; c is at least one, and its
+//! prior counts as half a minute of blocks. The statistic is reported as its log significance in nats, with `x = T/2 sqrt c`
 //!
-//! `-ln P(chi^2 > 2x) = x - ln (1 + x + .. + x^(nu/2-1)/(nu/2-1)!)`.
+//! `-ln P(chi^2 > 2x) = x - ln (1 + x + .. + x^(nu/2-1)/(nu/2-1)!)`
 //!
-//! A change is declared where one of them is above the threshold. When it was, and what changed, is reported by the
-//! block that leaves least where all is free before it and after it (R. E. Quandt, *J. American Statistical
-//! Association* 53 (1958) 873-880).
+//! (M. Abramowitz and I. A. Stegun, 1964, eq. 6.3.3, 6.3.4, 26.4.5).
 //!
-//! The blocks are those of the current candidate (`last_blocks`), all after its noise model and in its basis: when
-//! another takes over, so do its blocks. From three seconds after a gap on, what is after it is held against what was
-//! before.
+//! **Declaration.** A change is declared if one of the statistics exceeds the threshold. Its time is the border of blocks
+//! with the least residual sum of squares when all parameters are free before and after it (R. E. Quandt, *J. American
+//! Statistical Association* 53 (1958) 873-880).
 //!
-//! Sources: G. C. Chow, *Econometrica* 28 (1960) 591-605; the mean of the logarithm and the tail: M. Abramowitz and I. A.
-//! Stegun, 1964, eq. 6.3.3, 6.3.4, 26.4.5.
+//! The blocks belong to the live candidate (`last_blocks`), with its noise model and basis. From three seconds
+//! after a gap on, the time after it is compared with the time before it.
 
 use super::{
     blocks::Block,
@@ -38,41 +36,41 @@ use super::{
 
 /// Expectation of the logarithm of a chi-square with one pair of degrees of freedom, `ln 2 - gamma`.
 const MEAN_LOG: f64 = 0.115_931_515_658_412_45;
-/// Gains and what is held.
+/// Number of parameters that are tested: gains and dynamics.
 const OPERATOR: usize = GAINS + DYNAMICS;
-/// Where they are among the states: all but the level.
+/// Their indices in the state: all except the level.
 const OPERATOR_STATES: [usize; OPERATOR] = [0, 1, 2, LINEAR, LINEAR + 1, LINEAR + 2];
 /// Pairs of degrees of freedom.
 const PAIRS: u32 = OPERATOR as u32 / 2;
-/// Blocks between before and now.
+/// Blocks between past and present.
 const GUARD_BLOCKS: usize = 2;
-/// Blocks after a gap from which they are held against those before it.
+/// Least number of blocks of a present after a gap.
 const LEAST_AFTER_GAP: usize = 4;
-/// Blocks that the supposed level of T, that of a chi-square, counts for.
+/// Number of blocks that the prior of the level, that of a chi-square, counts as.
 const PRIOR_BLOCKS: f64 = 60.0;
-/// Blocks that the level is a mean of at most.
+/// Largest number of blocks in the mean of the level.
 const LEVEL_MEMORY: f64 = 240.0;
-/// By so much a logarithm raises the level at most: a change is not a typical variation.
+/// Largest contribution of one logarithm to the level: a change must not count as variation.
 const LARGEST_LOG_STEP: f64 = 3.0;
 
-/// What the detector looks at.
+/// Settings of the detector.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Detection {
-    /// Blocks of the present: of a short and of a long one.
+    /// Number of blocks of the short and of the long present.
     pub recent: [usize; 2],
-    /// Least number of blocks before.
+    /// Least number of blocks of the past.
     pub least: usize,
-    /// Largest number of blocks before.
+    /// Largest number of blocks of the past.
     pub most: usize,
-    /// What a difference must have against chance, nats.
+    /// Log significance at which a change is declared, nats.
     pub threshold: f64,
-    /// Standard deviations that are supposed of what is held, in its units.
+    /// Prior standard deviations of the dynamics, in their units.
     pub dynamics: [f64; DYNAMICS],
-    /// Blocks after a change in which none is declared.
+    /// Number of blocks after a declared change in which no other is declared.
     pub refractory: u64,
 }
 
-/// A statistic in units of what it has been.
+/// A statistic and its level without a change.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Statistic {
     level: f64,
@@ -91,12 +89,13 @@ impl Statistic {
         }
     }
 
-    /// How many times larger than a chi-square it has been.
+    /// Ratio of the statistic to a chi-square so far, at least one.
     fn scale(&self) -> f64 {
         libm::exp(self.level - mean_log(PAIRS)).max(1.0)
     }
 
     fn take(&mut self, t: f64) {
+        // The test uses the level before this block, so that a change does not reduce its own significance.
         self.log_significance = log_significance(t / libm::sqrt(self.scale()), PAIRS);
         self.levels = (self.levels + 1.0).min(PRIOR_BLOCKS + LEVEL_MEMORY);
         let log = libm::log(t.max(0.05)).min(self.level + LARGEST_LOG_STEP);
@@ -120,11 +119,11 @@ fn log_significance(x: f64, pairs: u32) -> f64 {
     half - libm::log(sum)
 }
 
-/// What the blocks show.
+/// The detector.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Detector {
     settings: Detection,
-    /// Over the short and over the long present.
+    /// For the short and for the long present.
     statistics: [Statistic; 2],
     /// Blocks since the last change was declared.
     since: u64,
@@ -138,7 +137,7 @@ pub struct Detector {
 crate::state!([] Detector { statistics, since, declared, declared_contrast, innovation_variances, difference, ago });
 
 impl Detector {
-    /// Before the first block. `None` if there is no room for the blocks.
+    /// The detector before the first block. `None` if there is no room for the blocks.
     pub fn new(settings: Detection) -> Option<Self> {
         let [short, long] = settings.recent;
         let present = short > 0 && short <= long;
@@ -156,12 +155,12 @@ impl Detector {
         })
     }
 
-    /// Looks at blocks of which the last is new. `dynamics` is where what is held is now, about the basis of the
+    /// Tests blocks of which the last is new. `dynamics` are the current corrections, relative to the basis of the
     /// blocks.
     pub(super) fn test(&mut self, last: &LastBlocks, dynamics: [f64; DYNAMICS]) {
         self.declared = false;
         self.since += 1;
-        // What was before the last change is not a measure of what comes.
+        // Blocks before the last declared change belong to another operator and are not used.
         let known = last
             .all()
             .len()
@@ -181,7 +180,7 @@ impl Detector {
         }
     }
 
-    /// T of a present; `None` if there is too little to compare.
+    /// T for a present; `None` if there are too few blocks.
     fn wald_statistic(&self, blocks: &[Block], fresh: usize, dynamics: [f64; DYNAMICS], present: usize) -> Option<f64> {
         let Detection {
             recent, least, most, ..
@@ -197,10 +196,10 @@ impl Detector {
             .wald_statistic(OPERATOR_STATES)
     }
 
-    /// The change is supposed to be at the block that leaves least where all is free before it and after it. What
-    /// changed is reported in the metric of the noise model, whose covariance is raised by how much more the scores
-    /// show in the mean between the halves of what was before: that of the scores alone is too uncertain to distinguish
-    /// gains from a delay, and those after the change have the change in them.
+    /// Locates the change at the border of blocks with the least residual sum of squares. The difference is reported
+    /// with the covariance of the noise model times a dispersion: the mean ratio of the covariance of the scores to
+    /// that of the model between the halves of the past. The covariance of the scores alone is too uncertain to
+    /// distinguish gains from a delay, and scores of the present contain the change.
     fn locate_change(&mut self, blocks: &[Block], dynamics: [f64; DYNAMICS], recent: usize) {
         let mut best: Option<Contrast> = None;
         self.ago = recent.min(blocks.len().saturating_sub(1));
@@ -222,34 +221,33 @@ impl Detector {
         self.difference = Difference::of(&self.declared_contrast).unwrap_or_default();
     }
 
-    /// Gains, level and what is held, now against before.
+    /// The difference of all states between two spans.
     fn compare(&self, sides: [&[Block]; 2], shown: f64, dynamics: [f64; DYNAMICS]) -> Option<Contrast> {
         let deviations = self.settings.dynamics;
         Contrast::between(sides, shown, |sum| sum.with_prior(dynamics, deviations))
     }
 
-    /// How long ago the change that was declared last had been, when it was declared, s.
+    /// Time from the last declared change to its declaration, s.
     pub fn ago_s(&self) -> f64 {
         self.ago as f64 * BLOCK_S
     }
 
-    /// What the last block has against chance, nats: the most that one of them has; zero while there is too
-    /// little to compare.
+    /// Log significance at the last block, nats: the larger of both statistics; zero while there are too few blocks.
     pub fn log_significance(&self) -> f64 {
         self.statistics.iter().fold(0.0, |most, s| s.log_significance.max(most))
     }
 
-    /// How many times larger than a chi-square T has been without a change: the most of all.
+    /// Ratio of T to a chi-square without a change: the larger of both statistics.
     pub fn typical_level(&self) -> f64 {
         self.statistics.iter().fold(1.0, |most, s| s.scale().max(most))
     }
 
-    /// Before and after the change that was declared last.
+    /// The difference at the last declared change.
     pub fn contrast(&self) -> &Contrast {
         &self.declared_contrast
     }
 
-    /// Mean square of the innovations before and after it.
+    /// Mean square of the innovations before and after the last declared change.
     pub fn innovation_variances(&self) -> [f64; 2] {
         self.innovation_variances
     }
@@ -259,7 +257,7 @@ impl Detector {
         self.declared
     }
 
-    /// What changed at the change that was declared last.
+    /// Parameters that changed at the last declared change.
     pub fn difference(&self) -> &Difference {
         &self.difference
     }

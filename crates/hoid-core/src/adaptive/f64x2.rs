@@ -1,7 +1,7 @@
-//! Two numbers side by side.
+//! Two numbers for one vector register.
 //!
-//! Every processor with vector registers takes two at a time, where they are at a multiple of 16 bytes. What is done to
-//! one does not depend on what is next to it: the digits are those of one alone, on every machine.
+//! Every processor with vector registers operates on two f64 at a multiple of 16 bytes. The operations are those of scalar
+//! numbers: the digits are the same on every machine.
 
 use core::ops::{Add, AddAssign, Div, Mul, Sub, SubAssign};
 

@@ -1,8 +1,8 @@
-//! The recursion: a sample in, an estimate out.
+//! The recursion: one sample in, one estimate out.
 //!
-//! The current candidate ([`super::candidate`]) takes each sample as it comes; what it learns and what it only follows
-//! is decided here, and remembered for those who read the record again (`replay`). The detector looks at the blocks of
-//! the current candidate.
+//! The live candidate ([`super::candidate`]) processes each sample on arrival. This module decides which samples update
+//! the estimate and which only advance the filters, and stores the decision for the replays (`replay`). The detector
+//! tests the blocks of the live candidate.
 
 mod replay;
 
@@ -28,14 +28,14 @@ use crate::{
 
 /// Trust region of the corrections in a replay: shares of omega and zeta, and s.
 const NEAR: [f64; DYNAMICS] = [0.15, 0.3, 0.03];
-/// Time from which a replay learns nothing, s: its filters start at rest, and the person did not.
+/// Time that a replay skips at its start, s: its filters start at rest, the signals do not.
 const AT_REST_S: f64 = 2.0;
-/// Time from which nothing is learnt of signals that do not move, s.
+/// Time after which constant signals no longer update the estimate, s.
 const STILL_S: f64 = 0.1;
-/// Time after that until the filters have settled, s.
+/// Time after a constant span until the filters have settled, s.
 const SETTLING_S: f64 = 2.0;
 
-/// The recursion. E is the memory for past samples.
+/// The recursion. E is the memory of past samples.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AdaptiveFilter<E> {
     prior: AdaptivePrior,
@@ -45,7 +45,8 @@ pub struct AdaptiveFilter<E> {
     live: Candidate,
     started: bool,
     trial: Candidate,
-    /// 0: nothing is replayed; 1: the estimate; from 2 on: a start elsewhere.
+    /// 0: no replay; 1: a replay from the estimate; 2 and more: a replay from another starting
+    /// point.
     stage: u64,
     /// The next sample of the replay.
     at: u64,
@@ -54,16 +55,16 @@ pub struct AdaptiveFilter<E> {
     detector: Detector,
     history: History<E>,
     saturation: Saturation,
-    /// Sums of the squares of e, of u, and of u after the noise model that is supposed, which no estimate leaves more
-    /// of than that of no response at all.
+    /// Sums of the squares of e, of u, and of `D u` for the prior D: the last bounds the innovation variance from
+    /// above, since it is that of a response of zero.
     powers: [f64; 3],
     restarts: u64,
     age: u64,
-    /// Samples in which neither signal has moved.
+    /// Number of samples in which neither signal has changed.
     still: u64,
-    /// Samples since then.
+    /// Number of samples since then.
     settling: u64,
-    /// Samples that went into the filters alone.
+    /// Number of samples that only advanced the filters.
     passed: u64,
 }
 
@@ -94,8 +95,8 @@ impl<E: AsMut<[f64]>> State for AdaptiveFilter<E> {
 }
 
 impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
-    /// At rest. `memory` is for [`memory_needed`] numbers, or fewer for no replays, but never fewer than
-    /// [`least_memory`]. `None` for numbers that are not valid, or too little memory.
+    /// The recursion at rest. `memory` holds [`memory_needed`] numbers, or fewer for no replays, at least
+    /// [`least_memory`]. `None` for invalid numbers or too little memory.
     pub fn new(prior: AdaptivePrior, memory: E) -> Option<Self> {
         let ts = prior.sample_time;
         if !prior.is_sound() || prior.person.tau > LATEST_S || memory.as_ref().len() < least_memory(ts) {
@@ -145,7 +146,7 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         })
     }
 
-    /// Starts at once, at what is known of the person. `None` for numbers that are not valid.
+    /// Starts immediately at an earlier estimate of the person. `None` for invalid numbers.
     pub fn with_initial_estimate(mut self, known: &InitialEstimate) -> Option<Self> {
         if !known.is_sound() || !known.apply_to_noise(&mut self.prior_noise, self.prior.sample_time) {
             return None;
@@ -156,11 +157,12 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         Some(self)
     }
 
-    /// Scales by the data so far.
+    /// Scales of the signals from the data so far.
     fn scales(&self, dispersion: f64) -> NoiseScales {
         let [e, u, y] = self.powers;
         let samples = self.history.samples().max(1) as f64;
         let measured = NoiseScales {
+            // |Y| is about sqrt(power of u/power of e): the scale of the prior of the gains.
             unit: libm::sqrt(u / e),
             size: libm::sqrt(u / samples),
             innovations: match (self.started, &self.initial) {
@@ -181,7 +183,7 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         }
     }
 
-    /// One that starts at the oldest sample that a replay reads.
+    /// A candidate that starts at the oldest sample that a replay reads.
     fn candidate(&self, point: Point, d: &NoiseModel, dispersion: f64) -> Option<Candidate> {
         let (ts, changes) = (self.prior.sample_time, &self.prior.changes);
         let basis = Basis::new(point, ts)?;
@@ -200,6 +202,8 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
                 Mixture::at(changes, state, covariance, known.variance)
             }
             None => {
+                // With replays the basis moves between them, and each replay has a trust region about its point; without,
+                // the corrections carry the whole prior of people.
                 let dynamics = match self.replays_anything() {
                     true => trusted(point),
                     false => variances(&self.prior),
@@ -231,7 +235,8 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         self.saturation.remember(u);
         self.detector.pass_over();
         if let Some(end) = end {
-            // It was there a sample ago: so much was not known then, but the next replay knows it.
+            // The previous sample was at the limit as well, which is known only now. The next
+            // replay uses it.
             self.history.revise_previous(end);
             return self.pass(u, end);
         }
@@ -241,7 +246,7 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         self.powers[0] += e * e;
         self.powers[1] += u * u;
         if !self.started {
-            // Before that the whitening filter is not full.
+            // Before, the whitening filter does not have all its outputs.
             if self.history.samples() > self.prior.order as u64 {
                 let y = self.live.whitened(u).y;
                 self.powers[2] += y * y;
@@ -277,8 +282,8 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         }
     }
 
-    /// Nothing is learnt while neither signal moves: it would be that of a recording that stands, or of a
-    /// person who rests, and the innovation variance would vanish.
+    /// While neither signal changes there is no update: the recorder has stopped or the person rests, and the
+    /// innovation variance would go to zero.
     #[inline(always)]
     fn is_stationary(&mut self, u: f64) -> bool {
         let samples = self.history.samples();
@@ -290,7 +295,7 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         if !moved {
             self.still += 1;
         } else if seconds(self.still) > STILL_S && seconds(self.settling) < SETTLING_S {
-            // What went on meanwhile is not in the filters.
+            // The filters lack the signals of the constant span and need time to settle.
             self.settling += 1;
         } else {
             (self.still, self.settling) = (0, 0);
@@ -298,7 +303,7 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         seconds(self.still) > STILL_S
     }
 
-    /// A sample from which nothing is learnt.
+    /// A sample without update.
     fn pass(&mut self, u: f64, use_of_it: Use) -> Step {
         let innovation = self.live.innovation(&self.live.whitened(u));
         let through = through_filters(&self.saturation, use_of_it, u, u - innovation);
@@ -333,7 +338,7 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         self.pass(0.0, Use::Missing);
     }
 
-    /// The signals of a sample.
+    /// Advances the basis by a sample.
     #[inline(always)]
     fn respond(&mut self, e: f64) {
         self.history.push(e);
@@ -347,13 +352,13 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         self.live.remember(u);
     }
 
-    /// What the detector reports about the last blocks.
+    /// Step 12: tests the last blocks for a change.
     fn test_for_change(&mut self) {
         let dynamics = core::array::from_fn(|j| self.live.mixture.mean()[LINEAR + j]);
         self.detector.test(&self.live.blocks, dynamics);
     }
 
-    /// Starts again where a signal has overflowed.
+    /// Restarts after an overflow of a signal.
     fn restart(&mut self) {
         self.history.clear();
         self.detector.pass_over();
@@ -368,17 +373,17 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         }
     }
 
-    /// True from when on there is an estimate.
+    /// True once there is an estimate.
     pub fn has_started(&self) -> bool {
         self.started
     }
 
-    /// Samples that the estimate has learnt from.
+    /// Number of samples that have updated the estimate.
     pub fn samples(&self) -> u64 {
         self.age
     }
 
-    /// True if an earlier fit of the person is where the estimate started.
+    /// True if the estimate started at an earlier fit of the person.
     pub fn has_initial_estimate(&self) -> bool {
         self.initial.is_some()
     }
@@ -397,8 +402,8 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         &self.alternatives
     }
 
-    /// Samples of the record so far that reported something: while nothing arrives nothing grows
-    /// old.
+    /// Number of samples of the record that updated the estimate: samples without information do
+    /// not age old results.
     pub(super) fn read(&self) -> u64 {
         self.history.samples().saturating_sub(self.passed)
     }
@@ -407,12 +412,12 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         &self.live
     }
 
-    /// Where what is held is now, the corrections included: never outside of where the basis may be.
+    /// The current basis point with its corrections, limited to the range of the basis.
     pub fn dynamics(&self) -> Point {
         self.live.point()
     }
 
-    /// The response of each gain at a frequency in rad/s, for what is held now.
+    /// The response of each gain at a frequency in rad/s, at the current point.
     pub fn responses(&self, omega_rad_s: f64) -> [Complex; GAINS] {
         self.live.responses(omega_rad_s)
     }
@@ -448,7 +453,7 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         self.live.mixture.variance()
     }
 
-    /// How often a signal overflowed and the filters were brought to rest.
+    /// How often a signal overflowed and the filters were reset.
     pub fn restarts(&self) -> u64 {
         self.restarts
     }
@@ -466,7 +471,7 @@ fn remember(candidate: &mut Candidate, use_of_it: Use, u: f64) {
     }
 }
 
-/// The output that goes on in the filters.
+/// The output that enters the filters.
 fn through_filters(saturation: &Saturation, use_of_it: Use, u: f64, predicted: f64) -> f64 {
     match use_of_it {
         Use::Missing => predicted,
@@ -474,7 +479,7 @@ fn through_filters(saturation: &Saturation, use_of_it: Use, u: f64, predicted: f
     }
 }
 
-/// Variances of what is supposed of the corrections.
+/// Prior variances of the corrections.
 fn variances(prior: &AdaptivePrior) -> [f64; DYNAMICS] {
     let [omega, zeta, tau] = prior.spread;
     [omega * prior.person.omega, zeta * prior.person.zeta, tau].map(|s| s * s)
@@ -486,20 +491,20 @@ fn trusted(point: Point) -> [f64; DYNAMICS] {
     [omega * point.omega, zeta * point.zeta, tau].map(|s| s * s)
 }
 
-/// Errors that are kept for the longest delay, for a sample time in s.
+/// Number of past errors for the longest delay, for a sample time in s.
 pub fn errors_needed(sample_time: f64) -> usize {
     libm::ceil(LATEST_S / sample_time) as usize + 4
 }
 
-/// Numbers of memory without which nothing can be estimated, for a sample time in s.
+/// Least number of memory entries, for a sample time in s.
 pub fn least_memory(sample_time: f64) -> usize {
     3 * errors_needed(sample_time)
 }
 
-/// Samples that are replayed at most.
+/// Largest number of samples of a replay.
 const MOST_REPLAYED: f64 = 12_000.0;
 
-/// Numbers of memory for replays of a given number of seconds, for a sample time in s.
+/// Number of memory entries for replays over `seconds`, for a sample time in s.
 pub fn memory_needed(sample_time: f64, seconds: f64) -> usize {
     let samples = (seconds / sample_time).clamp(0.0, MOST_REPLAYED);
     3 * (2 * errors_needed(sample_time) + libm::ceil(samples) as usize)

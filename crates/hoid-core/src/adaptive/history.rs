@@ -1,26 +1,26 @@
 //! The last samples of the record, in memory of the caller.
 //!
-//! Errors, outputs, and what becomes of each sample, in three rings of the same length.
+//! Errors, outputs, and the use of each sample, in three rings of the same length.
 
 use crate::state::State;
 
-/// Their order.
+/// Indices of the rings.
 const ERRORS: usize = 0;
 const OUTPUTS: usize = 1;
 const USES: usize = 2;
 
-/// What becomes of a sample.
+/// Use of a sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Use {
-    /// The estimate learns from it.
+    /// The sample updates the estimate.
     Update,
-    /// It passes through the filters.
+    /// The sample only advances the filters.
     FilterOnly,
-    /// Its output is missing: the prediction takes its place.
+    /// The output is missing: its prediction enters the filters.
     Missing,
-    /// The stick is at its upper end: the output is at least as large.
+    /// The stick is at its upper limit: the intended output is at least as large.
     AtUpperLimit,
-    /// The stick is at its lower end.
+    /// The stick is at its lower limit.
     AtLowerLimit,
 }
 
@@ -62,17 +62,17 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> History<E> {
         Self { memory, samples: 0 }
     }
 
-    /// Samples that there is room for.
+    /// Capacity, in samples.
     pub fn room(&self) -> usize {
         self.memory.as_ref().len() / 3
     }
 
-    /// Samples so far.
+    /// Number of samples so far.
     pub fn samples(&self) -> u64 {
         self.samples
     }
 
-    /// The place of a sample in one of the rings.
+    /// Index of a sample in one of the rings.
     #[inline(always)]
     fn place(&self, ring: usize, sample: u64) -> Option<usize> {
         let room = self.room();
@@ -92,14 +92,14 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> History<E> {
             .map_or(0.0, |place| self.memory.as_ref()[place])
     }
 
-    /// Takes the error of a sample; [`History::complete`] takes the rest.
+    /// Stores the error of a sample; [`History::complete`] stores the rest.
     #[inline(always)]
     pub fn push(&mut self, error: f64) {
         self.put(ERRORS, self.samples, error);
         self.samples += 1;
     }
 
-    /// The output of the newest sample, and what becomes of it.
+    /// Stores the output of the newest sample, and its use.
     #[inline(always)]
     pub fn complete(&mut self, output: f64, use_of_it: Use) {
         let newest = self.samples.saturating_sub(1);
@@ -107,7 +107,7 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> History<E> {
         self.put(USES, newest, use_of_it.number());
     }
 
-    /// Reports something else of the sample before the newest, from which had been learnt.
+    /// Changes the use of the sample before the newest, which had updated the estimate.
     pub fn revise_previous(&mut self, use_of_it: Use) {
         if let Some(previous) = self.samples.checked_sub(2)
             && self.output(previous).1 == Use::Update
@@ -116,19 +116,19 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> History<E> {
         }
     }
 
-    /// The error so many samples before a sample; zero before the record.
+    /// The error `age` samples before a sample; zero before the record.
     #[inline(always)]
     pub fn error(&self, sample: u64, age: usize) -> f64 {
         sample.checked_sub(age as u64).map_or(0.0, |at| self.get(ERRORS, at))
     }
 
-    /// The output of a sample, and what becomes of it.
+    /// The output of a sample, and its use.
     #[inline(always)]
     pub fn output(&self, sample: u64) -> (f64, Use) {
         (self.get(OUTPUTS, sample), Use::of(self.get(USES, sample)))
     }
 
-    /// Forgets all.
+    /// Removes all samples.
     pub fn clear(&mut self) {
         self.memory.as_mut().fill(0.0);
         self.samples = 0;

@@ -1,15 +1,15 @@
-//! What an earlier fit of the person left: the recursion starts there, with its covariance.
+//! An initial estimate from an earlier fit of the person: the recursion starts at it, with its covariance.
 //!
-//! Gains and corrections start at the estimate of the fit with its covariance, and are followed from the
-//! first sample on. The noise model starts with the products that a span with the remnant of the fit would
-//! have left, so that the first seconds do not have to find it.
+//! Gains and corrections start at the fitted values with their covariance and are updated from the first sample on. The
+//! noise model starts with the products of a span with the remnant of the fit, so that it need not be found in the first
+//! seconds.
 
 use super::{
     noise::{Lags, NoiseModel},
     sizes::{GAINS, STATES},
 };
 
-/// An estimate that is there before the first sample.
+/// An estimate before the first sample.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct InitialEstimate {
     /// Gains, level, and corrections of the basis.
@@ -18,15 +18,15 @@ pub struct InitialEstimate {
     pub covariance: [[f64; STATES]; STATES],
     /// Variance of eps.
     pub variance: f64,
-    /// |Y| at the reference.
+    /// |Y| at the reference frequency.
     pub unit: f64,
-    /// Remnant of the fit, where there is one: its autocovariances over the variance of eps, from lag
-    /// zero on, and the seconds that they count for.
+    /// Remnant of the fit, if there is one: its autocovariances relative to the variance of eps, from lag zero on, and
+    /// the time that they count as, s.
     pub remnant: Option<(Lags, f64)>,
 }
 
 impl InitialEstimate {
-    /// True for numbers that are valid.
+    /// True for valid numbers.
     pub(super) fn is_sound(&self) -> bool {
         let finite = |x: &f64| x.is_finite();
         self.state.iter().all(finite)
@@ -39,7 +39,7 @@ impl InitialEstimate {
             && self.unit.is_finite()
     }
 
-    /// Puts the remnant into a noise model; false for numbers that are not valid.
+    /// Sets a noise model to the remnant; false for invalid numbers.
     pub(super) fn apply_to_noise(&self, noise: &mut NoiseModel, sample_time: f64) -> bool {
         match &self.remnant {
             Some((lags, seconds)) => noise.set_prior(lags, self.variance, seconds / sample_time),

@@ -1,15 +1,15 @@
-//! The last blocks of a candidate, after one noise model and in one basis: what the detector compares.
+//! The last blocks of a candidate, with one noise model and in one basis: the data of the detector.
 //!
-//! Where samples are not taken for longer than a quarter of a second, or nothing moves, what is next to that gap is not
-//! kept: the samples before it may have been part of the same fault, and after it the filters settle.
+//! If samples are not used for longer than a quarter of a second, or the signals do not change, the blocks next to that gap
+//! are dropped: samples before it may belong to the same fault, and after it the filters have to settle.
 
 use super::blocks::{Block, EMPTY, Row};
 
-/// Blocks that there is room for.
+/// Capacity, in blocks.
 pub const BLOCKS: usize = 96;
 /// Length of a block, s.
 pub const BLOCK_S: f64 = 0.5;
-/// Time from which samples that are not taken are a gap, and time that is not looked at after one, s.
+/// Time from which unused samples are a gap, and time that is skipped after one, s.
 const GAP_S: f64 = 0.25;
 const BEHIND_S: f64 = 2.0;
 
@@ -20,8 +20,7 @@ pub(super) struct LastBlocks {
     open: Block,
     blocks: [Block; BLOCKS],
     count: usize,
-    /// Samples that were not taken, one after the other, and those that are not looked at from now
-    /// on.
+    /// Number of consecutive unused samples, and number of samples that are still to be skipped.
     gap: u64,
     behind: u64,
     fresh: usize,
@@ -31,7 +30,7 @@ pub(super) struct LastBlocks {
 crate::state!([] LastBlocks { open, blocks, count, gap, behind, fresh, closed });
 
 impl LastBlocks {
-    /// None, for a sample time in s.
+    /// Without blocks, for a sample time in s.
     pub fn new(ts: f64) -> Self {
         Self {
             samples_of_block: libm::round(BLOCK_S / ts).max(1.0) as u64,
@@ -70,19 +69,19 @@ impl LastBlocks {
         self.closed = true;
     }
 
-    /// A sample carries no information, and is not a fault.
+    /// A sample without information that is not a fault.
     pub fn pass_over(&mut self) {
         self.closed = false;
     }
 
-    /// A sample is not taken.
+    /// A sample that is not used.
     pub fn skip(&mut self) {
         self.pass_over();
         self.gap += 1;
         let samples = |seconds: f64| (seconds / BLOCK_S * self.samples_of_block as f64) as u64;
         let (long, behind) = (samples(GAP_S).max(1), samples(BEHIND_S));
         if self.gap == long {
-            // The block that is open, and the one before it.
+            // Drops the open block and the one before it.
             self.open = EMPTY;
             self.count = self.count.saturating_sub(1);
             self.fresh = 0;

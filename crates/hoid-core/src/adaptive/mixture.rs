@@ -1,23 +1,25 @@
-//! When did the operator last change? A mixture over the answers.
+//! When did the operator last change? A mixture of hypotheses about the time of the last change.
 //!
-//! After each block the likeliest hypotheses have children that report that the operator changed in it: they are what
-//! their parents were before it, and the covariance of a change is added to that of the gains. A whitening filter D of
-//! order p has D(theta x) for D theta x while it reaches back to before the change: where the noise is steep, the step
-//! of the response is then hundreds of innovations, which no gains explain. So a child takes nothing of that block, and
-//! of the next one the samples after the first p. A child starts with the prior probability of a change in the time
-//! since the last birth, and its probability follows its likelihood. When there is no room, the least likely of those
-//! that are old enough is pruned. So between changes the estimate rests on all data since the last one, and after a
-//! change it is that of the child that was born there (P. Andersson, *International Journal of Control* 42 (1985)
-//! 1175-1193; R. P. Adams and D. J. C. MacKay, *Bayesian online changepoint detection*, 2007; the births of A. S.
-//! Willsky and H. L. Jones, *IEEE Trans. Automatic Control* 21 (1976) 108-112, with all their likelihoods).
+//! After each block the likeliest hypotheses have children: a child assumes that the operator changed in this block. It has
+//! the estimate of its parent before the block, with the covariance of a jump added to that of the gains (A. S. Willsky and
+//! H. L. Jones, *IEEE Trans. Automatic Control* 21 (1976) 108-112). It starts with the probability of its parent times the
+//! hazard, the prior probability of a change since the last birth, and is then weighted by its likelihood like all others
+//! (R. P. Adams and D. J. C. MacKay, *Bayesian online changepoint detection*, 2007, algorithm 1; P. Andersson,
+//! *International Journal of Control* 42 (1985) 1175-1193). If there is no free slot, the least likely of the hypotheses
+//! that are old enough is pruned. Between changes the estimate therefore uses all data since the last change.
 //!
-//! **Classes.** The numerator is any, or that of a gain with a lead, `(K_e + K_e_dot s)(s + a)`: the second is the
-//! first with a covariance that leaves the gains no other direction. For each form the gains hardly drift between
-//! changes, or they wander, as people do. Children have the class of their parent, but one with a gain and a lead has
-//! children of any numerator too. The best of each class is never pruned.
+//! **Samples that a child skips.** Up to p samples after a change, a whitening filter D of order p computes
+//! `D (theta r)` with gains theta that differ within its window, and the model has theta `D r`. With a steep remnant the
+//! difference is hundreds of innovations, which no gains explain. A child therefore skips the block of its birth and the
+//! first p samples of the next one.
 //!
-//! **The estimate** is the mean of the mixture, its covariance that of the mixture, the differences between
-//! the hypotheses included.
+//! **Classes.** The numerator is free, or that of a gain with a lead, `(K_e + K_e_dot s)(s + a)`: the same filter with a
+//! covariance that has no other direction of the gains. In each form the gains drift slowly between changes, or they
+//! wander. A child has the class of its parent; a gain with a lead also has children with a free numerator. The best of
+//! each class is never pruned.
+//!
+//! **Estimate.** Mean and covariance of the mixture, with the spread of the means (Y. Bar-Shalom, X. R. Li and T.
+//! Kirubarajan, *Estimation with Applications to Tracking and Navigation*, 2001, section 1.4.16).
 
 use hoid_numerics::elimination;
 
@@ -28,32 +30,32 @@ use super::{
     sizes::{CLASSES, DYNAMICS, GAINS, HYPOTHESES, LINEAR, SEGMENTS, STATES},
 };
 
-/// What is supposed of changes. Gains are in units of |Y| at the reference frequency.
+/// Prior of changes. Gains are in units of |Y| at the reference frequency.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ChangePrior {
     /// Length of a block, s.
     pub block: f64,
     /// Mean time between changes, s.
     pub between: f64,
-    /// Standard deviations of a change: of the gain and of the lead's part at 2 rad/s.
+    /// Standard deviations of a change: of the gain, and of the part of the lead at 2 rad/s.
     pub jump: [f64; 2],
-    /// Drifts of the gains in a second: of those who hardly drift, and of those who wander.
+    /// Drift of the gains in one second: of steady and of wandering hypotheses.
     pub drift: [f64; 2],
     /// The drift just after a change, and its time constant, s.
     pub settling: [f64; 2],
-    /// Drift of the level of u in a second, over the root mean square of u.
+    /// Drift of the level of u in one second, relative to the root mean square of u.
     pub level: f64,
-    /// Time that the innovation variance rests on, s, and that of a newborn.
+    /// Memory of the innovation variance, s, and that of a newborn hypothesis.
     pub variance: [f64; 2],
-    /// Probability of those who hardly drift.
+    /// Prior probability of steady gains.
     pub steady: f64,
-    /// Probability of any numerator.
+    /// Prior probability of a free numerator.
     pub any: f64,
-    /// Blocks for which a newborn is kept whatever it predicts.
+    /// Blocks for which a newborn hypothesis is not pruned.
     pub protected: u64,
-    /// Standard deviations beyond which an innovation counts no more than there.
+    /// Limit of an innovation, in standard deviations.
     pub limit: f64,
-    /// The same in the detector.
+    /// Limit of an innovation in the detector, in standard deviations.
     pub detector_limit: f64,
 }
 
@@ -73,13 +75,13 @@ impl ChangePrior {
     }
 }
 
-/// Births before this time are of a start that is not settled, s.
+/// Time before which there are no births, s: the start has not settled.
 const FIRST_BIRTH_S: f64 = 3.0;
-/// A form is handed on from a gain with a lead to any numerator with this share of its probability.
+/// Share of the probability of a gain with a lead with which its child has a free numerator.
 const FORM_SWITCH: f64 = 0.3;
-/// Least logarithm of a probability.
+/// Lower limit of a log probability.
 const LEAST_LOG_WEIGHT: f64 = -60.0;
-/// Size of the gains before anything is known, in units of the ratio of u to e.
+/// Prior standard deviation of the gains, in units of the ratio of u to e.
 const INITIAL_GAIN_DEVIATION: f64 = 2.0;
 
 /// Scales of the signals.
@@ -88,10 +90,10 @@ pub(super) struct NoiseScales {
     /// Ratio of u to e, and the root mean square of u.
     pub unit: f64,
     pub size: f64,
-    /// Innovation variance to start with.
+    /// Initial innovation variance.
     pub innovations: f64,
     pub sample_time: f64,
-    /// Samples that count for one.
+    /// Number of samples that count as one.
     pub dispersion: f64,
 }
 
@@ -109,7 +111,7 @@ pub(super) struct Mixture {
 crate::state!([] Mixture { hypotheses, count, blocks, mean });
 
 impl Mixture {
-    /// One hypothesis of each class about a state. `dynamics` are the variances of the corrections.
+    /// One hypothesis of each class at the prior. `dynamics` are the variances of the corrections.
     pub fn new(prior: &ChangePrior, basis: &Basis, scales: &NoiseScales, dynamics: [f64; DYNAMICS]) -> Self {
         let mut p = [[0.0; STATES]; STATES];
         p[GAINS][GAINS] = scales.size * scales.size;
@@ -123,7 +125,7 @@ impl Mixture {
         })
     }
 
-    /// All classes at a known estimate.
+    /// One hypothesis of each class at a known estimate.
     pub fn at(prior: &ChangePrior, state: [f64; STATES], covariance: Covariance, variance: f64) -> Self {
         Self::of(prior, |_| (state, covariance, variance))
     }
@@ -155,8 +157,8 @@ impl Mixture {
         &mut self.hypotheses[..self.count.min(HYPOTHESES)]
     }
 
-    /// Takes a block, its first samples as many as the whitening filter reaches back, and those after them; the least
-    /// energy that any hypothesis left.
+    /// Steps 5 to 9 for a block, given the sums of its first p samples and of the rest. Returns the least residual
+    /// energy of all hypotheses.
     pub fn update(
         &mut self,
         [early, late]: [&Moments; 2],
@@ -172,6 +174,7 @@ impl Mixture {
         let mut left = [BlockResidual::ZERO; HYPOTHESES];
         let (mut common, mut best) = (f64::INFINITY, self.mean);
         for (h, left) in self.all_mut().iter_mut().zip(&mut left) {
+            // Step 5, P_j + Q_j: a random walk of the gains, faster just after a change, when people still settle.
             let age = (blocks - h.born.min(blocks)) as f64 * seconds;
             let mut drift = prior.drift[h.class % 2] * prior.drift[h.class % 2];
             if h.born > 0 {
@@ -191,18 +194,20 @@ impl Mixture {
                 (common, best) = (left.energy, h.state);
             }
         }
-        // The samples that a newborn does not take are nothing by which it is better or worse.
+        // A newborn skips its early samples. It is charged the residual energy of the best
+        // hypothesis for them, so that skipping them is neither an advantage nor a disadvantage.
         let of_early = early.energy(basis, &best);
         for (_, left) in self.all().iter().zip(&mut left).filter(|(h, _)| newborn(h)) {
             left.passed = [early.samples, of_early];
             left.energy += of_early;
             common = common.min(left.energy);
         }
-        // Half of the time since the start: its errors, which are large, do not stay.
+        // Memory of half the time since the start: the large residuals of the start are forgotten.
         let [longest, shortest] = prior.variance.map(|seconds| seconds / scales.sample_time);
         let memory = longest.min((0.5 * blocks as f64 * moments.samples).max(shortest));
-        // What is predicted without an error leaves a variance that is still positive.
+        // A perfect prediction must leave a positive variance.
         let least = 1e-24 * scales.size * scales.size;
+        // Step 7.
         for (h, left) in self.all_mut().iter_mut().zip(&left) {
             h.weigh(left, moments.samples, common, scales.dispersion, memory);
             h.variance = h.variance.max(least);
@@ -227,6 +232,7 @@ impl Mixture {
             self.all_mut().iter_mut().for_each(|h| h.log_weight = even);
             return;
         }
+        // mu_j = exp(l_j - max)/sum: the maximum is subtracted against underflow.
         let sum: f64 = (self.all().iter())
             .map(|h| libm::exp(finite(h.log_weight) - best))
             .sum();
@@ -265,12 +271,12 @@ impl Mixture {
             .sum()
     }
 
-    /// The likeliest of each class.
+    /// Index of the likeliest hypothesis of each class.
     fn best_of_classes(&self) -> [Option<usize>; CLASSES] {
         core::array::from_fn(|class| self.likeliest(|h| h.class == class))
     }
 
-    /// The children of a block, of the parents of before it. Those who wander have theirs every second block.
+    /// Step 9: the children of a block, from the parents before it. Wandering classes have children every second block.
     fn births(
         &mut self,
         parents: &[Option<Hypothesis>; CLASSES],
@@ -297,9 +303,11 @@ impl Mixture {
                 found => (found.as_ref(), own),
             };
             let Some(parent) = parent else { continue };
+            // The parents are those before the block: a child must not contain the data of a change that it explains.
             let mut child = parent.child(self.blocks);
             let every = if wanders { 2.0 } else { 1.0 };
             child.class = class;
+            // mu of the class times the hazard H = seconds/between (AM, equation 5, for a geometric run length).
             child.log_weight = libm::log(share.max(1e-12) * (every * seconds / prior.between).min(0.5));
             inflate_gains(
                 &mut child.covariance,
@@ -307,6 +315,7 @@ impl Mixture {
                 class,
                 prior.jump.map(|jump| jump * scales.unit),
             );
+            // A change may change the remnant too: the variance of a child follows its own data sooner.
             let youth = prior.variance[1] / scales.sample_time / scales.dispersion;
             child.residuals = child.residuals.min(youth);
             let Some(place) = self.free_slot(prior) else {
@@ -317,7 +326,8 @@ impl Mixture {
         self.normalise();
     }
 
-    /// A free place, or that of the least likely that is old enough and not the best of its class.
+    /// A free slot, or that of the least likely hypothesis that is old enough and not the best of
+    /// its class.
     fn free_slot(&mut self, prior: &ChangePrior) -> Option<usize> {
         if self.count < HYPOTHESES {
             self.count += 1;
@@ -334,12 +344,13 @@ impl Mixture {
             })
     }
 
-    /// The mean of the mixture.
+    /// `x^ = sum_j mu_j x^_j`.
     pub fn mean(&self) -> &[f64; STATES] {
         &self.mean
     }
 
-    /// Its covariance.
+    /// `P = sum_j mu_j (P_j + (x^_j - x^)(x^_j - x^)')`: the second term is the spread of the
+    /// means.
     pub fn covariance(&self) -> Covariance {
         let mut c = [[0.0; STATES]; STATES];
         for h in self.all() {
@@ -354,7 +365,7 @@ impl Mixture {
         c
     }
 
-    /// The mean over the hypotheses of what each reports.
+    /// The mean of a function of state and covariance over the hypotheses.
     pub fn mean_of(&self, what: impl Fn(&[f64; STATES], &Covariance) -> f64) -> f64 {
         self.all()
             .iter()
@@ -367,7 +378,7 @@ impl Mixture {
         self.all().iter().map(|h| h.weight() * h.variance).sum()
     }
 
-    /// What the likeliest reports about the past: the states before its changes, the oldest first, and the current one.
+    /// The segments of the likeliest hypothesis: the states before its changes, the oldest first, and the current one.
     pub fn segments(&self) -> Segments {
         let mut segments = Segments::NONE;
         if let Some(best) = self.likeliest(|_| true) {
@@ -382,9 +393,9 @@ impl Mixture {
         segments
     }
 
-    /// Replaces what was supposed of the corrections, normal about zero with the variances `was`, by what is
-    /// supposed of people, normal about `mean` with the variances `is`:
-    /// `P' = (I + P D)^-1 P`, `D = 1/is - 1/was`, `s' = s + P' (mean/is - D s)`.
+    /// Replaces the prior of the corrections, normal with mean zero and variances `was`, by the prior of people, normal
+    /// with `mean` and variances `is`: `P' = (I + P D)^-1 P`, `D = 1/is - 1/was`, `x' = x + P' (mean/is - D x)`. In
+    /// information form one prior is subtracted and the other added.
     pub fn replace_prior(&mut self, was: [f64; DYNAMICS], is: [f64; DYNAMICS], mean: [f64; DYNAMICS]) {
         for h in self.all_mut() {
             let mut matrix: Covariance = [[0.0; STATES]; STATES];
@@ -417,7 +428,7 @@ impl Mixture {
     }
 }
 
-/// States of a past, with the block up to which each held.
+/// The states of successive segments, each with its last block.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Segments {
     all: [Segment; SEGMENTS + 1],
@@ -442,7 +453,7 @@ impl Segments {
         }
     }
 
-    /// The same in another count of blocks, and in other coordinates.
+    /// The segments with another first block and in other coordinates.
     pub fn carried(mut self, later: u64, to: impl Fn(&[f64; STATES]) -> [f64; STATES]) -> Self {
         for segment in &mut self.all {
             *segment = Segment {
@@ -462,7 +473,7 @@ impl Segments {
     }
 }
 
-/// Directions of the gains that are those of a gain and of a lead, `n_0 = K a`, `n_1 = K + K_dot a`,
+/// Directions of a gain and of a lead in the space of the gains, `n_0 = K a`, `n_1 = K + K_dot a`,
 /// `n_2 = K_dot`, each response over its scale; K_dot in units of K at 2 rad/s.
 fn gain_and_lead(basis: &Basis) -> [[f64; GAINS]; 2] {
     let (a, [s0, s1, s2]) = (1.0 / basis.point().lag, basis.scale());
@@ -472,7 +483,8 @@ fn gain_and_lead(basis: &Basis) -> [[f64; GAINS]; 2] {
     ]
 }
 
-/// Adds the variance of a change of the gains: of a gain and a lead, or of any numerator, by the class.
+/// Adds a variance to the gains (`Q_j`, the jump of a child, or the prior), along gain and lead or in all directions by
+/// the class.
 fn inflate_gains(p: &mut Covariance, basis: &Basis, class: usize, [gain, lead]: [f64; 2]) {
     if class >= 2 {
         for (i, size) in [gain, lead, lead].into_iter().enumerate() {

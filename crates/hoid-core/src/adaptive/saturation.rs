@@ -1,23 +1,22 @@
-//! Where the stick ends.
+//! Outputs at a limit of the stick: censored samples.
 //!
-//! A stick that is at its end reports only that they would have gone at least as far. Taken as it is, such an output
-//! reports that they answered less than they do, and the samples after it are held against a noise that was none. So
-//! nothing is learnt of it, and what goes on in the filters is the output that was predicted, where that lies beyond
-//! the end, and the end where it does not: the output given what is known, except for the noise (J. Tobin,
-//! *Econometrica* 26 (1958) 24-36, has the regression with both).
+//! An output at a limit only shows that the intended output was at least as large. Used as measured, it would bias the gains
+//! towards zero, and the following samples would be compared with a wrong noise. These samples therefore do not update the
+//! estimate, and the filters get the predicted output if it lies beyond the limit, otherwise the limit (J. Tobin,
+//! *Econometrica* 26 (1958) 24-36, has the regression with censored outputs).
 //!
-//! The stick is at its end where two samples one after the other are alike, and none has been farther out; from then on
-//! one sample there is enough. The first time, the sample before is only known to be at the end when a replay reads it.
+//! The stick is at a limit if two consecutive samples are equal and no output has been farther out; from then on one sample
+//! there is enough. The first time, the first of the two samples is known to be at the limit only in a replay.
 
 use super::history::Use;
 
-/// The ends that have been reached.
+/// The limits that have been reached.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Saturation {
     lowest: f64,
     highest: f64,
     last: f64,
-    /// Whether the stick has stayed at its lowest and at its highest output.
+    /// Whether the stick has stayed at its lower and at its upper limit.
     known: [bool; 2],
 }
 
@@ -34,7 +33,7 @@ impl Saturation {
         }
     }
 
-    /// The end at which the stick is, if it is at one.
+    /// The limit at which the stick is, if it is at one.
     #[inline(always)]
     pub fn end(&self, u: f64) -> Option<Use> {
         let [low, high] = self.known;
@@ -46,8 +45,7 @@ impl Saturation {
         }
     }
 
-    /// What goes on in the filters in the place of an output at an end, from what was predicted: never
-    /// farther beyond it than the ends are from one another.
+    /// The output for the filters in place of one at a limit, from the prediction; at most one range beyond the limit.
     #[inline(always)]
     pub fn beyond(&self, end: Use, u: f64, predicted: f64) -> f64 {
         let range = self.highest - self.lowest;
@@ -58,7 +56,7 @@ impl Saturation {
         }
     }
 
-    /// Saturation a sample.
+    /// Updates the limits with a sample.
     #[inline(always)]
     pub fn remember(&mut self, u: f64) {
         let again = u == self.last && self.highest > self.lowest;
@@ -84,7 +82,7 @@ mod tests {
     #[test]
     fn a_stick_that_stands_farther_out_than_ever_is_at_its_end() {
         let ends = after(&[0.1, -0.4, 1.0]);
-        // Predicted beyond the end, this side of it, and farther than can be.
+        // Predictions beyond the limit, inside of it, and farther than one range beyond.
         let beyond = |u: f64, predicted: f64| ends.end(u).map(|end| ends.beyond(end, u, predicted));
         assert_eq!(beyond(1.0, 1.3), Some(1.3));
         assert_eq!(beyond(1.0, 0.2), Some(1.0));
@@ -108,7 +106,7 @@ mod tests {
         let ends = after(&[0.1, 1.0, 1.0, -0.3]);
         assert_eq!(ends.end(1.0), Some(Use::AtUpperLimit));
         assert_eq!(ends.end(-0.3), Some(Use::AtLowerLimit));
-        // Farther out than the end is not an end.
+        // An output beyond the limit is not at a limit.
         assert_eq!(after(&[0.1, 1.0, 1.0, 1.2, 0.0]).end(1.2), None);
     }
 

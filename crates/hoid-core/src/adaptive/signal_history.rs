@@ -1,6 +1,6 @@
-//! The last signals of a basis, the newest first, without moving them at each sample.
+//! The last signals of a basis, the newest first, without a copy at each sample.
 //!
-//! A ring that is kept twice, one copy after the other: independent of its start, its numbers are contiguous.
+//! A ring that is stored twice, one copy after the other: from any start, its numbers are contiguous.
 
 use super::{
     f64x2::F64x2,

@@ -1,17 +1,17 @@
-//! The replays that repair the current estimate.
+//! Replays: the recursion reads the stored record again and replaces the live candidate.
 //!
-//! The current candidate (`candidate`) takes each sample as it comes. In addition, another candidate reads the record
-//! again from the start of the memory, [`REPLAYED`] samples with each new one, until it has caught up. It has the basis
-//! where the estimate now points, the noise model of its residuals, and the dispersion of its innovations. When it has
-//! caught up it takes over, and the next one starts. So the estimate is, a few seconds late, that of a prediction error
-//! method of all data since the start of the memory that is repeated again and again, at a bounded cost for each sample
-//! and with the same digits whatever the machine.
+//! Next to the live candidate a second one, the trial, reads the record from the start of the memory, [`REPLAYED`] samples
+//! per new sample, until it has caught up. It uses the basis at the current estimate, the noise model of the residuals,
+//! and the dispersion of the innovations. When it has caught up it becomes the live candidate, and the next trial starts.
+//! The estimate is therefore, a few seconds late, that of a prediction error method over all stored data, iterated as in a
+//! Gauss-Newton search (L. Ljung, *System Identification*, 1999, section 10.2), at a bounded cost per sample and with the
+//! same digits on every machine.
 //!
-//! Every second replay starts elsewhere. It is repeated [`STAGES`] times from where it ended, and takes over
-//! only if its evidence is better by [`TAKEOVER_NATS`].
+//! Every second trial starts at another point, against local minima. It is repeated [`STAGES`] times from its result, and
+//! replaces the live candidate only if its evidence is better by [`TAKEOVER_NATS`].
 //!
-//! With no more memory than the longest delay needs nothing is replayed: basis and noise model are then those of the
-//! start, except for corrections, and the noise model is renewed in place.
+//! With memory for the longest delay only there are no replays: basis and noise model are those of the start, except for
+//! corrections, and the noise model is renewed in place.
 
 use core::ops::Range;
 
@@ -24,19 +24,19 @@ use crate::adaptive::{
     saturation::Saturation,
 };
 
-/// Samples that are read again with each new one.
+/// Number of stored samples that are read per new sample.
 pub const REPLAYED: usize = 50;
-/// Replays of a start that is elsewhere, and the evidence by which it must be better, nats.
+/// Number of trials from another starting point, and the evidence by which the last must be better,
+/// nats.
 const STAGES: u64 = 3;
 const TAKEOVER_NATS: f64 = 3.0;
-/// Evidence by which a replay of the estimate itself may be worse: it started with what was known less
-/// well.
+/// Evidence by which a trial from the estimate may be worse, nats: it started with a wider prior.
 const TOLERATED_NATS: f64 = 20.0;
-/// Samples that a first estimate needs, in orders of the noise model.
+/// Number of samples for the first estimate, in orders of the noise model.
 const FEWEST: u64 = 3;
 
 impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
-    /// The first estimate: the best of all starts over the samples so far.
+    /// The first estimate: the best of all starting points over the samples so far.
     pub(super) fn begin(&mut self) {
         let (ts, n) = (self.prior.sample_time, self.history.samples());
         let enough = n as f64 * ts >= self.prior.hold && n >= FEWEST * self.prior.order as u64;
@@ -82,7 +82,7 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         -0.5 * away.iter().zip(is).map(|(a, v)| a * a / v).sum::<f64>()
     }
 
-    /// Reads on with the trial, and starts another when it is done.
+    /// Continues the trial, and starts the next one when it is done.
     pub(super) fn replay(&mut self) {
         if self.stage == 0 {
             self.start_replay();
@@ -115,12 +115,12 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         self.start_from(&live, point, stage);
     }
 
-    /// The start of this replay, or of the last one that was elsewhere.
+    /// Index of the starting point of this trial, or of the last one from another point.
     fn turn(&self) -> usize {
         (self.replays / 2) as usize % self.prior.starts.len()
     }
 
-    /// A trial at a point, with what another has learnt.
+    /// Starts a trial at a point, with the noise model and dispersion of another candidate.
     fn start_from(&mut self, from: &Candidate, point: Point, stage: u64) {
         let mut d = from.noise.clone();
         d.solve();
@@ -128,6 +128,8 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
             self.stage = 0;
             return;
         };
+        // The guide: the gains of each segment of the other candidate, so that the residuals of D are right from the
+        // first block on, before the trial has found the gains itself.
         let later = (trial.start.saturating_sub(from.start)) / from.block_samples().max(1);
         let guide = from.mixture.segments();
         let basis = trial.basis().clone();
@@ -135,7 +137,7 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         (self.stage, self.at) = (stage, self.trial.start);
     }
 
-    /// What becomes of a trial that has caught up.
+    /// Decides about a trial that has caught up.
     fn decide(&mut self) {
         let mut trial = self.trial.clone();
         trial.clear_guide();
@@ -144,6 +146,7 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         if !(evidence.is_finite() && trial.mixture.mean().iter().all(|s| s.is_finite())) {
             return;
         }
+        // Evidence is comparable only over the same samples.
         let same = trial.start == self.live.start;
         self.apply_population_prior(&mut trial);
         if stage > 1 && stage <= STAGES {
@@ -155,6 +158,7 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
             1 => !same || evidence > self.live.evidence - TOLERATED_NATS,
             _ => same && evidence > self.live.evidence + TAKEOVER_NATS,
         };
+        // The losing point still predicts nearly as well: it widens the reported errors.
         if stage > 1 && same {
             let loser = if takes_over { &self.live } else { &trial };
             let deficit = (evidence - self.live.evidence).abs();
@@ -166,7 +170,7 @@ impl<E: AsRef<[f64]> + AsMut<[f64]>> AdaptiveFilter<E> {
         }
     }
 
-    /// Puts what is supposed of people in the place of the trust region of a replay.
+    /// Replaces the trust region of a replay by the prior of people.
     fn apply_population_prior(&self, candidate: &mut Candidate) {
         if self.initial.is_some() {
             return;
