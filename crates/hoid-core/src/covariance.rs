@@ -180,6 +180,8 @@ impl<const N: usize> Covariance<N> {
 
     /// `sum_of_squares` is N_0 sigma^2.
     fn update_variable(&mut self, psi: &[f64; N], eps: f64, sum_of_squares: f64, smallest: f64) -> ParameterStep<N> {
+        // 1 + psi' P psi is the variance of the innovation over sigma^2. An innovation larger than this explains
+        // shortens the memory.
         let denominator = 1.0 + self.factors.quadratic_form(psi);
         let gain = self.factors.measurement_update(psi, 1.0);
         let expected = denominator * sum_of_squares;
@@ -208,6 +210,7 @@ impl<const N: usize> Covariance<N> {
     fn update_gradient(&mut self, psi: &[f64; N], eps: f64, rate: f64) -> ParameterStep<N> {
         let power: f64 = psi.iter().map(|p| p * p).sum();
         self.power += (power - self.power) * POWER_WEIGHT;
+        // The offset keeps the step bounded where psi vanishes: rate psi/psi'psi would grow without limit.
         self.largest_power = self.largest_power.max(self.power);
         let denominator = GRADIENT_OFFSET * self.largest_power + power;
         let scale = if denominator > 0.0 { rate / denominator } else { 0.0 };

@@ -76,9 +76,13 @@ impl<S: Shape, const N: usize, const K: usize, A: Adaptation<N>, B: ErrorPropaga
             .adaptation
             .update(&psi, limited, &theta, self.bars.variance().unwrap_or(0.0));
         let stable = self.stable;
+        // eps and psi are outputs of filters with the poles of C and F: outside of the stable region they diverge, and
+        // with them the estimate (Ljung and Söderström 1983, section 3.7.3).
         let (allowed, theta) = backtrack(&theta, &moved.step, |theta| stable.holds(&shape, theta));
+        // The filters continue with the a-posteriori residuals of the new theta (Ljung and Söderström 1983, eq. 3.151).
         self.correct(&theta);
         (self.theta, self.psi) = (theta, psi);
+        // The error bars follow the step that was made: shortened by `allowed`, limited by `used`.
         let gain = moved.gain.map(|g| allowed * used * g);
         self.bars.update(&layout, &rows, &gain, innovation);
         self.adaptation.add_drift_to(&mut self.bars);

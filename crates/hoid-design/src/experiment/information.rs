@@ -13,7 +13,7 @@
 //! information is lost to it (U. Forssell and L. Ljung, *Automatica* 35 (1999) 1215-1241, section 5). Errors of functions of theta, such as
 //! crossover and margin, are those of the first order.
 //!
-//! It takes lines that are prominent of the remnant in e: a line that does not is one at which H is drawn to -1/P, and
+//! It uses lines that exceed the remnant in e: at a line that does not, H is drawn to -1/P, and
 //! predicted to be known better than it is.
 //!
 //! **The remnant** is a lag of order m, `S_n = K^2/(1 + (T_n omega)^2)^m`, whose share p of the variance of u, through the loop,

@@ -44,6 +44,7 @@ pub(super) fn weigh(criteria: &[Option<f64>]) -> Option<(usize, Vec<f64>)> {
     let front = criteria
         .iter()
         .position(|c| c.is_some_and(|c| c - least <= NO_EVIDENCE))?;
+    // Akaike weights, exp(-Delta/2) (Burnham and Anderson 2002, section 2.9).
     let mut weights: Vec<f64> = (criteria.iter())
         .map(|c| c.map_or(0.0, |c| (0.5 * (least - c)).exp()))
         .collect();

@@ -55,8 +55,8 @@ impl Covariances {
     /// Adds the bias that another estimate shows: `d d'`, d the difference to it.
     ///
     /// The prediction error fit is biased where its noise model is wrong, by an amount that no
-    /// scatter shows; an estimate that does not rest on that noise model reports it. Components of
-    /// errors is then the mean squared error, variance and squared bias, with d for the bias: all of
+    /// scatter shows; an estimate that does not rest on that noise model reports it. The
+    /// errors are then built from the mean squared error, variance plus squared bias, with d for the bias: all of
     /// it, and not the `d d'/3` of a truth that may lie anywhere between the two, since the bias is
     /// on one side. Elements at a bound stay as they are.
     ///

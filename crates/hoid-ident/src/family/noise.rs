@@ -107,6 +107,7 @@ pub(super) fn hannan_rissanen(series: &[Vec<f64>], (nc, nd): (usize, usize), lon
     }
     let (gram, right) = products.system(0..q, q);
     let mut found = solve_symmetric(&gram, &right)?;
+    // c_k rho^k moves all roots of C by the factor rho.
     for _ in 0..MOST_DRAWN {
         if hoid_core::stability::roots_inside(&found[..nc], LARGEST_ROOT) {
             return Some(found);

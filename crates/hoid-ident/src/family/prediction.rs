@@ -158,6 +158,7 @@ impl<'a> Prediction<'a> {
         let coefficients = [vec![0.0; noise.0], start_of_noise.d].concat();
         let mut eta = criterion.layout.spread(start, &coefficients);
         let unit = self.penalties(&criterion.layout);
+        // The prior is weighted by kappa sigma^2, which is known only after a fit: a few rounds make both consistent.
         let mut weight = start_of_noise.loss;
         let mut found = None;
         for round in 0..ROUNDS {
@@ -257,6 +258,7 @@ impl<'a> Prediction<'a> {
         let (n, states) = (criterion.residuals(), criterion.states());
         let penalty: f64 = criterion.penalty.iter().map(|p| p.at(&minimum.theta)).sum();
         let beside = criterion.beside_at(&minimum.theta, workspace).sum_of_squares;
+        // The noise variance comes from the residuals alone, without the prior and without the lines.
         let mut squares = minimum.at.sum_of_squares - penalty - beside;
         if self.noise_free().is_some() {
             squares = squares.max(self.rounding() * n as f64);

@@ -24,6 +24,7 @@ pub(super) fn profile_interval(
     quantile: f64,
     workspace: &mut Workspace,
 ) -> Option<(f64, f64)> {
+    // Rise of the criterion at the ends of the interval: t^2 in units of the inflated innovation variance.
     let level = fit.inflation * fit.innovation_variance * quantile * quantile;
     let least = fit.minimum.at.sum_of_squares;
     let search = SearchOptions {
@@ -41,6 +42,7 @@ pub(super) fn profile_interval(
             held.limits[place] = (at, at);
             eta[place] = at;
             let found = held.search(eta.clone(), &search, None, workspace)?;
+            // The next point starts from the conditional minimum of this one: few iterations, and the same valley.
             eta.copy_from_slice(&found.theta);
             Some(found.at.sum_of_squares - least > level)
         };

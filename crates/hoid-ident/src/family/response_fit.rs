@@ -128,6 +128,8 @@ impl<'p> ResponseCriterion<'p> {
             .collect();
         starts.sort_by(|a, b| a.0.total_cmp(&b.0));
         let mut best: Option<Minimum> = None;
+        // chi^2 has local minima in delay and poles: the best points of a grid are searched from, each with its best
+        // gain.
         for (_, start) in starts.into_iter().take(searches) {
             let known = best.as_ref().map(|b| b.at.sum_of_squares);
             if let Some(found) = minimise(self, start, search, None, &mut Workspace::default())
@@ -222,6 +224,7 @@ impl<'p> ResponseCriterion<'p> {
             cross += (model.conj() * point.response).re / point.variance;
             power += model.norm_sqr() / point.variance;
         }
+        // The response is linear in the gain: weighted least squares in one unknown.
         x[0] = cross / power;
         let value = self.linearise(x, &mut Workspace::default()).sum_of_squares;
         (value.is_finite() && x[0] != 0.0).then_some(value)
@@ -242,6 +245,8 @@ impl Objective for ResponseCriterion<'_> {
         for point in self.points.iter() {
             let hold = self.intersample.response(point.omega_rad_s, self.sample_time);
             let model = operator.response_and_gradient(point.omega_rad_s);
+            // `variance` is E|error|^2 of the complex response, half of it in each part: chi^2 = 2 |error|^2/variance
+            // has two degrees of freedom per line.
             let weight = 2.0 / point.variance;
             let off = point.response - model.value * hold;
             let slopes: Vec<Complex64> = model.gradient.iter().map(|g| g * hold).collect();

@@ -168,6 +168,8 @@ impl<'a> IvProblem<'a> {
             z: self.instruments(filter, system),
         };
         let free = self.initial_state_responses(filter);
+        // 1/(C F) starts at rest at the first row, the true filter does not: the difference is a free response, which
+        // is projected out of all columns. The estimate then does not depend on the unknown past.
         let all = equation.phi.iter_mut().chain(&mut equation.z).chain([&mut equation.y]);
         all.for_each(|column| eliminate(&free, column));
         equation
@@ -187,6 +189,7 @@ impl<'a> IvProblem<'a> {
                 z = columns;
                 continue;
             }
+            // Each source serves only the rows whose noise did not enter its weights (split-sample instruments).
             for rows in self.rows_of(&source.samples, filter.d.len()) {
                 for (to, from) in z.iter_mut().zip(&columns) {
                     to[rows.clone()].copy_from_slice(&from[rows.clone()]);
@@ -248,6 +251,7 @@ impl<'a> IvProblem<'a> {
         }
         let mut at = 0;
         for n in self.rows(filter.d.len()) {
+            // d/df_i of F C eps = D (F u - B e): the second term of psi_fi is eps(t-i)/F.
             let mut through = eps[at..at + n].to_vec();
             divide_in_place(filter.f, &mut through);
             for (i, column) in psi[..self.poles].iter_mut().enumerate() {
@@ -301,6 +305,8 @@ impl<'a> IvProblem<'a> {
     /// # Errors
     /// [`IdentError::SingularInstruments`].
     pub fn solve(&self, equation: &Equation) -> Result<Vec<f64>, IdentError> {
+        // Z = Q T with T regular, so that Z' Phi theta = Z' y and Q' Phi theta = Q' y have the same solution, but the
+        // condition number of Z does not enter.
         let q = self.basis(&equation.z)?;
         let mut product: Vec<f64> = equation
             .phi

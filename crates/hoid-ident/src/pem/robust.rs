@@ -60,6 +60,8 @@ impl Reweighting {
     /// Square roots of the weights for the next round, by the residuals of each record. `None` when
     /// the residuals have no scale (half of them are zero).
     pub fn next(&mut self, residuals: &[Vec<f64>]) -> Option<Vec<Vec<f64>>> {
+        // A scale that is estimated in every round can alternate with the weights; held, each round lowers Huber's
+        // loss.
         if self.round < SCALES {
             self.scale = median_absolute(residuals) / 0.674_489_750_196_081_7;
         }
@@ -114,6 +116,7 @@ pub(crate) fn fit(
         let next = minimise(&objective, minimum.theta.clone(), &settings.search, None, workspace)
             .ok_or(IdentError::NoFiniteLoss)?;
         iterations += next.termination.iterations;
+        // step' G step/(S/n): the squared distance of the rounds in standard errors.
         let step: Vec<f64> = next.theta.iter().zip(&minimum.theta).map(|(a, b)| a - b).collect();
         let p = step.len();
         let curvature: f64 = (0..p)
@@ -132,6 +135,7 @@ pub(crate) fn fit(
     };
     let free = free_parameters(constrained, &minimum.theta, &minimum.at.descent);
     let names = criterion.orders.parameter_names();
+    // The covariance uses the unweighted psi (Huber 1981, eq. 7.6.8); the weights enter through `variance`.
     let plain = constrained.linearise(&minimum.theta, workspace);
     let inverse = inverse_of_free(&plain.gram, &free, &names)?;
     let variance = rounds.variance(&residuals, names.len() + criterion.states());

@@ -36,9 +36,12 @@ const ORDERS: usize = 4;
 const ROWS_EACH: usize = 10;
 
 fn solve(problem: &IvProblem<'_>, _: &Criterion<'_>, _: IterationLimits) -> Result<IvSolution, IdentError> {
+    // Step 1: biased by the coloured v, but correlated with the true output, which is all that instruments need.
     let (start, _) = problem.stabilised(&problem.least_squares(Prefilter::default())?)?;
+    // Step 2.
     let second = problem.equation(Prefilter::default(), &start);
     let system = problem.solve(&second)?;
+    // Step 3: L whitens v, for the smallest variance (Ljung 1999, eq. 15.24).
     let rows = problem.rows(0);
     let shortest = rows.iter().min().copied().unwrap_or(0);
     let order = (ORDERS * (problem.poles + problem.nb)).min(shortest / ROWS_EACH);
@@ -47,6 +50,7 @@ fn solve(problem: &IvProblem<'_>, _: &Criterion<'_>, _: IterationLimits) -> Resu
         d: &whitening,
         ..Prefilter::default()
     };
+    // Step 4.
     let (stable, _) = problem.stabilised(&system)?;
     let last = problem.equation(filter, &stable);
     let theta = problem.solve(&last)?;
