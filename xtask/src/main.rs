@@ -6,6 +6,7 @@
 //! | `cargo xtask python [ARGUMENT...]` | the tests of the Python package alone, arguments for pytest |
 //! | `cargo xtask check` | formatting, crates that are used, lints, documentation of the crates and the book, as continuous integration does |
 //! | `cargo xtask crates` | licences, bans and versions of the crates that are used, alone (module `crates`) |
+//! | `cargo xtask words [--book]` | the words that prose does not use, in sources, or in the book, alone (module `words`) |
 //! | `cargo xtask book` | the book in `docs/`, into `docs/book/` (needs mdbook) |
 //! | `cargo xtask lab` | that the page of `hoid lab` is what its sources build, and the page in a browser (module `lab`) |
 //! | `cargo xtask lab-page [--config FILE] [--out FILE]` | the page of `hoid lab` as one file that needs no program after it, into `target/lab-page/` |
@@ -32,6 +33,7 @@ mod places;
 mod process;
 mod processors;
 mod python;
+mod words;
 
 use std::{
     env,
@@ -42,7 +44,7 @@ use background::Background;
 use counts::Counts;
 use process::{SHIPPED, cargo, cargo_command, each_line, run};
 
-const USAGE: &str = "usage: cargo xtask test [ARGUMENT...] | python [ARGUMENT...] | check | crates | book | lab | lab-page [OPTION...] | embedded [--all] | ffi [OPTION...] | miri [ARGUMENT...] | places [--dry | --dev] | bench [OPTION...] | slow NAME [ARGUMENT...]";
+const USAGE: &str = "usage: cargo xtask test [ARGUMENT...] | python [ARGUMENT...] | check | crates | words [--book] | book | lab | lab-page [OPTION...] | embedded [--all] | ffi [OPTION...] | miri [ARGUMENT...] | places [--dry | --dev] | bench [OPTION...] | slow NAME [ARGUMENT...]";
 
 fn main() -> ExitCode {
     let mut arguments = env::args().skip(1);
@@ -53,6 +55,8 @@ fn main() -> ExitCode {
         Some(python::BUILD) => python::build(),
         Some("check") => check(),
         Some("crates") => crates::check(),
+        Some("words") if arguments.next().as_deref() == Some("--book") => words::check_book(),
+        Some("words") => words::check(),
         Some("book") => book(),
         Some("bench") => bench::bench(&arguments.collect::<Vec<_>>()),
         Some("lab") => lab::lab(),
@@ -199,6 +203,7 @@ fn slow(arguments: &[String]) -> Result<(), String> {
 fn check() -> Result<(), String> {
     cargo(&["fmt", "--all", "--check"], &[])?;
     crates::check()?;
+    words::check()?;
     cargo(&["clippy", "--workspace", "--all-targets", "--", "-D", "warnings"], &[])?;
     cargo(&["doc", "--workspace", "--no-deps"], &[("RUSTDOCFLAGS", "-D warnings")])?;
     book()

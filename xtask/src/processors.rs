@@ -43,7 +43,7 @@ pub fn webassembly(profile: &str) -> Result<Option<PathBuf>, String> {
     Ok(Some(target_directory().join(WASM).join(folder).join("hoid_ffi.wasm")))
 }
 
-/// Whether Rust can build for a target here; said where it cannot.
+/// Whether Rust can build for a target here; reported where it cannot.
 fn is_there(target: &str) -> bool {
     let there = installed_targets().iter().any(|one| one == target);
     if !there {

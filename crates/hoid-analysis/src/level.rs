@@ -34,7 +34,7 @@ pub(crate) struct Level {
     /// The records with it, where it was taken out.
     as_read: Option<Vec<Record>>,
     /// Findings about it next to the means.
-    beside_means: Vec<f64>,
+    separate_means: Vec<f64>,
 }
 
 impl Level {
@@ -46,7 +46,7 @@ impl Level {
         });
         Self {
             as_read,
-            beside_means: Vec::new(),
+            separate_means: Vec::new(),
         }
     }
 
@@ -68,7 +68,7 @@ impl Level {
     ) -> Result<(), AnalysisError> {
         for record in data.records.iter_mut().filter(|_| self.as_read.is_some()) {
             let left = of(record)?.unwrap_or(0.0);
-            self.beside_means.push(left);
+            self.separate_means.push(left);
             let mut is_output = false;
             *record = record.clone().map_signals(|values| {
                 let by = if is_output { left } else { 0.0 };
@@ -86,7 +86,7 @@ impl Level {
         of: impl Fn(usize, &Record) -> Option<Estimate>,
     ) -> Option<Setting> {
         levels_into(&mut data.accounts, self.as_read.as_ref()?, |k, record| {
-            let beside = self.beside_means.get(k).copied().unwrap_or(0.0);
+            let beside = self.separate_means.get(k).copied().unwrap_or(0.0);
             of(k, record).map(|level| Estimate {
                 value: level.value + beside,
                 ..level

@@ -1,4 +1,4 @@
-//! Faults of recordings, looked for and repaired before anything else is done with them.
+//! Faults of recordings, detected and repaired before anything else is done with them.
 
 use hoid_ident::faults::{SLOWEST_S, repair};
 use hoid_model::{FaultHandling, Finding, ModelError, Record};

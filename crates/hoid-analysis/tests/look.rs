@@ -54,7 +54,7 @@ fn a_file_is_seen_as_a_whole() {
         "hoid identify 'my run.csv' --input Target-y --output 'Stick [V]' --from 2 --to 22 --offset u=1 \
          --excitation Target --controlled-element 1/s"
     );
-    // What is known is not looked for.
+    // What is known is not searched for.
     let known = LookOptions {
         excitation: Some("none".to_owned()),
         from_s: Some(5.0),

@@ -167,7 +167,7 @@ pub fn reader_left() -> bool {
 
 /// Writes a warning, a note or an error to standard error.
 pub fn message(text: &str) {
-    // When even standard error is closed there is no one to tell.
+    // When even standard error is closed there is no place for a message.
     let _ = writeln!(io::stderr().lock(), "{text}");
 }
 

@@ -249,7 +249,7 @@ fn an_offset_is_estimated_and_biases_nothing() {
             error > 0.0 && (by - added).abs() < 0.01 * added.abs().max(error),
             "{by} {added}"
         );
-        // As they are: said where it matters.
+        // As they are: reported where it matters.
         let kept = identified(d, &[&BOX_JENKINS[..], &["--detrend", "mean"]].concat());
         assert!(kept["records"][0]["level"].is_null());
         let page = good(d, &[&["identify", "c.csv", "-v"], &BOX_JENKINS[..]].concat());

@@ -235,7 +235,7 @@ fn a_delay_in_seconds_is_nk() {
     }
 }
 
-/// What `info` says of a cell is what a reader makes of it.
+/// What `info` states of a cell is what a reader makes of it.
 #[test]
 fn a_cell_is_the_same_to_info_and_to_who_reads_it() {
     let directory = TempDir::new().unwrap();

@@ -1,4 +1,4 @@
-//! Rates above 200 Hz: filtered and decimated by themselves, said in the result, and the same person.
+//! Rates above 200 Hz: filtered and decimated by themselves, stated in the result, and the same person.
 #![allow(clippy::unwrap_used)]
 
 mod common;
@@ -16,7 +16,7 @@ use tempfile::TempDir;
 
 use common::{bad, good, hoid, json};
 
-/// A run of C1, or of a person with an element, at so many Hz.
+/// A run of C1, or of a person with an element, at a given number of Hz.
 fn simulate(at: &Path, person: &str, hz: f64, seed: u64) -> String {
     let file = format!("{person}-{hz}-{seed}.csv");
     let (ts, seed) = (format!("{:?}", 1.0 / hz), seed.to_string());

@@ -163,7 +163,8 @@ fn bands_cover_and_precision_grows() {
     assert!(ratio < 0.5, "{ratio}");
 }
 
-/// A remnant of so many poles at -1/.06 s, of the power .04: its samples, and the variance of its innovations.
+/// A remnant of a given number of poles at -1/.06 s, of the power .04: its samples, and the variance of its
+/// innovations.
 fn steep(poles: usize, samples: usize, seed: u64) -> (Vec<f64>, f64) {
     let (pole, mut stream, mut state) = ((-TS / 0.06).exp(), Stream(seed), vec![0.0; poles]);
     let mut sample = || {

@@ -107,7 +107,7 @@ fn population(condition: &str, people: &[&Person], prior: &OperatorPrior) -> Pop
             continue;
         }
         if form.is_none() && !OF_ANY_FORM.contains(&name) {
-            let why = "the forms of people differ; say one under [analysis] in group.toml".to_owned();
+            let why = "the forms of people differ; name one under [analysis] in group.toml".to_owned();
             found.left_out.push((name.to_owned(), why));
             continue;
         }

@@ -63,7 +63,8 @@ pub(crate) unsafe fn bytes<'a>(pointer: *const u8, length: usize, what: &str) ->
             format!("{what}: no memory has {length} bytes"),
         ));
     }
-    // SAFETY: not null, and no longer than a slice may be; that there are so many is the contract.
+    // SAFETY: not null, and no longer than a slice may be; that there are this many is the
+    // contract.
     Ok(unsafe { slice::from_raw_parts(pointer, length) })
 }
 

@@ -48,7 +48,7 @@ fn listed<T: Copy>(tracker: *const HoidTracker, of: Lists<T>) -> Vec<T> {
     }
     // SAFETY: a tracker, and room as told.
     assert_eq!(unsafe { of(tracker, list.as_mut_ptr(), count, &mut count) }, HOID_OK);
-    // SAFETY: so many were written.
+    // SAFETY: this many were written.
     unsafe { list.set_len(count) };
     list
 }
@@ -128,10 +128,10 @@ fn a_tracker_by_every_function_of_the_header() {
     let status = unsafe { hoid_tracker_save(tracker, ptr::null_mut(), 0, &mut length) };
     assert_eq!(status, HOID_OK);
     let mut bytes = Vec::<u8>::with_capacity(length);
-    // SAFETY: room for so many.
+    // SAFETY: room for this many.
     let status = unsafe { hoid_tracker_save(tracker, bytes.as_mut_ptr(), length, &mut length) };
     assert_eq!(status, HOID_OK);
-    // SAFETY: so many were written.
+    // SAFETY: this many were written.
     unsafe { bytes.set_len(length) };
     let mut second = ptr::null_mut();
     // SAFETY: a slice, a place on the stack.

@@ -43,7 +43,7 @@ fn saved(tracker: &Owned) -> Vec<u8> {
     let status = unsafe { hoid_tracker_save(tracker.0, ptr::null_mut(), 0, &mut length) };
     assert_eq!(status, HOID_OK);
     let mut bytes = vec![0; length];
-    // SAFETY: room for so many.
+    // SAFETY: room for this many.
     let status = unsafe { hoid_tracker_save(tracker.0, bytes.as_mut_ptr(), length, &mut length) };
     assert_eq!(status, HOID_OK);
     bytes

@@ -122,7 +122,7 @@ pub enum IdentError {
         /// The parameters there are.
         available: String,
     },
-    /// An option that makes no sense, alone or with the others.
+    /// An option that is not valid, alone or with the others.
     #[error("{option}: found {found}; expected {expected}")]
     BadOption {
         /// The option.

@@ -20,8 +20,7 @@ pub(crate) fn shown(text: &str) -> String {
 /// The longest name of a column in a message, characters.
 const NAMED: usize = 80;
 
-/// The name of a column for a message: as it stands, except for its length and what a terminal
-/// obeys.
+/// The name of a column for a message: unchanged, except for its length and what a terminal obeys.
 pub(crate) fn named(name: &str) -> String {
     let mut text = String::with_capacity(name.len().min(4 * NAMED));
     for (at, character) in name.chars().enumerate() {

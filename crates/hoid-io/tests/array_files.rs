@@ -148,7 +148,7 @@ fn variables_of_matlab() {
         if name != "mat/h5py_v73.mat" {
             close(channel(&read(&name, "e", "u"), "wide(2,:)"), &times(3.0, &u()));
         }
-        // Elements of structures, in full and by their end, at the time that stands nearest.
+        // Elements of structures, in full and by their end, at the time that is nearest.
         for run in 1..=3_i32 {
             let factor = f64::from(run);
             for path in ["run", "data.run"] {

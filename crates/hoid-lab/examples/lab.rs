@@ -4,8 +4,8 @@
 //! Three operators: those of C1 and C2, and a gain with a lag before 4/s, each with a remnant of first order whose
 //! variance is a tenth of that of u. The operator sees e at each tick; the record has every tenth, which estimators
 //! take for held: their delay is half a sample shorter. Reported: bias of each parameter in percent with its standard
-//! error, and the part of the intervals of 95 % that hold the truth. Besides, in how many runs the live estimate
-//! determines a lag, its form unknown, and how far from the truth.
+//! error, and the part of the intervals of 95 % that hold the truth. Also in how many runs the live estimate determines
+//! a lag, its form unknown, and how far from the truth.
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
 #[path = "../tests/common/page.rs"]

@@ -37,7 +37,7 @@ pub struct Config {
     pub live: LiveFor,
     /// The recursive method of the live estimate, as `hoid track --method` has it.
     pub method: String,
-    /// What makes a run unverified besides a bit that differs.
+    /// What makes a run unverified other than a bit that differs.
     pub limits: Limits,
     /// The tracked signal, and how often.
     pub condition: Vec<Condition>,
@@ -80,7 +80,7 @@ pub enum Display {
     Preview,
 }
 
-/// What makes a run unverified besides a bit that differs.
+/// What makes a run unverified other than a bit that differs.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Limits {

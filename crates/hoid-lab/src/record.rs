@@ -1,5 +1,5 @@
 //! A run as a record that all commands of hoid read: every tenth tick, e and u of that instant, target, disturbance and
-//! output besides, and e as it was on the screen. t = 0 is the start of the measurement.
+//! output in addition, and e as it was on the screen. t = 0 is the start of the measurement.
 
 use hoid_model::{Channel, Record, SampleTime};
 

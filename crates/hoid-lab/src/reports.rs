@@ -1,6 +1,6 @@
 //! Pages about a session, made by the program `hoid` itself: what `identify`, `track` and `describe`
-//! say of each run, and what `group` says of all people so far. It runs as a process of its own, on
-//! one core, so that nothing of it can end or hold up an experiment.
+//! report about each run, and what `group` states of all people so far. It runs as a process of its
+//! own, on one core, so that nothing of it can end or hold up an experiment.
 
 use std::{
     path::{Path, PathBuf},

@@ -91,7 +91,7 @@ struct LoggedBefore {
     verified: Vec<Stem>,
 }
 
-/// A session whose disk is full from a batch on, for so many batches.
+/// A session whose disk is full from a batch on, for a given number of batches.
 fn session(out: &Path, full: usize, until: usize, told: &mut LoggedBefore) -> Option<Session> {
     let ballast = out.join("ballast");
     let mut session = Session::begin(out, &config(), "P01", false).ok()?;

@@ -60,7 +60,7 @@ fn served_by(server: Server) -> At {
 }
 
 impl At {
-    /// The reply to a request as it stands.
+    /// The reply to a request unchanged.
     fn raw(&self, request: &[u8]) -> String {
         let mut stream = TcpStream::connect(&self.host).unwrap();
         stream.set_read_timeout(Some(Duration::from_secs(10))).unwrap();

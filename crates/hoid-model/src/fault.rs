@@ -58,7 +58,7 @@ pub enum FaultHandling {
     Bridge,
     /// The record is cut at all of them.
     Cut,
-    /// They are not looked for.
+    /// They are not searched for.
     Keep,
 }
 
@@ -163,7 +163,7 @@ impl fmt::Display for Fault {
     }
 }
 
-/// A number of so many significant digits, without trailing zeros.
+/// A number of a given number of significant digits, without trailing zeros.
 fn short(value: f64, digits: usize) -> String {
     if value == 0.0 || !value.is_finite() {
         return value.to_string();

@@ -4,7 +4,7 @@
 //! significant digits and the value with the same decimals (ISO/IEC Guide 98-3, 7.2.6). Numbers
 //! without a standard error get five significant digits.
 
-/// Stands where there is no number.
+/// Used where there is no number.
 pub const DASH: &str = "\u{2013}";
 
 /// Two-sided 95 % point of the normal distribution.

@@ -119,7 +119,7 @@ impl PyDescription {
         Ok(Some(all))
     }
 
-    /// Share of the power of u off the lines, and with the part at the lines.
+    /// Share of the power of u at non-excited frequencies, and with the part at the lines.
     #[getter]
     fn remnant(&self) -> (ValueWithError, ValueWithError) {
         let function = &self.0.found.function;

@@ -99,7 +99,7 @@ fn method(options: &Bound<'_, PyDict>) -> Outcome<Method> {
     Ok(method)
 }
 
-/// For an earlier name of a recursive method that of now, and the sentence that reports it.
+/// For an earlier name of a recursive method the current one, and the sentence that reports it.
 #[pyfunction]
 pub fn renamed_method(name: &str) -> Option<(&'static str, String)> {
     hoid_survey::renamed(name)

@@ -72,7 +72,7 @@ pub fn simulate<'py>(
             if has_remnant || noise_level.is_some() || noise_definition.is_some() {
                 return Err(bad_option(
                     "remnant_order, remnant_time_constant, noise_level and noise_definition are of the thesis's \
-                     remnant: in a scenario with a form the tables [[remnant]] say it",
+                     remnant: in a scenario with a form the tables [[remnant]] specify it",
                 ));
             }
             if let Some(ts) = sample_time {

@@ -77,7 +77,7 @@ impl OperatorRun {
         self.respond();
     }
 
-    /// Where it stands, as numbers.
+    /// Its position, as numbers.
     pub fn saved(&self) -> Vec<f64> {
         let mut numbers = vec![self.k as f64];
         numbers.extend(self.operator);
@@ -86,8 +86,8 @@ impl OperatorRun {
         numbers
     }
 
-    /// Goes on from where an operator of the same scenario and run stood ([`OperatorRun::saved`]), with the same
-    /// digits. False if the numbers are of another; then nothing has changed.
+    /// Goes on from where an operator of the same scenario and run was ([`OperatorRun::saved`]), with the same digits.
+    /// False if the numbers are of another; then nothing has changed.
     pub fn restore(&mut self, numbers: &[f64]) -> bool {
         let Some(([k], rest)) = numbers.split_first_chunk::<1>() else {
             return false;

@@ -14,7 +14,7 @@
 //!
 //! Operator and controlled element are in controllable canonical form (states: output and rate of
 //! `1/den`). The operator's gains are in its output matrix; those of the controlled element where
-//! [`Realisation`] says. When parameters change, the matrices of each sample are those of the
+//! [`Realisation`] states. When parameters change, the matrices of each sample are those of the
 //! continuous model with the values at that sample.
 
 use std::ops::Range;

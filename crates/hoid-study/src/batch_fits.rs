@@ -26,7 +26,7 @@ pub(crate) struct BatchFits {
 }
 
 impl BatchFits {
-    /// All fits that these estimators need of these runs. None when `go_on` says no before one of
+    /// All fits that these estimators need of these runs. None when `go_on` states no before one of
     /// them.
     pub fn of(
         estimators: &[(&EstimatorCell, Task)],

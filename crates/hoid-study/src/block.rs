@@ -52,7 +52,7 @@ pub(crate) fn blocks(plan: &Plan) -> Vec<Block> {
     all
 }
 
-/// Runs a block. `done` is called with the number of estimates made; none when `go_on` says no.
+/// Runs a block. `done` is called with the number of estimates made; none when `go_on` states no.
 pub(crate) fn run_block(
     plan: &Plan,
     schemas: &Schemas,
@@ -109,8 +109,8 @@ struct CellRun<'a> {
 }
 
 impl<'a> CellRun<'a> {
-    /// Estimates of these runs. None when `go_on` says no; it is called before each estimator, some
-    /// of which take a tenth of a second.
+    /// Estimates of these runs. None when `go_on` states no; it is called before each estimator,
+    /// some of which take a tenth of a second.
     fn estimate_all(
         &mut self,
         simulator: &Simulator,

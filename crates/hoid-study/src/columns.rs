@@ -64,7 +64,7 @@ impl Rows {
         }
     }
 
-    /// Sets a number of the row; a column that the table does not have is not looked for twice:
+    /// Sets a number of the row; a column that the table does not have is not searched for twice:
     /// plans decide which there are.
     pub fn real(&mut self, name: &str, value: f64) {
         if let Some(ColumnValues::Real(values)) = self.column(name)

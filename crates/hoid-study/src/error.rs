@@ -131,7 +131,7 @@ pub enum StudyError {
     },
     /// A directory without runs.
     #[error(
-        "no file in {directory} is called {pattern}; it has {found}: say by --pattern what their names mean, as {{subject}}_{{run}}.csv"
+        "no file in {directory} is called {pattern}; it has {found}: state by --pattern what their names mean, as {{subject}}_{{run}}.csv"
     )]
     NoRuns {
         /// The directory.

@@ -66,10 +66,9 @@ pub struct Outcome {
 /// is called before each estimate, and what it stops can be resumed.
 ///
 /// # Errors
-/// [`StudyError::Occupied`] when the directory holds a study without `resume`,
-/// [`StudyError::OtherStudy`] when it is another one, [`StudyError::SourceThere`] where a plan stands
-/// that is another, [`StudyError::Io`] when a file cannot be written or another process works on the
-/// directory.
+/// [`StudyError::Occupied`] when the directory holds a study without `resume`, [`StudyError::OtherStudy`] when it is
+/// another one, [`StudyError::SourceThere`] if there is another plan, [`StudyError::Io`] when a file cannot be written
+/// or another process works on the directory.
 pub fn run(
     plan: &Plan,
     directory: &Path,

@@ -69,7 +69,7 @@ fn a_virtual_experiment_has_its_truth_beside_it() {
     assert!(z.iter().all(|z| z.abs() < 5.0), "{z:?}");
     assert!((z.iter().sum::<f64>() / 16.0).abs() < 1.0, "{z:?}");
 
-    // Troubles: an uneven t is refused as it stands and read when it is to be resampled.
+    // Troubles: an uneven t is refused unchanged and read when it is to be resampled.
     let troubled = VirtualExperiment {
         subjects: 1,
         runs: 1,

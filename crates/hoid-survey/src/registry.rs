@@ -93,7 +93,7 @@ pub fn method(text: &str) -> Result<Method, IdentError> {
     found.ok_or_else(|| bad("the method", text.to_owned(), &format!("one of {}", names.join(", "))))
 }
 
-/// For an earlier name of a method that of now, and the sentence that reports it.
+/// For an earlier name of a method the current one, and the sentence that reports it.
 pub fn renamed(text: &str) -> Option<(&'static str, String)> {
     let earlier = plain(text);
     let found = methods()

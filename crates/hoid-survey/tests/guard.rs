@@ -150,7 +150,7 @@ fn what_was_found_and_done_is_told_with_its_place() {
     }
     use {GuardAction as A, GuardKind as K};
     assert_eq!(told[0], (K::Outlier, A::Held, 4000, 1));
-    // Beginning and end of the gap, of the larger span and of the frozen one.
+    // Start and end of the gap, of the larger span and of the frozen one.
     let of = |kind: K, action: A| told.iter().find(|t| (t.0, t.1) == (kind, action));
     assert!(of(K::Missing, A::Resumed).is_some(), "{told:?}");
     let level = of(K::Level, A::Restarted).unwrap();

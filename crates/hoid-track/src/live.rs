@@ -15,7 +15,7 @@ use hoid_ident::{Choice, IdentError};
 /// What makes the options of a record of the warm-up, with what was searched for them.
 pub type Choose<'a> = &'a dyn Fn(&Record) -> Result<(TrackOptions, Option<Choice>), IdentError>;
 
-/// Share of the warm-up that is collected besides after a fit that failed.
+/// Share of the warm-up that is collected in addition after a fit that failed.
 const QUARTER: usize = 4;
 /// For a warm-up that goes on, so many times its length is kept.
 const KEPT: usize = 2;

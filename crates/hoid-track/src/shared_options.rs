@@ -13,7 +13,7 @@ use crate::{forgetting::ForgettingRule, memory::MemoryOptions};
 /// How far the variances of P may grow where nothing excites a parameter.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum WindupGuard {
-    /// As far as forgetting takes them: equations 5.26 and 31 of the thesis as they stand.
+    /// As far as forgetting takes them: equations 5.26 and 31 of the thesis unchanged.
     Off,
     /// To this multiple of what they are at the start.
     Bound(f64),

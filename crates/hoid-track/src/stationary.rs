@@ -30,7 +30,7 @@ use crate::{
 
 /// Share of the typical size within which a signal is stationary.
 const SHARE: f64 = 0.02;
-/// Stands of both signals, and of one of them, from which nothing arrives, s, and least samples of one.
+/// Stationary spans of both signals, and of one of them, from which nothing arrives, s, and least samples of one.
 pub(crate) const BOTH_S: f64 = 1.0;
 const ONE_S: f64 = 5.0;
 const LEAST: u64 = 20;
@@ -91,7 +91,7 @@ impl BufferedSample {
     }
 }
 
-/// How long a signal has stood, and how large it usually is.
+/// How long a signal has been stationary, and how large it usually is.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Channel {
     /// Value at which the stand started, samples after it, and the last samples that are the same number.
@@ -178,8 +178,8 @@ impl Channel {
 /// The watch of a recursion.
 #[derive(Debug, Clone)]
 pub(crate) struct StationaryWatch {
-    /// Samples of stands of both and of one from which nothing arrives, of a block, until the filters
-    /// have settled.
+    /// Lengths in samples of stationary spans of both signals and of one from which nothing arrives, of a block, until
+    /// the filters have settled.
     both: u64,
     one: u64,
     block: u64,

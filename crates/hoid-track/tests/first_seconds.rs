@@ -1,4 +1,4 @@
-//! What `adaptive` says of virtual people in their first seconds: from the second second on, with
+//! What `adaptive` states of virtual people in their first seconds: from the second second on, with
 //! bands that hold.
 #![allow(clippy::unwrap_used)]
 

@@ -1,4 +1,5 @@
-//! Parameters of virtual people by `adaptive`: within their errors, or not said to be determined.
+//! Parameters of virtual people by `adaptive`: within their errors, or not reported to be
+//! determined.
 #![allow(clippy::unwrap_used)]
 
 use hoid_model::uncertainty::Estimate;

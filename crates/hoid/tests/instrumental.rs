@@ -267,7 +267,7 @@ fn pem(nk: usize) -> impl Fn(&Record) -> Result<Fit, IdentError> {
     move |record| Estimator::new(Structure::BoxJenkins, Structure::BoxJenkins.operator_orders(nk)).fit(one(record))
 }
 
-/// The mean within so many of its standard errors and a share of the truth.
+/// The mean within a given number of its standard errors and a share of the truth.
 fn assert_unbiased(label: &str, samples: &[Sample], errors: f64, share: f64) {
     for ((sample, truth), name) in samples.iter().zip(truth()).zip(NAMES) {
         let distance = (sample.mean() - truth).abs();

@@ -146,7 +146,12 @@ fn describing_functions_are_those_of_the_table() {
             row.coherence,
             0.005 + 1e-9,
         );
-        check("off the lines", h.off_line_share, row.off_line_share, 0.005 + 1e-9);
+        check(
+            "at non-excited frequencies",
+            h.off_line_share,
+            row.off_line_share,
+            0.005 + 1e-9,
+        );
         // With the plant as it answered, after its hold of half a tick.
         let (by_ratio, by_phase) = (measured.crossover_rad_s.unwrap(), measured.phase_margin_deg.unwrap());
         println!("  with the plant measured: {}, {}", shown(by_ratio), shown(by_phase));

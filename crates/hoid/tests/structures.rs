@@ -314,7 +314,7 @@ fn records_without_input_are_told_from_those_with() {
     assert!(v.cross_correlation.lags.is_empty() && v.quality.vaf_simulation == 0.0);
     assert!(v.quality.vaf_prediction > 50.0);
     assert!(fit.operator().is_err());
-    // A record with an input serves as well; the input is not looked at.
+    // A record with an input serves as well; the input is not examined.
     let with = Truth::of(Structure::Arx).record(200, 1.0, 2);
     assert!(estimator(Structure::Ar).fit(&[with]).is_ok());
 }

@@ -2,7 +2,7 @@
 
 A result has a native side that is computed and cannot be stored. Its pickle holds what the native
 side reports about itself, and the call that made it. So a result comes back at once and with the same
-digits; what is asked of it that was not said before (a prediction on another record, a page) makes
+digits; what is asked of it that was not reported before (a prediction on another record, a page) makes
 the native side again, once, by the same call on the same data, and compares.
 """
 

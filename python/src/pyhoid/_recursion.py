@@ -40,7 +40,7 @@ _OF_METHODS = {name for *_, keywords in _pyhoid.recursive_methods() for name in 
 
 
 def name_of_now(method: RecursiveMethod) -> RecursiveMethod:
-    """The name of a method; of an earlier name that of now, with a warning to who called."""
+    """The name of a method; of an earlier name the current one, with a warning to who called."""
     renamed = _pyhoid.renamed_method(method) if isinstance(method, str) else None
     if renamed is None:
         return method

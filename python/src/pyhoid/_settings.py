@@ -283,7 +283,7 @@ class BatchSettings(TypedDict, total=False):
     # For pem.
     coefficient_prior: Mapping[str, tuple[float, float]] | None
 
-    # Loss of Huber instead of squares: residuals beyond so many standard deviations count
+    # Loss of Huber instead of squares: residuals beyond a given number of standard deviations count
     # linearly; of no number 1.345. For pem.
     robust: float | bool | None
 
@@ -468,7 +468,7 @@ BATCH_SETTINGS = """noise : Literal['ar', 'arma', 'remnant']
             Guesses of coefficients with a weight W, as f1=-1.9:0.5: the loss grows by W (f1 +
             1.9)^2. For pem.
         robust : float | bool
-            Loss of Huber instead of squares: residuals beyond so many standard deviations count
+            Loss of Huber instead of squares: residuals beyond a given number of standard deviations count
             linearly; of no number 1.345. For pem.
         stable : bool
             Take only models that are stable from e to u (C and F always are stable). For pem.

@@ -260,7 +260,7 @@ class Description:
         Crossover frequency (rad/s), phase margin (deg), gain margin (dB) and its frequency, each an
         Estimate or None; None without a controlled element.
     remnant_share, noise_ratio : Estimate
-        Share of the power of u off the lines, and with its part at the lines (P_n).
+        Share of the power of u at non-excited frequencies, and with its part at the lines (P_n).
     verdict : {"trustworthy", "doubtful", "not determined"}
         What the result is worth.
     reasons, notes : list of str
@@ -304,7 +304,7 @@ class Description:
         parts = [f"Verdict: {self.verdict}", *(f"- {reason}" for reason in self.reasons)]
         parts.append(repr(self.function))
         parts.extend(f"{name}: {value}" for name, value in (self.open_loop or {}).items())
-        parts.append(f"remnant: {self.remnant_share} of the power of u off the lines")
+        parts.append(f"remnant: {self.remnant_share} of the power of u at non-excited frequencies")
         return "\n".join(parts)
 
 

@@ -91,7 +91,7 @@ class OperatorFit(Model, Result):
     intersample : dict
         What e does between its samples: ``used`` (``"auto"``, ``"zoh"`` or ``"foh"``), and
         ``tau_e_if_straight``, the delay in s if e was logged from what is faster or continuous; None
-        where the data show or `intersample` says what e does.
+        where the data show or `intersample` states what e does.
     prior : dict of str to (float, float)
         Centre, and standard deviation of the logarithm.
     loss, innovation_variance : float

@@ -310,7 +310,7 @@ def info(
     ----------
     path : path
     input, output, excitation : str, optional
-        Columns that are known, which are not looked for; ``excitation="none"`` looks for none.
+        Columns that are known, which are not searched for; ``excitation="none"`` looks for none.
     controlled_element : str, optional
         As ``"90/(s(s+6))"``: with it and a column y it is found by how many samples the control was
         recorded late.

@@ -42,7 +42,7 @@ class Tracker(_pyhoid.Tracker):
         What the person controls, as in `track`: then `crossover` and `phase_margin` are reported.
     decimate : "auto", "off" or int
         As in `track`: above 200 Hz every n-th sample is tracked by default, .15 s after the last one
-        taken; between them the estimate stays, and `step` returns NaN. `decimation` says what is
+        taken; between them the estimate stays, and `step` returns NaN. `decimation` states what is
         done.
     record : Record, optional
         A record to start from, instead of the warm-up: its fit is the start, and the filters have

@@ -2,7 +2,7 @@
 
 A mark is a comment of HTML, which readers do not see:
 
-| mark | says |
+| mark | states |
 |---|---|
 | `<!-- file: NAME -->` | the block is the file of this name, which blocks after it use |
 | `<!-- given: CODE -->` | what the reader has already: run before the block, with it |

@@ -86,7 +86,7 @@ class Reader:
                     f"no line of the output is {shown}"
                 )
         else:
-            what = "say by a mark which file it is" if block.language == "toml" else "no such block"
+            what = "state by a mark which file it is" if block.language == "toml" else "no such block"
             raise AssertionError(f"a block of {block.language!r}: {what}")
         then = block.mark("then")
         if then:

@@ -1,4 +1,4 @@
-"""What a place tells, and how it is compared."""
+"""The output of a place, and its comparison."""
 
 from __future__ import annotations
 

@@ -85,16 +85,16 @@ pub enum Blemish {
     Offset(f64),
     /// The stick reads in steps of this part of the rms of u, in the loop.
     Quantised(f64),
-    /// The stick ends at so many rms of u, in the loop.
+    /// The stick ends at a given number of rms of u, in the loop.
     Saturated(f64),
-    /// Every 50 s in the mean one recorded sample of u is off by so many standard deviations of the
-    /// innovations.
+    /// Every 50 s in the mean one recorded sample of u is off by a given number of standard
+    /// deviations of the innovations.
     Glitches(f64),
     /// Recorded e and u are NaN for 3 s from 60 s on.
     Missing,
     /// They are zero for 3 s from 60 s on.
     Silent,
-    /// No one acts and nothing moves for the first so many seconds.
+    /// No one acts and nothing moves for the first a given number of seconds.
     IdleStart(f64),
     /// From so many seconds on u is recorded with the wrong sign.
     Polarity(f64),

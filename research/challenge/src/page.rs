@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use super::{cases::cases, measure::Line, tables::tables};
 
-/// The page; `measured` says when, how, and with how many runs.
+/// The page; `measured` states when, how, and with how many runs.
 pub fn page(lines: &[Line], measured: &str) -> String {
     let mut text = format!(
         "# The challenge: cases that can refute a tracker\n\n{measured}\n\n\

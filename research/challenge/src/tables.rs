@@ -298,7 +298,7 @@ fn in_order<'a>(names: impl Iterator<Item = &'a str>) -> Vec<&'a str> {
 }
 
 /// A row for each case and a column for each method, in as many tables, one below the other, as a page needs that has
-/// room for so many methods next to each other.
+/// room for this many methods next to each other.
 fn by_case(text: &mut String, cases: &[&str], methods: &[&str], beside: usize, cell: impl Fn(&str, &str) -> String) {
     let each = methods.len().div_ceil(methods.len().div_ceil(beside).max(1)).max(1);
     for (i, some) in methods.chunks(each).enumerate() {

@@ -19,7 +19,7 @@ use hoid_sim::{
 };
 use rayon::prelude::*;
 
-/// u comes later by so many samples from a share of the record on.
+/// u comes later by a given number of samples from a share of the record on.
 fn late(record: &Record, share: f64, by: usize) -> Record {
     let at = (share * record.len() as f64) as usize;
     let late = |t: usize| record.output()[if t >= at { t.saturating_sub(by) } else { t }];

@@ -39,7 +39,7 @@ fn simulator(condition: Condition, remnant_order: usize, level: f64) -> Simulato
     Simulator::new(&scenario(condition, remnant_order, level)).unwrap()
 }
 
-/// Seed 7000; the method was set on seed 9000, and looked at on seed 5000.
+/// Seed 7000; the method was set on seed 9000, and examined on seed 5000.
 fn run(simulator: &Simulator, condition: Condition, order: usize, level: usize, replication: u64) -> Record {
     let run_seed = RunSeed {
         seed: 7000,

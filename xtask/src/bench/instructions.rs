@@ -55,7 +55,7 @@ pub fn gate(program: &Path, data: &Path, keep: bool) -> Result<(), String> {
     match (over, same_compiler) {
         (false, _) => Ok(()),
         (true, true) => Err(format!(
-            "a task takes more than {:.0} % more instructions than {KEPT} says; repair it, or keep the new numbers with \
+            "a task takes more than {:.0} % more instructions than {KEPT} states; repair it, or keep the new numbers with \
              `cargo xtask bench --instructions --keep` and give the reason",
             100.0 * ALLOWED
         )),

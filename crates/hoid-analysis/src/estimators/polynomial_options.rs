@@ -131,7 +131,7 @@ fn by_prediction() -> Vec<BatchOption<Polynomials>> {
     let focus = "What the model is to be good at: one-step prediction, or simulation from the input alone";
     let start = "Start of the search, all coefficients as f1=-1.9,f2=.92,b0=.04,...";
     let guess = "Guesses of coefficients with a weight W, as f1=-1.9:0.5: the loss grows by W (f1 + 1.9)^2";
-    let robust = "Loss of Huber instead of squares: residuals beyond so many standard deviations count linearly; of no number 1.345";
+    let robust = "Loss of Huber instead of squares: residuals beyond a given number of standard deviations count linearly; of no number 1.345";
     let stable = "Take only models that are stable from e to u (C and F always are stable)";
     let mut all = vec![
         BatchOption::new(

@@ -1,9 +1,8 @@
 //! One look at a file: what its columns are, what excites the loop and in which span of whole periods, and
 //! by how much the control was recorded late.
 //!
-//! Command line, groups and Python look at a file by this alone, and nothing is chosen silently: what is
-//! found is shown, with the evidence, as [`Advice`] on how to read the file. What was asked for is not looked
-//! for.
+//! Command line, groups and Python look at a file by this alone, and nothing is chosen silently: what is found is
+//! shown, with the evidence, as [`Advice`] on how to read the file. What was asked for is not searched for.
 //!
 //! | file | what it finds |
 //! |---|---|

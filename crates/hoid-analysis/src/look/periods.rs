@@ -63,7 +63,7 @@ pub(super) fn search(record: &Record, known: &LookOptions) -> Result<Periods, St
     let found = candidates.iter().find_map(|channel| in_channel(record, channel, known));
     found.ok_or_else(|| {
         if candidates.is_empty() {
-            return "there is no column besides error and control".to_owned();
+            return "there is no column other than error and control".to_owned();
         }
         format!(
             "no column among {} has its power in lines over whole periods; name one by --excitation and its span by --from and --to",

@@ -26,9 +26,9 @@ pub struct Tracking {
     pub start_span_s: Option<(f64, f64)>,
     /// Time from which the estimate moves, s.
     pub update_from_s: Option<f64>,
-    /// The trace is the mean over so many seconds.
+    /// The trace is the mean over a given number of seconds.
     pub moving_average_s: Option<f64>,
-    /// Every so many samples of the recording give a row.
+    /// Every n samples of the recording give a row.
     pub every: usize,
     /// The rate at which it is tracked.
     pub rate: Decimation,

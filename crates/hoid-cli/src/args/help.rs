@@ -8,7 +8,7 @@ use clap::{Arg, Command, CommandFactory};
 
 use super::Cli;
 
-/// Report of help on a command besides its options.
+/// Report of help on a command other than its options.
 struct Help {
     command: &'static str,
     examples: &'static [&'static str],

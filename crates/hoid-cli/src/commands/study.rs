@@ -81,8 +81,8 @@ fn run_plan(args: &StudyRunArgs) -> Result<(), CliError> {
     Ok(())
 }
 
-/// Runs a plan or a group, by its name, into a directory with a progress bar of so many units; an
-/// interrupt stops it so that it can be resumed.
+/// Runs a plan or a group, by its name, into a directory with a progress bar of a given number of
+/// units; an interrupt stops it so that it can be resumed.
 pub fn with_progress(
     name: &str,
     directory: &Path,

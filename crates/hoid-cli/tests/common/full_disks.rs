@@ -24,7 +24,7 @@ pub struct Outcome {
     pub failures: Vec<String>,
 }
 
-/// So many rounds of a work; none if no disk of its own can be mounted.
+/// A given number of rounds of a work; none if no disk of its own can be mounted.
 pub fn rounds(bench: &Bench, work: &Work, count: usize, draw: &mut Draw) -> Option<Outcome> {
     let whole = bench.place(work, "whole");
     fs::create_dir_all(&whole).unwrap();

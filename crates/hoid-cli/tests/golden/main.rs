@@ -1,4 +1,4 @@
-//! The golden set: recorded answers of the program. They say what changed when something was moved.
+//! The golden set: recorded answers of the program. They show what changed when something was moved.
 //!
 //! `fixtures/golden/calls.toml` lists the inputs and the calls, `fixtures/golden/command-line/` holds an
 //! answer each. Inputs are simulated here, in a folder that is thrown away. `python/tests/test_golden.py`

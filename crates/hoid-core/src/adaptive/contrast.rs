@@ -186,7 +186,8 @@ mod tests {
         all
     }
 
-    /// Mean and its standard error of T over so many pairs of 60 blocks before and 10 now, and by the model alone.
+    /// Mean and its standard error of T over a given number of pairs of 60 blocks before and 10 now, and by the model
+    /// alone.
     fn mean_distance(noise_pole: f64, runs: usize, seed: u64) -> [f64; 3] {
         let mut random = seed;
         let (mut sum, mut square, mut by_model) = (0.0, 0.0, 0.0);

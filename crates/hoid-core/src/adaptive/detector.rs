@@ -103,12 +103,12 @@ impl Statistic {
     }
 }
 
-/// Expectation of the logarithm of a chi-square with so many pairs of degrees of freedom.
+/// Expectation of the logarithm of a chi-square with a given number of pairs of degrees of freedom.
 fn mean_log(pairs: u32) -> f64 {
     MEAN_LOG + (1..pairs).map(|k| 1.0 / f64::from(k)).sum::<f64>()
 }
 
-/// `-ln P(chi^2 > x)` for a chi-square with so many pairs of degrees of freedom.
+/// `-ln P(chi^2 > x)` for a chi-square with a given number of pairs of degrees of freedom.
 fn log_significance(x: f64, pairs: u32) -> f64 {
     let half = 0.5 * x;
     let (mut term, mut sum) = (1.0, 1.0);

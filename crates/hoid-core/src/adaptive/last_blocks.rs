@@ -141,7 +141,7 @@ mod tests {
         assert_eq!(last.all().len(), 2);
         (0..5).for_each(|_| last.skip());
         assert_eq!((last.all().len(), last.fresh()), (1, 0));
-        // Two seconds after it are not looked at.
+        // Two seconds after it are not examined.
         (0..49).for_each(|_| last.take(&ROW));
         assert_eq!(last.all().len(), 1);
         last.take(&ROW);

@@ -510,8 +510,8 @@ mod tests {
     /// The sample of the change: two before the end of block 56.
     const CHANGE: usize = 32 * 56 - 2;
 
-    /// How far the gains are after so many blocks from those of an operator that has changed, over the change, with a
-    /// remnant of four poles; of each block so many samples are its first.
+    /// How far the gains are after a given number of blocks from those of an operator that has changed, over the
+    /// change, with a remnant of four poles; of each block so many samples are its first.
     fn off(first: usize, blocks: usize) -> f64 {
         let point = Point {
             tau: 0.2,

@@ -154,11 +154,11 @@ pub enum Trouble {
     FrozenOutput,
     /// e and u are nearly silent.
     Idle,
-    /// Both are larger by a factor.
+    /// Both are scaled by a factor.
     Larger,
-    /// e is larger by a factor.
+    /// e is scaled by a factor.
     RescaledInput,
-    /// u is larger by a factor.
+    /// u is scaled by a factor.
     RescaledOutput,
     /// e is as u was, and u as e was.
     Swapped,
@@ -481,7 +481,8 @@ mod tests {
         }
     }
 
-    /// The stick is where it rests and e goes on; not so where the person does an unpredicted sample, or e stands too.
+    /// The stick is where it rests and e goes on; not so where the person does an unpredicted sample, or e is
+    /// stationary too.
     #[test]
     fn a_rest_is_not_frozen_but_a_rest_that_does_not_fit_is() {
         let still = block([0.02, 0.0], [0.1, 1.1]);

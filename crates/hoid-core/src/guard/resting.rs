@@ -8,11 +8,11 @@
 //! `n >= 3`, `s >= .05 t`, `T < max(8 s, 2 l)`
 //!
 //! after t seconds. A frozen channel is at whatever the value was, to which u never came back before or hardly ever,
-//! for a distribution without an atom there gives it probability zero; and one that froze within a rest stands longer
-//! than the person ever rested. For a longest of n equally distributed rests the next one is larger with probability
-//! 1/(n+1), whatever their distribution (order statistics; H. A. David and H. N. Nagaraja, *Order Statistics*, 2003,
-//! §2.1); twice as long it is, with exponential rests, with a probability of about `2/((n+1)(n+2))`. The least of 8 s
-//! is for the time in which only a few rests have been seen.
+//! for a distribution without an atom there gives it probability zero; and one that froze within a rest is stationary
+//! longer than the person ever rested. For a longest of n equally distributed rests the next one is larger with
+//! probability 1/(n+1), whatever their distribution (order statistics; H. A. David and H. N. Nagaraja, *Order
+//! Statistics*, 2003, §2.1); twice as long it is, with exponential rests, with a probability of about `2/((n+1)(n+2))`.
+//! The least of 8 s is for the time in which only a few rests have been seen.
 //!
 //! A rest is judged by who calls: e has to move on meanwhile, and the innovations must be no larger than typical.
 

@@ -253,7 +253,7 @@ impl Work<'_> {
         }
         let most = forms.iter().max_by_key(|(_, names)| names.len()).map_or("", |f| f.0);
         let why = format!(
-            "a parameter means the same in one form alone ({all}); say form = \"{most}\" under [analysis] in group.toml and run the group again"
+            "a parameter means the same in one form alone ({all}); write form = \"{most}\" under [analysis] in group.toml and run the group again"
         );
         match self.apart.iter_mut().find(|(known, _)| *known == why) {
             Some((_, names)) => names.push(quantity.to_string()),

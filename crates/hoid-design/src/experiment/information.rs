@@ -191,7 +191,7 @@ impl<'a> Loop<'a> {
         ]
     }
 
-    /// The errors of a forcing function over so many seconds of whole periods.
+    /// The errors of a forcing function over a given number of seconds of whole periods.
     pub fn expected(&self, forcing: &ForcingFunction, length_s: f64) -> Result<Expected, DesignError> {
         if !(length_s.is_finite() && length_s > 0.0) {
             return Err(DesignError::OutOfRange {
@@ -281,7 +281,7 @@ impl<'a> Loop<'a> {
 }
 
 impl Expected {
-    /// The same with errors that are so many times as large.
+    /// The same with errors that are scaled by a factor.
     #[must_use]
     pub fn scaled(&self, by: f64) -> Self {
         let of = |e: &Estimate| Estimate {

@@ -146,7 +146,7 @@ pub(super) unsafe fn list<'a, T>(pointer: *const T, count: usize) -> Done<&'a [T
     if pointer.is_null() || !pointer.is_aligned() {
         return Err("a list is null or not aligned".to_owned());
     }
-    // SAFETY: not null, aligned; that there are so many is the contract.
+    // SAFETY: not null, aligned; that there are this many is the contract.
     Ok(unsafe { slice::from_raw_parts(pointer, count) })
 }
 

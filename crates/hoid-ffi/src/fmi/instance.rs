@@ -201,7 +201,7 @@ impl Instance {
             model.take(&given, time_of(self.k));
             self.k += 1;
         }
-        // Information of a model about its next sample is not said before its time.
+        // Information of a model about its next sample is not reported before its time.
         if model.speaks_at_once() || time_of(self.k) <= self.end_s + OFF * ts {
             self.values.splice(self.first_output.., model.outputs());
         }

@@ -31,7 +31,7 @@ const DIFFERENT: f64 = 3.0;
 const LEVEL: f64 = 2.0;
 
 /// Name of a quantity, and its estimates by the first fit and by the other.
-type Beside = (String, Estimate, Estimate);
+type ComparedEstimate = (String, Estimate, Estimate);
 
 /// Trend removed from the records.
 #[derive(Debug, Clone, Copy)]
@@ -53,7 +53,7 @@ impl Without {
     }
 
     /// A doubt where fits differ in any of these.
-    fn finding(self, pairs: impl IntoIterator<Item = Beside>) -> Option<Finding> {
+    fn finding(self, pairs: impl IntoIterator<Item = ComparedEstimate>) -> Option<Finding> {
         let differ: Vec<String> = pairs
             .into_iter()
             .filter_map(|(name, first, other)| {
@@ -85,8 +85,12 @@ impl Without {
     }
 }
 
-/// What the same fit to the records without each of `all` says; `again` gives the quantities of both fits.
-fn opinions(all: &[Without], records: &[Record], again: impl Fn(&[Record]) -> Option<Vec<Beside>>) -> Vec<Finding> {
+/// What the same fit to the records without each of `all` states; `again` gives the quantities of both fits.
+fn opinions(
+    all: &[Without],
+    records: &[Record],
+    again: impl Fn(&[Record]) -> Option<Vec<ComparedEstimate>>,
+) -> Vec<Finding> {
     let asked = |without: &Without| without.finding(again(&without.records(records)?)?);
     all.iter().filter_map(asked).collect()
 }
@@ -101,8 +105,8 @@ pub fn of_polynomials(
     let all = [Without::SamplesThatStandOut, Without::WhatIsSlow(slow_period_s(fit))];
     opinions(&all, records, |others| {
         let other = again(estimator, fit, others)?;
-        let mut pairs = parameters_beside(fit, &other);
-        pairs.extend(loops_beside(fit, &other, element));
+        let mut pairs = compared_parameters(fit, &other);
+        pairs.extend(compared_loops(fit, &other, element));
         Some(pairs)
     })
 }
@@ -130,8 +134,8 @@ pub fn of_grey_box(
     };
     opinions(&Without::ALL, records, |others| {
         let other = estimator.fit(others).ok()?;
-        let mut pairs = beside(fit.parameters(), other.parameters());
-        pairs.extend(loops_beside(fit.polynomial_fit(0), other.polynomial_fit(0), element));
+        let mut pairs = compared(fit.parameters(), other.parameters());
+        pairs.extend(compared_loops(fit.polynomial_fit(0), other.polynomial_fit(0), element));
         Some(pairs)
     })
 }
@@ -171,7 +175,7 @@ pub fn of_family(
             both.filter(|(a, _)| a.determined)
                 .map(|(a, b)| (a.name.clone(), a.estimate(), b.estimate()))
         });
-        let mut pairs: Vec<Beside> = parameters.collect();
+        let mut pairs: Vec<ComparedEstimate> = parameters.collect();
         if let Some((a, b)) = measures(fit).zip(measures(&other)) {
             pairs.push(("the crossover".to_owned(), a.crossover_rad_s, b.crossover_rad_s));
             pairs.push(("the phase margin".to_owned(), a.phase_margin_deg, b.phase_margin_deg));
@@ -199,13 +203,13 @@ pub fn of_sigmoid(estimator: &SigmoidChange, fit: &SigmoidFit, records: &[Record
     }
     if fit.change_found() {
         let named = |of: &SigmoidFit| of.parameters().into_iter().map(|p| (p.name, p.estimate)).collect();
-        return without.finding(beside(named(fit), named(&other)));
+        return without.finding(compared(named(fit), named(&other)));
     }
     let constant = |of: &SigmoidFit| {
         let found = &of.constant_operator().parameters;
         found.iter().map(|p| (p.name.to_owned(), p.estimate)).collect()
     };
-    without.finding(beside(constant(fit), constant(&other)))
+    without.finding(compared(constant(fit), constant(&other)))
 }
 
 /// What a level that is left in e and u does to a fit of polynomials, by a fit without their means: a
@@ -213,7 +217,7 @@ pub fn of_sigmoid(estimator: &SigmoidChange, fit: &SigmoidFit, records: &[Record
 pub fn of_level(estimator: &Estimator, fit: &Fit, records: &[Record]) -> Option<Finding> {
     let without: Vec<Record> = records.iter().map(|r| r.clone().detrended(Detrend::Mean)).collect();
     let other = again(estimator, fit, &without)?;
-    let moved: Vec<String> = parameters_beside(fit, &other)
+    let moved: Vec<String> = compared_parameters(fit, &other)
         .into_iter()
         .filter_map(|(name, first, other)| {
             let off = (first.value - other.value).abs() / first.standard_error.filter(|e| *e > 0.0)?;
@@ -241,23 +245,23 @@ fn again(estimator: &Estimator, fit: &Fit, records: &[Record]) -> Option<Fit> {
 }
 
 /// The parameters of two fits: the operator's where there is one in both.
-fn parameters_beside(fit: &Fit, other: &Fit) -> Vec<Beside> {
+fn compared_parameters(fit: &Fit, other: &Fit) -> Vec<ComparedEstimate> {
     match (fit.operator(), other.operator()) {
         (Ok(one), Ok(two)) => {
             let named = |of: OperatorEstimate| of.rows().map(|(name, _, estimate)| (name.to_owned(), estimate)).into();
-            beside(named(one), named(two))
+            compared(named(one), named(two))
         }
-        _ => beside(fit.parameters(), other.parameters()),
+        _ => compared(fit.parameters(), other.parameters()),
     }
 }
 
-fn beside(one: Vec<(String, Estimate)>, two: Vec<(String, Estimate)>) -> Vec<Beside> {
+fn compared(one: Vec<(String, Estimate)>, two: Vec<(String, Estimate)>) -> Vec<ComparedEstimate> {
     let pairs = one.into_iter().zip(two);
     pairs.map(|((name, first), (_, other))| (name, first, other)).collect()
 }
 
 /// Crossover and phase margin of two fits with the same controlled element.
-fn loops_beside(fit: &Fit, other: &Fit, element: Option<&ContinuousTransferFunction>) -> Vec<Beside> {
+fn compared_loops(fit: &Fit, other: &Fit, element: Option<&ContinuousTransferFunction>) -> Vec<ComparedEstimate> {
     let Some(element) = element else { return Vec::new() };
     let margins = |of: &Fit| {
         let (low, high) = MANUAL_CONTROL_RANGE_RAD_S;

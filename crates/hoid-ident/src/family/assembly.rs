@@ -44,7 +44,7 @@ pub(super) struct AtLines<'d> {
 }
 
 /// The search of a form that counts next to the one in front.
-pub(super) struct Beside<'a> {
+pub(super) struct OtherForm<'a> {
     pub fit: PredictionFit<'a>,
     pub lines: Option<LineFit>,
     pub weight: f64,
@@ -56,7 +56,7 @@ pub(super) struct Chosen<'p, 'a> {
     pub weight: f64,
     pub lines: AtLines<'p>,
     /// The other forms that count.
-    pub beside: Vec<Beside<'a>>,
+    pub others: Vec<OtherForm<'a>>,
     /// All forms that were compared.
     pub forms: Vec<FormFigures>,
     pub prediction: &'p Prediction<'a>,
@@ -113,7 +113,7 @@ impl<'a> Chosen<'_, 'a> {
             add_bias(&mut errors, found, self.lines.fit.as_ref(), separate, (&others, unseen));
         }
         let mut weighed = vec![in_form(found, &errors, self.weight, separate)?];
-        for other in &self.beside {
+        for other in &self.others {
             let form = self.weighed(other, separate, workspace)?;
             if form.operators.first().is_some_and(knows_the_response) {
                 weighed.push(form);
@@ -240,7 +240,12 @@ impl<'a> Chosen<'_, 'a> {
     }
 
     /// Another form with its errors, made as those of the best form.
-    fn weighed(&self, of: &Beside<'a>, separate: usize, workspace: &mut Workspace) -> Result<WeighedForm, IdentError> {
+    fn weighed(
+        &self,
+        of: &OtherForm<'a>,
+        separate: usize,
+        workspace: &mut Workspace,
+    ) -> Result<WeighedForm, IdentError> {
         let joint = self.joint(&of.fit, of.lines.as_ref(), separate, workspace);
         let found = joint.as_ref().unwrap_or(&of.fit);
         let mut errors = Errors::of(found, self.run_to_run, workspace);
@@ -274,19 +279,19 @@ fn add_bias(
             covariances.add_bias(fit, lines.operator.coordinates());
             if owes.contains(&true) {
                 for other in others {
-                    covariances.add_besides(fit, other, 1.0, |place| owes[place]);
+                    covariances.add_extra_variance(fit, other, 1.0, |place| owes[place]);
                 }
             }
         }
         _ => {
             for other in others {
                 covariances.add_bias(fit, other);
-                covariances.add_besides(fit, other, MORE_WITHOUT_LINES, |_| true);
+                covariances.add_extra_variance(fit, other, MORE_WITHOUT_LINES, |_| true);
             }
             let elements = fit.layout().elements.iter().enumerate().filter(|_| unseen);
             for (place, (coordinate, _)) in elements {
                 let unseen = UNSEEN_WITHOUT_LINES.iter().find(|(of, _)| of == coordinate);
-                covariances.besides[place] += unseen.map_or(0.0, |(_, deviation)| deviation * deviation);
+                covariances.extra_variance[place] += unseen.map_or(0.0, |(_, deviation)| deviation * deviation);
             }
         }
     }

@@ -41,7 +41,7 @@ pub(super) struct Covariances {
     pub model_based: Vec<f64>,
     /// Variances that single elements have in addition. They are not a part of the covariance: the
     /// response is known better than they are, since the elements err together.
-    pub besides: Vec<f64>,
+    pub extra_variance: Vec<f64>,
 }
 
 impl Covariances {
@@ -80,10 +80,16 @@ impl Covariances {
     }
 
     /// Adds `weight d^2` to the variances of single elements, of those that it counts for.
-    pub fn add_besides(&mut self, fit: &PredictionFit<'_>, other: &[f64], weight: f64, counts: impl Fn(usize) -> bool) {
+    pub fn add_extra_variance(
+        &mut self,
+        fit: &PredictionFit<'_>,
+        other: &[f64],
+        weight: f64,
+        counts: impl Fn(usize) -> bool,
+    ) {
         for (place, d) in differences(fit, other) {
             if counts(place) {
-                self.besides[place] += weight * d * d;
+                self.extra_variance[place] += weight * d * d;
             }
         }
     }
@@ -94,7 +100,8 @@ impl Covariances {
         let p = fit.parameters();
         for (i, profile) in profiles.iter_mut().enumerate() {
             let Some((low, high)) = profile else { continue };
-            let ratio = (self.clustered[i * p + i] + self.besides[i]) / (fit.inflation * self.model_based[i * p + i]);
+            let ratio =
+                (self.clustered[i * p + i] + self.extra_variance[i]) / (fit.inflation * self.model_based[i * p + i]);
             if ratio.is_finite() && ratio > 1.0 {
                 let (x, (least, most)) = (fit.eta()[i], fit.criterion.limits[i]);
                 *low = (x - (x - *low) * ratio.sqrt()).max(least);
@@ -228,14 +235,14 @@ pub(super) fn covariances(fit: &PredictionFit<'_>) -> Option<Covariances> {
     Some(Covariances {
         clustered,
         model_based,
-        besides: vec![0.0; p],
+        extra_variance: vec![0.0; p],
     })
 }
 
 /// Adds `factor H^-1 L H^-1`.
 fn add_lines_part(covariance: &mut [f64], factor: f64, fit: &PredictionFit<'_>, inverse: &[f64]) {
     let p = fit.parameters();
-    let l = fit.criterion.beside_at(fit.eta(), &mut Workspace::default()).gram;
+    let l = fit.criterion.additional_at(fit.eta(), &mut Workspace::default()).gram;
     let (inverse, l) = (
         DMatrix::from_row_slice(p, p, inverse),
         DMatrix::from_row_slice(p, p, &l),

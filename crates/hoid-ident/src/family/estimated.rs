@@ -110,7 +110,7 @@ impl Estimated {
         // Of single parameters: with what they are uncertain by in addition.
         let of_parameters = covariances.zip(covariance.clone()).map(|(c, mut of_all)| {
             for (i, &place) in places.iter().enumerate() {
-                of_all[i * places.len() + i] += c.besides[place];
+                of_all[i * places.len() + i] += c.extra_variance[place];
             }
             of_all
         });

@@ -5,7 +5,7 @@ use hoid_model::{Detrend, Form, Record, Structure};
 
 use super::{
     arx_response::ArxResponse,
-    assembly::{AtLines, Beside, Chosen},
+    assembly::{AtLines, Chosen, OtherForm},
     comparison::{Comparison, Tried},
     coordinates::Grid,
     intersample::Intersample,
@@ -125,9 +125,9 @@ impl FamilyEstimator {
         let weight = figures[front].weight;
         let Tried { lines, fit, .. } = tried.remove(front);
         let weights = figures.iter().enumerate().filter(|(i, _)| *i != front);
-        let beside = tried.into_iter().zip(weights).filter(|(_, (_, f))| f.weight > 0.0);
-        let beside = beside.map(|(tried, (_, figures))| {
-            Ok(Beside {
+        let others = tried.into_iter().zip(weights).filter(|(_, (_, f))| f.weight > 0.0);
+        let others = others.map(|(tried, (_, figures))| {
+            Ok(OtherForm {
                 fit: tried.fit?,
                 lines: tried.lines,
                 weight: figures.weight,
@@ -141,7 +141,7 @@ impl FamilyEstimator {
                 fit: lines,
                 why_none: no_lines,
             },
-            beside: beside.collect::<Result<_, IdentError>>()?,
+            others: others.collect::<Result<_, IdentError>>()?,
             forms: figures,
             prediction: &prediction,
             records: &records,

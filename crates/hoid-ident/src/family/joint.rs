@@ -33,7 +33,7 @@ use super::{
     prior::OperatorPrior,
     response_fit::{MeasuredResponse, ResponseCriterion},
 };
-use crate::{criterion::Workspace, grey_box::objective::Beside};
+use crate::{criterion::Workspace, grey_box::objective::AdditionalTerm};
 
 /// Part of V_L that `V_L - V_P` is at least: both are estimates.
 const LEAST_DIFFERENCE: f64 = 0.25;
@@ -74,7 +74,7 @@ pub(super) fn with_lines<'a>(
         )
     };
     let mut criterion = fit.criterion.clone();
-    criterion.beside = Some(Beside {
+    criterion.additional = Some(AdditionalTerm {
         criterion: Arc::new(measured),
         elements: layout.operator_elements(),
         weight: weight * fit.innovation_variance * fit.inflation,
@@ -183,7 +183,7 @@ mod tests {
             (0.0, 1.0),
             (ts, Intersample::Auto),
         );
-        criterion.beside = Some(Beside {
+        criterion.additional = Some(AdditionalTerm {
             criterion: Arc::new(measured),
             elements: 5,
             weight: 0.3,
@@ -191,7 +191,7 @@ mod tests {
         let eta = [&TRUTH[..4], &[0.2837, -0.9, 0.1]].concat();
         let mut workspace = Workspace::default();
         let at = criterion.linearise(&eta, &mut workspace);
-        let beside = criterion.beside_at(&eta, &mut workspace);
+        let beside = criterion.additional_at(&eta, &mut workspace);
         assert!(beside.sum_of_squares > 0.0 && beside.sum_of_squares < at.sum_of_squares);
         assert_eq!((beside.descent[5], beside.descent[6]), (0.0, 0.0));
         for i in 0..eta.len() {

@@ -1,7 +1,7 @@
 //! Where the coordinates of an operator and the coefficients of its noise model are in eta.
 //!
 //! `eta = [coordinates.., c_1 .. c_nc, d_1 .. d_nd]`: those of the operator first, then those of
-//! the noise `v = (C/D) eps`. A coordinate that each record has for itself stands once for each of
+//! the noise `v = (C/D) eps`. A coordinate that each record has for itself appears once for each of
 //! them; the noise is common to all.
 
 use std::ops::Range;

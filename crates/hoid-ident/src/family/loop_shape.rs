@@ -2,8 +2,8 @@
 //! is stable.
 //!
 //! `L = Y Y_c`, Y the sampled response of what was estimated, Y_c exact. With the covariance of real and imaginary part
-//! of `dL/L = dY/Y` at a frequency, a crossing of `|L| = 1` and the phase there move as [`super::open_loop`] says, and
-//! one of the negative real axis by `d omega = -Im(dL/L)/Im(d ln L/d omega)`, so that the gain margin moves by
+//! of `dL/L = dY/Y` at a frequency, a crossing of `|L| = 1` and the phase there move as [`super::open_loop`] states,
+//! and one of the negative real axis by `d omega = -Im(dL/L)/Im(d ln L/d omega)`, so that the gain margin moves by
 //! `-(20/ln 10) (Re(dL/L) + Re(d ln L/d omega) d omega)` dB.
 //!
 //! A closed loop that is not stable becomes stable only when L moves over -1 at some frequency. How many standard errors

@@ -43,7 +43,7 @@ pub(super) struct Mixture {
 }
 
 impl Mixture {
-    /// For these forms; `None` for none. Errors rest on so many clusters.
+    /// For these forms; `None` for none. Errors rest on this number of clusters.
     pub fn of(components: &[Component], clusters: usize) -> Option<Self> {
         let total: f64 = components.iter().map(|c| c.weight).sum();
         if let [only] = components {

@@ -10,11 +10,11 @@
 //!
 //! `min_x sum_j |H(omega_j) - M(omega_j, x)|^2 / |H(omega_j)|^2`,
 //!
-//! which gives an operator back from its own exact model. Its covariance follows from that of
-//! theta to first order, `dx = (J'J)^-1 J' dH`, J the derivatives of M over |H| (the implicit
-//! function theorem without the second derivative, which vanishes where M meets H). What the fit
-//! leaves, [`FamilyConversion::mismatch`], says how far the polynomials are from the form; where it
-//! is large they have none.
+//! which gives an operator back from its own exact model. Its covariance follows from that of theta
+//! to first order, `dx = (J'J)^-1 J' dH`, J the derivatives of M over |H| (the implicit function
+//! theorem without the second derivative, which vanishes where M meets H). What the fit leaves,
+//! [`FamilyConversion::mismatch`], states how far the polynomials are from the form; where it is
+//! large they have none.
 
 use hoid_model::{
     Complex64, FamilyOperator, Form, NotConvertible, PolynomialModel, SampleTime,

@@ -58,7 +58,7 @@ impl LoopMeasures {
         }
     }
 
-    /// With Student's intervals of errors that rest on so many clusters.
+    /// With Student's intervals of errors that rest on this number of clusters.
     pub(super) fn of_few(self, clusters: usize) -> Self {
         Self {
             crossover_interval: reaching(self.crossover_rad_s, quantile(clusters)),
@@ -129,7 +129,7 @@ impl LoopMeasures {
     }
 }
 
-/// So many standard errors to both sides.
+/// A given number of standard errors to both sides.
 fn reaching(of: Estimate, quantile: f64) -> Option<(f64, f64)> {
     let reach = quantile * of.standard_error?;
     Some((of.value - reach, of.value + reach))

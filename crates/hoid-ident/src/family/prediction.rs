@@ -162,7 +162,7 @@ impl<'a> Prediction<'a> {
         let mut weight = start_of_noise.loss;
         let mut found = None;
         for round in 0..ROUNDS {
-            criterion.penalty = unit.iter().map(|p| p.beside(weight)).collect();
+            criterion.penalty = unit.iter().map(|p| p.weighted(weight)).collect();
             let mut minimum = criterion
                 .search(eta, &self.search, None, workspace)
                 .ok_or(IdentError::NoFiniteLoss)?;
@@ -257,7 +257,7 @@ impl<'a> Prediction<'a> {
     ) -> Result<PredictionFit<'a>, IdentError> {
         let (n, states) = (criterion.residuals(), criterion.states());
         let penalty: f64 = criterion.penalty.iter().map(|p| p.at(&minimum.theta)).sum();
-        let beside = criterion.beside_at(&minimum.theta, workspace).sum_of_squares;
+        let beside = criterion.additional_at(&minimum.theta, workspace).sum_of_squares;
         // The noise variance comes from the residuals alone, without the prior and without the lines.
         let mut squares = minimum.at.sum_of_squares - penalty - beside;
         if self.noise_free().is_some() {

@@ -3,8 +3,8 @@
 //! Some seconds of tracking carry little information about the neuromuscular system: its resonance
 //! lies above the frequencies at which people are excited. A weak prior keeps its parameters where
 //! people's are, and does nothing if the data speak. A positive parameter x has a log-normal prior,
-//! `ln x ~ N(ln centre, spread)`, so that the spread is relative. In the criterion it stands as one
-//! more measurement of the parameter (a maximum a posteriori estimate; L. Ljung, *System
+//! `ln x ~ N(ln centre, spread)`, so that the spread is relative. In the criterion it is one more
+//! measurement of the parameter (a maximum a posteriori estimate; L. Ljung, *System
 //! Identification*, 1999, section 7.4).
 //!
 //! How much of a result is prior is the ratio of its variance after the data to that before

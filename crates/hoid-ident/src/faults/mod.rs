@@ -22,10 +22,10 @@
 //! fault: their remnant comes in pulses and bursts, but through their muscles, and the statistics of the spikes
 //! distinguish pushes from faults.
 //!
-//! [`repair`] looks at a record and does what [`FaultHandling`](hoid_model::FaultHandling) says: by default it bridges
-//! what lasts up to [`BRIDGED_S`], cuts the record at what is longer, and leaves segments of [`SHORTEST_S`] or more,
-//! each a record. Faults of more than [`MOST_SPIKES`] of the samples of a channel are reported and not bridged: then
-//! the channel is not what is assumed of it.
+//! [`repair`] looks at a record and does what [`FaultHandling`](hoid_model::FaultHandling) states: by default it
+//! bridges what lasts up to [`BRIDGED_S`], cuts the record at what is longer, and leaves segments of [`SHORTEST_S`] or
+//! more, each a record. Faults of more than [`MOST_SPIKES`] of the samples of a channel are reported and not bridged:
+//! then the channel is not what is assumed of it.
 
 mod autoregression;
 mod direction;

@@ -1,6 +1,6 @@
 //! A record that no single sample can carry, for a second opinion on a fit.
 //!
-//! Each sample of e and of u is held to what those on both sides of it say: with the interpolation error
+//! Each sample of e and of u is held to what those on both sides of it: with the interpolation error
 //! `r(t) = sum_i a_i eps(t+i)/|a|^2`, whose standard deviation is `s = sigma/|a|`, a sample beyond `c s` is moved to
 //! it, `x(t) - r + c s sign(r)` (the filter cleaner of R. D. Martin and D. J. Thomson, *Proc. IEEE* 70 (1982)
 //! 1097-1115, with two sides). The sample that is farthest off comes first, and the others are examined again: an

@@ -1,6 +1,6 @@
 //! A record without what is slow, for a second opinion on a fit.
 //!
-//! A step or a drift of a sensor is not a fault that its neighbours could tell, and a level does not hold it. The
+//! A step or a drift of a sensor is not a fault that its neighbours could reveal, and a level does not hold it. The
 //! person does not follow it, so that e has power at low frequencies that u does not answer, and the gain of the fit
 //! results too low with small error bars. Both channels lose their line and the cosines `cos(pi k (t + 1/2)/N)`,
 //! `k = 1 .. 2 T/`[`PERIOD_S`], so all that is slower than that period. The two lose it by the same linear operation,

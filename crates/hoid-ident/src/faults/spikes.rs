@@ -103,7 +103,7 @@ pub(super) fn find(values: &mut [f64], sample_time_s: f64) -> Vec<Spike> {
     joined(found)
 }
 
-/// Samples that are to be replaced, by what stands around them.
+/// Samples that are to be replaced, by their neighbours.
 pub(super) fn bridge(values: &mut [f64], samples: Range<usize>) {
     let (level, deviation) = level_and_deviation(values);
     let x: Vec<f64> = values.iter().map(|v| v - level).collect();

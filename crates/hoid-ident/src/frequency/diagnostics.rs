@@ -15,7 +15,7 @@
 //! | `no-reference`: no channel of the excitation | note |
 //! | `no-crossover`, `large-error`: crossover outside the lines; errors of the size of the value | doubt |
 //! | `several-crossovers`: the magnitude falls through 0 dB again | note |
-//! | `leakage`: the excitation has power off its lines | doubt above 1 %, else a note |
+//! | `leakage`: the excitation has power at frequencies other than its lines | doubt above 1 %, else a note |
 //! | `offset-not-whole`: an offset that may have been meant as whole samples | note |
 
 use hoid_model::{Finding, Record};
@@ -33,7 +33,8 @@ use crate::IdentError;
 
 /// Level at which chance is excluded.
 const LEVEL: f64 = 0.05;
-/// Share of the power of the excitation off its lines that is not rounding of the file.
+/// Share of the power of the excitation at frequencies other than its lines that is not rounding of
+/// the file.
 const LEAKAGE: f64 = 1e-4;
 const MUCH_LEAKAGE: f64 = 1e-2;
 /// Distance from a whole number of samples, from rounding to what is meant.
@@ -218,8 +219,8 @@ fn of_loop(open_loop: &OpenLoop, margins: &DescribingMargins) -> Vec<Finding> {
     findings
 }
 
-/// What the excitation has off its lines: a span of no whole periods, a file that is damaged, or a
-/// channel that was measured with noise.
+/// What the excitation has at frequencies other than its lines: a span of no whole periods, a file
+/// that is damaged, or a channel that was measured with noise.
 fn leakage(found: &DiagnosticInputs<'_>, records: &[Record]) -> Result<Option<Finding>, IdentError> {
     let Some(channel) = found.channel else {
         return Ok(None);
@@ -239,7 +240,7 @@ fn leakage(found: &DiagnosticInputs<'_>, records: &[Record]) -> Result<Option<Fi
     }
     Ok(worst.filter(|(off, _)| *off > LEAKAGE).map(|(off, label)| {
         let words = format!(
-            "{channel} of {label} has {:.2} % of its power off the lines: the span is not whole periods, lines are missing, or \
+            "{channel} of {label} has {:.2} % of its power at non-excited frequencies: the span is not whole periods, lines are missing, or \
              {channel} is a noisy measurement",
             100.0 * off
         );

@@ -52,7 +52,7 @@ impl Excitation {
     /// The harmonics n_k of the period T in s.
     ///
     /// # Errors
-    /// [`IdentError::BadOption`] without harmonics, with a harmonic 0 or one that stands twice, or
+    /// [`IdentError::BadOption`] without harmonics, with a harmonic 0 or one that appears twice, or
     /// for a period that is not positive.
     pub fn of_harmonics(harmonics: &[usize], period_s: f64) -> Result<Self, IdentError> {
         if !(period_s.is_finite() && period_s > 0.0) {

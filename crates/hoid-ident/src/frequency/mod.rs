@@ -19,7 +19,7 @@
 //!   [`Line::confidence_circle`] holds where it is not.
 //! - **Coherence** between excitation and u over runs:
 //!   `|sum U_i D_i*|^2 / (sum |U_i|^2 sum |D_i|^2)`. Of n unrelated runs it is 1/n in the mean.
-//! - **Remnant**: what u has off the lines, as the remnant shows in u after the loop, `N/(1 + L)`.
+//! - **Remnant**: what u has at non-excited frequencies, as the remnant shows in u after the loop, `N/(1 + L)`.
 //!
 //! Sources: D. T. McRuer and H. R. Jex, IEEE Trans. Human Factors in Electronics 8 (1967) 231-249;
 //! M. M. van Paassen and M. Mulder, *Identification of Human Operator Control Behaviour in
@@ -33,7 +33,7 @@
 //! | `window`, `spectrum` | whole periods, offsets between channels, Fourier coefficients |
 //! | [`DescribingOptions`] | averaging, span, offset, controlled element |
 //! | `describe` | [`describe()`]: lines of all runs, averages, standard errors |
-//! | `remnant` | power off the lines: spectrum, share, noise ratio |
+//! | `remnant` | power at non-excited frequencies: spectrum, share, noise ratio |
 //! | `open_loop` | crossover frequency and phase margin by interpolation, with their spread |
 //! | `description` | [`describe_runs()`]: all of it with every choice that the records decide, and its verdict |
 //! | `diagnostics` | what makes a describing function doubtful |

@@ -187,7 +187,10 @@ fn the_remnant_is_found_off_the_lines() {
         let records = runs(&scenario, 500, 40);
         let found = describe(&records, &lines(), &DescribingOptions::default()).unwrap();
         let ratio = found.noise_ratio;
-        println!("{condition}: {ratio:?}, off the lines {:?}", found.off_line_share);
+        println!(
+            "{condition}: {ratio:?}, at non-excited frequencies {:?}",
+            found.off_line_share
+        );
         // For the demanded level 0.1, of which 1000 runs are within 0.003; the mean of ratios has a
         // bias of some of their variance.
         assert!((ratio.value - 0.1).abs() < 3.0 * ratio.standard_error.unwrap() + 0.003);

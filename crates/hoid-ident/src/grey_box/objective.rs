@@ -31,25 +31,25 @@ pub(crate) struct PhysicalCriterion<'a, P> {
     /// Prior knowledge before the data, in units of the residuals; none if there is nothing.
     pub penalty: Vec<Penalty>,
     /// Common parts of else was measured of the operator that all records.
-    pub beside: Option<Beside<'a>>,
+    pub additional: Option<AdditionalTerm<'a>>,
 }
 
 /// Another criterion of the first elements of eta, added to the sum of squares with a weight.
 #[derive(Clone)]
-pub(crate) struct Beside<'a> {
+pub(crate) struct AdditionalTerm<'a> {
     pub criterion: Arc<dyn Objective + Send + Sync + 'a>,
     /// How many elements of eta it is of.
     pub elements: usize,
     pub weight: f64,
 }
 
-impl fmt::Debug for Beside<'_> {
+impl fmt::Debug for AdditionalTerm<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "Beside {{ weight: {} }}", self.weight)
+        write!(f, "Additional {{ weight: {} }}", self.weight)
     }
 }
 
-impl Beside<'_> {
+impl AdditionalTerm<'_> {
     /// What it adds at eta to a linearisation of as many parameters.
     pub fn add_to(&self, eta: &[f64], total: &mut Linearisation, workspace: &mut Workspace) {
         let (p, q) = (eta.len(), self.elements);
@@ -81,7 +81,7 @@ pub(crate) struct Penalty {
 
 impl Penalty {
     /// The same next to innovations of this variance.
-    pub fn beside(self, variance: f64) -> Self {
+    pub fn weighted(self, variance: f64) -> Self {
         Self { variance, ..self }
     }
 
@@ -134,15 +134,15 @@ impl<'a, P: Parametrisation> PhysicalCriterion<'a, P> {
             samples: None,
             limits,
             penalty: Vec::new(),
-            beside: None,
+            additional: None,
         }
     }
 
     /// Additional measurements, at eta: its part of the criterion; zeros if there is nothing.
-    pub fn beside_at(&self, eta: &[f64], workspace: &mut Workspace) -> Linearisation {
+    pub fn additional_at(&self, eta: &[f64], workspace: &mut Workspace) -> Linearisation {
         let mut own = Linearisation::empty(eta.len());
-        if let Some(beside) = &self.beside {
-            beside.add_to(eta, &mut own, workspace);
+        if let Some(additional) = &self.additional {
+            additional.add_to(eta, &mut own, workspace);
         }
         own
     }
@@ -323,8 +323,8 @@ impl<P: Parametrisation> Objective for PhysicalCriterion<'_, P> {
         for penalty in &self.penalty {
             penalty.add_to(eta, &mut total);
         }
-        if let Some(beside) = &self.beside {
-            beside.add_to(eta, &mut total, workspace);
+        if let Some(additional) = &self.additional {
+            additional.add_to(eta, &mut total, workspace);
         }
         total
     }

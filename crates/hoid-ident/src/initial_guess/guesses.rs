@@ -13,9 +13,9 @@
 //!    few times (K. Steiglitz and L. E. McBride, *IEEE Trans. Automatic Control* 10 (1965)
 //!    461-464). The `arx` poles themselves, badly biased where the noise poles are not those of the
 //!    system (m0 = 1: a2 near 0), only where that fails.
-//! 4. `high-order arx`: an ARX model with so many poles that the noise has some of its own, and the
-//!    poles of its noise-free response by Steiglitz and McBride (B. Wahlberg, *Automatica* 25
-//!    (1989) 829-841, in its simplest form).
+//! 4. `high-order arx`: an ARX model with a given number of poles that the noise has some of its
+//!    own, and the poles of its noise-free response by Steiglitz and McBride (B. Wahlberg,
+//!    *Automatica* 25 (1989) 829-841, in its simplest form).
 //! 5. `instruments`: ARX, instrumental variables twice, the residual, C and D from it
 //!    ([`crate::iv`]).
 //!

@@ -47,7 +47,7 @@ pub(super) fn penalties(layout: &Layout, prior: &OperatorPrior) -> Vec<Penalty> 
 
 /// The penalties with the variance of the innovations as their unit.
 pub(super) fn weighted(unit: &[Penalty], variance: f64) -> Vec<Penalty> {
-    unit.iter().map(|p| p.beside(variance)).collect()
+    unit.iter().map(|p| p.weighted(variance)).collect()
 }
 
 /// Variance of the innovations at a minimum.

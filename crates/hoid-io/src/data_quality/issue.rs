@@ -96,7 +96,7 @@ pub struct QualityIssue {
     pub channel: String,
     /// Rows concerned.
     pub rows: usize,
-    /// Their share of the rows looked at.
+    /// Their share of the rows examined.
     pub share: f64,
     /// How much, in `unit`: jitter RMS in s; a gap, a stall or a saturation its longest time in s;
     /// a clock and a drift the relative deviation; the step of what is quantised; else the number

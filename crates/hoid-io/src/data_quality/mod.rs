@@ -6,7 +6,7 @@
 //! | `issue` | [`QualityIssue`]: a finding |
 //! | `signals` | the columns that are examined |
 //! | `grid` | the even grid after a time |
-//! | `timing` | jitter, missing rows, a time that stands or runs back, a clock that is off or drifts |
+//! | `timing` | jitter, missing rows, a time that is constant or decreases, a clock that is off or drifts |
 //! | `holds` | rows that are there twice, and channels that all hold their values |
 //! | `values` | saturation, quantisation, constants, missing values |
 //! | `search` | all of these, for columns that belong together, and for the channels of a record |

@@ -23,7 +23,7 @@ pub(crate) struct Signals<'a> {
     pub(crate) nominal_hz: Option<f64>,
     /// Other columns that count time.
     pub(crate) clocks: Vec<Signal<'a>>,
-    /// Rows before the first one looked at.
+    /// Rows before the first one examined.
     pub(crate) before: usize,
 }
 

@@ -139,7 +139,7 @@ fn rate(signals: &Signals<'_>, grid: &Grid, rms: f64, unit: f64, found: &mut Vec
         text: format!(
             "t gives {hz:.4} Hz {what} {} Hz {}: the clock of t runs {way} by {} %{}",
             short(expected),
-            if given { "were expected" } else { "is usual" },
+            if given { "were expected" } else { "is common" },
             short(100.0 * off.abs()),
             if given {
                 ""

@@ -35,7 +35,7 @@ pub struct Preparation {
 
 impl Preparation {
     /// The record as it goes to the estimator, and the actions taken.
-    /// [`Preparation::drop_repeated`] belongs to reading and is not looked at.
+    /// [`Preparation::drop_repeated`] belongs to reading and is not examined.
     ///
     /// # Errors
     /// [`IoError::Preparation`] naming the step, what was found, and the expected value;

@@ -25,7 +25,7 @@ use super::step::Step;
 use crate::IoError;
 use crate::wording::decimal;
 
-/// A new rate makes at most so many samples out of one.
+/// A new rate makes at most this many samples out of one.
 const LARGEST_FACTOR: f64 = 100.0;
 
 /// Another sampling rate.

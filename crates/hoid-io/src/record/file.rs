@@ -84,7 +84,7 @@ fn write_columns(path: &Path, record: &Record) -> Result<(), IoError> {
 /// Writes a record as CSV into something that is open already, such as standard output.
 ///
 /// # Errors
-/// [`IoError::ChannelName`]; [`IoError::Unwritable`] for what `out` says. `name` represents it in
+/// [`IoError::ChannelName`]; [`IoError::Unwritable`] for what `out` states. `name` represents it in
 /// both.
 pub fn write_record_csv(out: &mut dyn Write, name: &str, record: &Record) -> Result<(), IoError> {
     check_names(record, || name.to_owned())?;

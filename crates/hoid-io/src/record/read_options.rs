@@ -36,7 +36,7 @@ pub struct ReadOptions {
     /// first sample (0 when there is none); with [`Repair::resample`] it is the frequency of the
     /// new grid. By default the sampling is that of t.
     pub sampling_hz: Option<f64>,
-    /// The samples with `from <= t < to`, s; anything outside is not looked at. By default all.
+    /// The samples with `from <= t < to`, s; anything outside is not used. By default all.
     pub span_s: (Option<f64>, Option<f64>),
     /// What may be repaired.
     pub repair: Repair,

@@ -11,7 +11,7 @@ use crate::table::Precision;
 use crate::time::sampling::{self, Uneven};
 use crate::wording::list;
 
-/// Resampling makes at most so many samples out of one.
+/// Resampling makes at most this many samples out of one.
 const LARGEST_FACTOR: usize = 100;
 
 /// Where the samples of the record come from.

@@ -125,7 +125,7 @@ impl TableWriter {
         })
     }
 
-    /// Appends the rows of a table of the same columns; its comments are not looked at.
+    /// Appends the rows of a table of the same columns; its comments are not examined.
     ///
     /// # Errors
     /// [`IoError::ColumnsDiffer`] and [`IoError::ColumnLength`], after which other rows may be

@@ -76,7 +76,7 @@ impl Precision {
         self.significant = self.significant.max(other.significant);
     }
 
-    /// Takes one more number with so many decimals into account.
+    /// Takes one more number with a given number of decimals into account.
     pub(crate) fn add_decimals(&mut self, decimals: usize) {
         self.decimals = Some(self.decimals.unwrap_or(0).max(decimals as i32));
     }

@@ -214,7 +214,7 @@ mod tests {
         assert_eq!(even_times(&[0.0]), Err(0));
     }
 
-    /// Times as a file with so many decimals prints them.
+    /// Times as a file with a given number of decimals prints them.
     fn printed(times: impl Iterator<Item = f64>, decimals: usize) -> (Vec<f64>, Precision) {
         let mut precision = Precision::default();
         let t = times

@@ -52,7 +52,7 @@ struct Lane {
 }
 
 impl<const C: usize> Decimator<C> {
-    /// A decimator by a factor of 2 or more; `held` says which channels are inputs that a model holds.
+    /// A decimator by a factor of 2 or more; `held` states which channels are inputs that a model holds.
     ///
     /// # Errors
     /// [`ModelError::Decimation`] for a factor without meaning.

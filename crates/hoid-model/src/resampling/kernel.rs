@@ -162,8 +162,8 @@ mod tests {
         }
     }
 
-    /// Amplitude and delay in samples of a wave of so many cycles a sample, taken at this fraction
-    /// between two samples.
+    /// Amplitude and delay in samples of a wave of a given number of cycles a sample, taken at this
+    /// fraction between two samples.
     fn response((offset, weights): &(isize, Vec<f64>), frequency: f64, fraction: f64) -> (f64, f64) {
         let omega = 2.0 * PI * frequency;
         let (mut re, mut im) = (0.0, 0.0);

@@ -1,5 +1,5 @@
 //! Box plots of the results of many runs: groups on the abscissa, in each group one box for each
-//! series. [`BoxStatistics`] says what a box shows.
+//! series. [`BoxStatistics`] states what a box shows.
 
 use kuva::{
     prelude::Plot,

@@ -219,7 +219,7 @@ impl MapGrid {
                     scene.add(text);
                 }
                 if is_marked {
-                    // Next to the number, or in the middle where none stands.
+                    // Next to the number, or in the middle without a hint.
                     let (at, half) = match decimals {
                         Some(_) => ((corner.0 + width - 4.6, corner.1 + 4.6), 2.2),
                         None => ((corner.0 + 0.5 * width, corner.1 + 0.5 * height), 5.0),

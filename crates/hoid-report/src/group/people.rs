@@ -2,7 +2,7 @@
 //! its errors.
 //!
 //! A parameter that the data determine is given with its standard error. One that they do not is in
-//! parentheses; where its interval is open above, `> x` says from where on.
+//! parentheses; where its interval is open above, `> x` states from where on.
 
 use hoid_ident::family::Parameter;
 use hoid_model::{VerdictLevel, uncertainty::Estimate};

@@ -80,13 +80,13 @@ impl FamilyOperatorRun {
         self.n = self.remnant.next(scenario, remnants, self.k);
     }
 
-    /// Where it stands, as numbers.
+    /// Its position, as numbers.
     pub fn saved(&mut self) -> Vec<f64> {
         let beside = [self.k as f64, self.n];
         beside.into_iter().chain(self.numbers().map(|number| *number)).collect()
     }
 
-    /// Goes on from where an operator of the same scenario and run stood ([`FamilyOperatorRun::saved`]), with the same
+    /// Goes on from where an operator of the same scenario and run was ([`FamilyOperatorRun::saved`]), with the same
     /// digits. False if the numbers are of another; then nothing has changed.
     pub fn restore(&mut self, saved: &[f64]) -> bool {
         let Some((&[k, n], rest)) = saved.split_first_chunk::<2>() else {

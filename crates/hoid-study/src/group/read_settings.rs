@@ -48,7 +48,7 @@ pub enum FaultTreatment {
     Bridge,
     /// They are reported.
     Report,
-    /// They are not looked for.
+    /// They are not searched for.
     Keep,
 }
 

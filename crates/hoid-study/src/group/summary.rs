@@ -168,7 +168,7 @@ mod tests {
         assert_eq!(judged(2, 0, &[person(Trustworthy)]).level, Trustworthy);
         assert_eq!(judged(2, 1, &[person(Trustworthy)]).level, Doubtful);
         assert_eq!(judged(2, 2, &[]).level, NotDetermined);
-        // One of two people stands.
+        // One of two people does not move.
         let both = [person(Trustworthy), person(NotDetermined)];
         let verdict = judged(2, 0, &both);
         assert_eq!(verdict.level, Doubtful);

@@ -41,7 +41,7 @@ pub(super) fn numbers<'a>(table: &'a OutputTable, name: &str) -> &'a [f64] {
     }
 }
 
-/// Stands between sentences in one cell.
+/// A separator between sentences in one cell.
 const BETWEEN: &str = " | ";
 
 /// Sentences in one cell.

@@ -64,7 +64,7 @@ impl Default for PeopleExperiment {
     }
 }
 
-/// Columns of a file besides t.
+/// Columns of a file other than t.
 const COLUMNS: [&str; 4] = ["e", "u", "d", "y"];
 /// What else is true.
 const OTHERS: [&str; 7] = [

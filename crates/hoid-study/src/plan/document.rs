@@ -344,7 +344,7 @@ fn tables_of<'a>(
         .collect()
 }
 
-/// A table without axes as it stands.
+/// A table without axes unchanged.
 fn single(table: &Spanned<DeTable<'_>>, text: &str, whole: &[&str]) -> Result<Variant, PlanProblem> {
     let mut all = variants(table, text, whole)?;
     match (all.pop(), all.is_empty()) {

@@ -82,7 +82,7 @@ pub fn line_at(text: &str, byte: usize) -> usize {
 }
 
 /// All combinations of the lists of a table. Keys in `whole`, joined by dots, want a list or a
-/// table as it stands.
+/// table unchanged.
 pub fn variants(table: &Spanned<DeTable<'_>>, source: &str, whole: &[&str]) -> Result<Vec<Variant>, PlanProblem> {
     let mut leaves = Vec::new();
     collect(table.get_ref(), source, whole, &mut Vec::new(), &mut leaves)?;

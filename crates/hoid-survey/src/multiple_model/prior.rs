@@ -103,7 +103,7 @@ pub(super) fn change_prior(alarm: f64, setup: &Setup, sample_time: SampleTime) -
     })
 }
 
-/// The first hypothesis, from the batch fit of the start span, its covariance so many times larger.
+/// The first hypothesis, from the batch fit of the start span, its covariance scaled by a factor.
 ///
 /// # Errors
 /// [`IdentError::BadStart`] without a fit, or where it lies outside the bounds.

@@ -2,9 +2,8 @@
 //! validation set, as the discussion of the thesis proposes (VII: *the covariance matrix could be updated based on VAF
 //! from a validation data set, in order to reduce the strong oscillations that are given in state s2*).
 //!
-//! It is `rpem` of `hoid_track` by the settings of the text, with [`track_validated`], where the rule
-//! stands. The validation set is a second run of the same person in the same task, with its own
-//! remnant.
+//! It is `rpem` of `hoid_track` by the settings of the text, with [`track_validated`], which contains the rule. The
+//! validation set is a second run of the same person in the same task, with its own remnant.
 
 use hoid_ident::{settings, settings::Bounds};
 use hoid_model::{PolynomialModel, Structure};

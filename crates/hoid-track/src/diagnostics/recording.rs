@@ -90,7 +90,8 @@ impl Trace {
             Finding::doubt(
                 "learnt-at-rest",
                 format!(
-                    "neither e nor u moves at {from:.2} to {to:.2} s and the estimate goes on there: its error bars shrink by what                      tells nothing; leave the guard as it is by default, which holds it"
+                    "neither e nor u moves from {from:.2} to {to:.2} s and the estimate is updated there: its error bars shrink without \
+                     information; keep the default guard, which holds the estimate"
                 ),
             )
         })

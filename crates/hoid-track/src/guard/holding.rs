@@ -130,9 +130,9 @@ impl Guard {
                 u: raw.values[1],
                 ..sample
             };
-            // e acts only after the delay: an innovation of now does not know it. A tenth of a second of
-            // interpolated u moves an estimate by less than the clock of births of a bank of
-            // hypotheses does that is stopped for as long.
+            // e acts only after the delay: a current innovation does not know it. A tenth of a second of interpolated u
+            // moves an estimate by less than the clock of births of a bank of hypotheses does that is stopped for as
+            // long.
             outcome = Some(if raw.moves {
                 recursion.step(taken)
             } else {

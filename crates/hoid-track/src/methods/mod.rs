@@ -153,7 +153,7 @@ impl Method {
     }
 }
 
-/// [`Method::adaptive`]: it needs nothing to begin with, and holds on recorded people.
+/// [`Method::adaptive`]: it needs no start, and works for recorded people.
 impl Default for Method {
     fn default() -> Self {
         Self::adaptive()

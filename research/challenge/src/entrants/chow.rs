@@ -18,7 +18,7 @@ use super::{
     basis::{Solved, Square, Sums, product, reported, whitened, worth},
 };
 
-/// Seconds of a block, and blocks of now and before; the least of before.
+/// Seconds of a block, and blocks of present and past; the least of before.
 const BLOCK_S: f64 = 0.25;
 const NOW: usize = 20;
 const BEFORE: usize = 160;
@@ -27,9 +27,9 @@ const LEAST_BEFORE: usize = 24;
 const KEPT: usize = 12;
 const AT_RAD_S: f64 = 2.5;
 const LIMIT: f64 = 3.5;
-/// T over its level from which a change is declared, in so many blocks one after the other. In runs 2 to 5 of the cases
-/// without a change (open seeds; 1.8 h), which are in no table, 6, 8, 12 and 25 are passed 32, 15, 9 and 5 times;
-/// except for a missing and a silent span 21, 5, 0 and 0 times.
+/// T over its level from which a change is declared, in a given number of blocks one after the other. In runs 2 to 5 of
+/// the cases without a change (open seeds; 1.8 h), which are in no table, 6, 8, 12 and 25 are passed 32, 15, 9 and 5
+/// times; except for a missing and a silent span 21, 5, 0 and 0 times.
 const THRESHOLD: f64 = 10.0;
 const PERSISTENCE: usize = 4;
 /// Expectation of the logarithm of a chi-square with two degrees of freedom; what the level is

@@ -5,7 +5,7 @@
 //! | `methods` | every method of [`hoid_track::Method`], as it is by default |
 //! | `basis` | three gains in the basis of a nominal person, and what whitens a remnant |
 //! | `kalman` | a random walk of these gains |
-//! | `chow` | a test of now against before |
+//! | `chow` | a test of the present against the past |
 //! | `threshold` | the published baseline: the size of the error |
 
 mod basis;

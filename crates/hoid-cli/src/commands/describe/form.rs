@@ -80,7 +80,7 @@ impl Shown<'_> {
             format!("{scaled} %")
         };
         page.push_str(&format!(
-            "Remnant: {} of the power of the output off the lines, {} with its part at the lines (P_n).\n",
+            "Remnant: {} of the power of the output at non-excited frequencies, {} with its part at the lines (P_n).\n",
             percent(&function.off_line_share),
             percent(&function.noise_ratio),
         ));

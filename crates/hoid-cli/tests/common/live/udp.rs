@@ -99,7 +99,7 @@ impl Stream {
     }
 }
 
-/// A sample as a struct; t is NaN if the sequence is to tell it.
+/// A sample as a struct; t is NaN if the sequence determines it.
 pub fn as_struct(sequence: u32, t: f64, e: f64, u: f64) -> Vec<u8> {
     let mut bytes = b"hoid".to_vec();
     bytes.extend_from_slice(&sequence.to_le_bytes());

@@ -18,7 +18,8 @@ use crate::{
     criterion::{Criterion, Data, Workspace, first_residual},
 };
 
-/// Residuals of a robust fit are held to so many of its scales, as its loss holds their slope.
+/// Residuals of a robust fit are held to a given number of its scales, as its loss holds their
+/// slope.
 const CLIPPED: f64 = 1.345;
 /// Deviations of a sum of scores beyond which the fit is not a minimum of the squares: one for
 /// simulation, or with a prior that weighs more than the data.

@@ -197,8 +197,8 @@ pub(super) fn drifts(blocks: &[ScoreBlock]) -> Vec<Set> {
     }]
 }
 
-/// Sines over the blocks of one record, of so many s each: periods from [`SHORTEST`] blocks to two thirds of all, half
-/// of what distinguishes two frequencies from one to the next, each in four phases.
+/// Sines over the blocks of one record, of a given number of s each: periods from [`SHORTEST`] blocks to two thirds of
+/// all, half of what distinguishes two frequencies from one to the next, each in four phases.
 pub(super) fn sways(blocks: &[ScoreBlock], block_s: f64) -> Vec<Set> {
     let n = blocks.len();
     let frequencies = (3..)

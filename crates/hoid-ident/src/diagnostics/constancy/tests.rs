@@ -32,7 +32,7 @@ fn box_jenkins(records: &[Record]) -> Fit {
     Estimator::new(Structure::BoxJenkins, orders).fit(records).unwrap()
 }
 
-/// u comes later by so many samples from `at` on.
+/// u comes later by a given number of samples from `at` on.
 fn late(record: &Record, at: usize, by: usize) -> Record {
     let u: Vec<f64> = (0..record.len())
         .map(|t| record.output()[if t >= at { t - by } else { t }])

@@ -72,7 +72,7 @@ pub(crate) struct Numbers {
 }
 
 impl Numbers {
-    /// The numbers that fill the bytes; a rest shorter than one is not looked at.
+    /// The numbers that fill the bytes; a rest shorter than one is not examined.
     pub(crate) fn new(bytes: Vec<u8>, kind: Kind, big_endian: bool) -> Self {
         let len = bytes.len() / kind.size();
         Self {

@@ -126,7 +126,8 @@ pub(super) fn plain_rows(bytes: &[u8], from: usize, layout: Layout<'_>, mut take
     at
 }
 
-/// The end of the part that starts at `start`: after the first end of a line after so many bytes.
+/// The end of the part that starts at `start`: after the first end of a line after a given number
+/// of bytes.
 fn end_of_part(bytes: &[u8], start: usize, length: usize) -> usize {
     let behind = start.saturating_add(length).min(bytes.len());
     let line = bytes[behind..].iter().position(|byte| *byte == b'\n');

@@ -11,8 +11,8 @@
 //! numbers may have decimal commas.
 //!
 //! Blank lines are skipped; a byte order mark and CRLF are tolerated. The stated sample time
-//! reports without rounding what t can only say up to its last digit; it counts where t agrees with
-//! it.
+//! reports without rounding what t can only state up to its last digit; it counts where t agrees
+//! with it.
 
 use std::collections::HashMap;
 use std::ops::Range;

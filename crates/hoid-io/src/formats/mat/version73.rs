@@ -1,6 +1,6 @@
 //! Version 7.3: HDF5 in MATLAB's manner, and HDF5 of other programs. Structures are groups, arrays of structures and
 //! cells are references to what is under `/#refs#`, sizes are in the order of C and so read backwards, `MATLAB_class`
-//! says what a dataset is and `MATLAB_object_decode` that it is an object. Datasets without them, as other programs
+//! states what a dataset is and `MATLAB_object_decode` that it is an object. Datasets without them, as other programs
 //! write them, are numbers; where no MATLAB is expected, sizes stay in the order of C.
 
 use hdf5_pure::{AttrValue, DType, Dataset, Error, File, Group, H5Element, Object};

@@ -241,7 +241,7 @@ mod tests {
     fn pages_say_what_they_unpack_to_and_gzip_is_held_to_it() {
         let honest = page(800, 100, &zipped(&[0; 800]));
         assert_eq!(unpacked(&honest, GZIP(), 100), Some(800));
-        // For two pages, the second after the last value is not looked at.
+        // For two pages, the second after the last value is not examined.
         let two = [honest.clone(), vec![0xff; 40]].concat();
         assert_eq!(unpacked(&two, GZIP(), 100), Some(800));
         assert_eq!(unpacked(&two, GZIP(), 101), None);

@@ -19,15 +19,15 @@ use crate::wording::shown;
 /// The unit of the fit, s: deviations beyond it count linearly.
 const UNIT_S: f64 = 1e-4;
 const ITERATIONS: usize = 1000;
-/// A reset: time between offsets off its median by more than so many deviations and s, and the
-/// offsets likewise.
+/// A reset: time between offsets off its median by more than a given number of deviations and s,
+/// and the offsets likewise.
 const RESET_TIME: (f64, f64) = (5.0, 5.0);
 const RESET_VALUE: (f64, f64) = (10.0, 1.0);
-/// A break: the longer of so many s and so many samples.
+/// A break: the longer of a given number of s and so many samples.
 const BREAK_S: f64 = 1.0;
 const BREAK_SAMPLES: f64 = 500.0;
 
-/// Lost samples: a step, and then a lateness, of so many sample times.
+/// Lost samples: a step, and then a lateness, of a given number of sample times.
 const LOST_SAMPLES: f64 = 4.0;
 /// Samples on each side whose median shows how late they are.
 const BESIDE: usize = 25;
@@ -112,8 +112,8 @@ fn resets(offsets: &[(f64, f64)]) -> Vec<(usize, usize)> {
     parts(breaks, offsets.len())
 }
 
-/// Where a step differs from the median by more than so many median absolute deviations, and by
-/// more than so much.
+/// Where a step differs from the median by more than a given number of median absolute deviations,
+/// and by more than so much.
 fn glitches(steps: &[f64], (deviations, least): (f64, f64)) -> Vec<bool> {
     let middle = median(steps);
     let off: Vec<f64> = steps.iter().map(|step| (step - middle).abs()).collect();

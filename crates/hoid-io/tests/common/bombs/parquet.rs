@@ -96,7 +96,7 @@ pub fn bomb(draw: &mut Draw) -> Vec<u8> {
     }
 }
 
-/// So many groups of the same values, which the format writes once.
+/// A given number of groups of the same values, which the format writes once.
 pub fn groups(schema: &str, groups: usize, rows: usize) -> Vec<u8> {
     let mut writer = writer(schema, Compression::UNCOMPRESSED, true);
     for _ in 0..groups {
@@ -119,7 +119,7 @@ pub fn groups(schema: &str, groups: usize, rows: usize) -> Vec<u8> {
     writer.into_inner().unwrap()
 }
 
-/// So many columns without a row.
+/// A given number of columns without a row.
 pub fn columns(count: usize) -> Vec<u8> {
     let each: String = (0..count).map(|k| format!("required double c{k}; ")).collect();
     groups(&format!("message m {{ {each} }}"), 0, 0)

@@ -150,7 +150,7 @@ fn mutate(bytes: &mut Vec<u8>, other: &[u8], original: &Original, draw: &mut Dra
     }
 }
 
-/// A place in so many bytes: anywhere, or near the head or the end, which report most.
+/// A place in a given number of bytes: anywhere, or near the head or the end, which report most.
 fn place(length: usize, draw: &mut Draw) -> usize {
     match draw.below(4) {
         0 => draw.below(length.min(256)),

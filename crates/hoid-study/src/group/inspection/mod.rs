@@ -1,5 +1,5 @@
 //! A look at the files of a group before they are analysed ([`Look`]): what is found in them is in the manifest with
-//! the evidence next to it, to be looked through by a person; the request is not looked for.
+//! the evidence next to it, to be looked through by a person; the request is not searched for.
 //!
 //! | file | what it holds |
 //! |---|---|
@@ -82,7 +82,7 @@ pub fn inspect(manifest: &mut Manifest, directory: &Path, known: &LookOptions) -
         let seen = match look.and_then(|look| look.seen) {
             Ok(seen) => seen,
             Err(reason) => {
-                evidence.push(Evidence::new("", "", format!("not looked at: {reason}")));
+                evidence.push(Evidence::new("", "", format!("not examined: {reason}")));
                 continue;
             }
         };

@@ -18,7 +18,7 @@ use super::{
 
 /// A run of the program that takes longer is ended, s.
 const LONGEST_S: u64 = 120;
-/// Every so many samples a row of a trace.
+/// Every n samples a row of a trace.
 const EVERY: &str = "10";
 
 /// How a record is evaluated, with default options.
