@@ -15,7 +15,7 @@ impl Reading {
     /// Reads the files; each file that was read is reported, with what a user should know of it.
     ///
     /// # Errors
-    /// The entries of reading; [`AnalysisError::OtherColumns`] for a file in which error and control have other names.
+    /// The errors of reading; [`AnalysisError::OtherColumns`] for a file in which error and control have other names.
     pub fn files(
         &self,
         paths: &[PathBuf],

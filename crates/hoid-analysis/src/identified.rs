@@ -124,7 +124,7 @@ impl Identified {
     /// VAF and NRMSE over the recordings, each by its own operator.
     ///
     /// # Errors
-    /// The entries of a prediction.
+    /// The errors of a prediction.
     pub fn quality(&self) -> Result<GoodnessOfFit, AnalysisError> {
         let each = self.data.records.iter().enumerate();
         let validations = each.map(|(k, record)| self.fit.operator(k).polynomial_fit.validate(record));

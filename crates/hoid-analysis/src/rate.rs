@@ -11,7 +11,7 @@ impl Recordings {
     /// only where a factor was named, and not where the rate was named in reading.
     ///
     /// # Errors
-    /// The entries of the decimation.
+    /// The errors of the decimation.
     pub fn at_rate(mut self, decimation: Decimation, counts_samples: bool) -> Result<Self, AnalysisError> {
         if self.settles_the_rate() {
             return Ok(self);

@@ -60,7 +60,7 @@ pub fn tracking(args: &TrackArgs) -> Result<Tracking, CliError> {
 /// Searches the orders that a plan leaves open, and shows how far it is.
 ///
 /// # Errors
-/// The entries of the search.
+/// The errors of the search.
 pub fn choose(plan: &TrackPlan, span: &Record) -> Result<(TrackOptions, Option<Choice>), IdentError> {
     searching(plan, |each| plan.choose(span, each))
 }

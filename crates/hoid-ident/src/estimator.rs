@@ -196,7 +196,7 @@ impl Estimator {
     /// standard error.
     ///
     /// # Errors
-    /// Those of [`Estimator::fit`], for each record by itself.
+    /// The errors of [`Estimator::fit`], for each record by itself.
     pub fn fit_each(&self, records: &[&Record]) -> Vec<Result<Fit, IdentError>> {
         let batched = match self.check() {
             Ok(()) if self.focus == Focus::Prediction => {

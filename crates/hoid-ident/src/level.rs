@@ -48,7 +48,7 @@ impl Fit {
     /// nothing of one, as with an integration.
     ///
     /// # Errors
-    /// The entries of residuals.
+    /// The errors of residuals.
     pub fn constant_of(&self, record: &Record) -> Result<Option<f64>, IdentError> {
         let ones = |name: &str, one: f64| Channel::new(name, "", vec![one; record.len()]);
         let unit = Record::new(record.sample_time(), ones("e", 0.0), ones("u", 1.0))?;

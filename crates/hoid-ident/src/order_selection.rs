@@ -428,7 +428,7 @@ fn fit_neighbours(
 /// alone.
 ///
 /// # Errors
-/// Those of [`Estimator::fit`] and [`choose_orders`]; [`IdentError::BadStart`] for a start where
+/// The errors of [`Estimator::fit`] and [`choose_orders`]; [`IdentError::BadStart`] for a start where
 /// several models are tried.
 pub fn fit_or_choose(
     template: &Estimator,

@@ -67,7 +67,7 @@ fn write(path: &Path, text: &str) -> Result<(), LabError> {
 /// Writes who took part.
 ///
 /// # Errors
-/// The entries of files.
+/// The errors of files.
 pub fn list(out: &Path) -> Result<(), LabError> {
     let mut people: BTreeMap<String, (usize, String)> = BTreeMap::new();
     for folder in Session::folders(out)? {
@@ -88,7 +88,7 @@ pub fn list(out: &Path) -> Result<(), LabError> {
 /// count. Nothing while none counts.
 ///
 /// # Errors
-/// The entries of files.
+/// The errors of files.
 pub fn manifest(out: &Path) -> Result<(), LabError> {
     let mut runs = Vec::new();
     let mut conditions: BTreeMap<String, Condition> = BTreeMap::new();

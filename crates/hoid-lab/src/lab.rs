@@ -234,7 +234,7 @@ impl Lab {
     /// The session as one archive; nothing if there is none.
     ///
     /// # Errors
-    /// The entries of files.
+    /// The errors of files.
     pub fn export(&self) -> Result<Option<(Vec<u8>, &'static str)>, LabError> {
         let Some(folder) = self.shared.session_folder() else {
             return Ok(None);
@@ -245,7 +245,7 @@ impl Lab {
     /// The signals of a run, `3.json`; nothing if there is no such run.
     ///
     /// # Errors
-    /// The entries of files.
+    /// The errors of files.
     pub fn data(&self, name: &str) -> Result<Option<(Vec<u8>, &'static str)>, LabError> {
         let number: Option<usize> = name.strip_suffix(".json").and_then(|number| number.parse().ok());
         let (Some(number), Some(folder)) = (number, self.shared.session_folder()) else {
@@ -259,7 +259,7 @@ impl Lab {
     /// A file of the pages of results, by the names that [`State::reports`](crate::wire::State::reports) has.
     ///
     /// # Errors
-    /// The entries of files.
+    /// The errors of files.
     pub fn report(&self, names: &[&str]) -> Result<Option<(Vec<u8>, &'static str)>, LabError> {
         let Some(folder) = self.shared.session_folder() else {
             return Ok(None);

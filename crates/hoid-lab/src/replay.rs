@@ -13,7 +13,7 @@ use crate::{
 /// The run as JSON.
 ///
 /// # Errors
-/// The entries of files.
+/// The errors of files.
 pub fn data(stem: &Stem) -> Result<Vec<u8>, LabError> {
     let begun = RunStart::read(stem)?;
     let task = begun.task(stem)?;

@@ -166,7 +166,7 @@ pub fn found(folder: &Path) -> Pages {
 /// digits, `-`, `_` and dots that do not lead, so that no name leads out of its folder.
 ///
 /// # Errors
-/// The entries of files.
+/// The errors of files.
 pub fn file(folder: &Path, out: &Path, names: &[&str]) -> Result<Option<(Vec<u8>, &'static str)>, LabError> {
     let sound = |name: &&str| {
         let known = |b: u8| b.is_ascii_alphanumeric() || b"-_.".contains(&b);

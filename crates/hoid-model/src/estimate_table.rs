@@ -14,7 +14,7 @@ use crate::{
 /// except for the first.
 ///
 /// # Errors
-/// The entries of the formatter.
+/// The errors of the formatter.
 ///
 /// ```
 /// use hoid_model::{estimate_table::write_rows, uncertainty::Estimate};

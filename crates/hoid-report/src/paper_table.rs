@@ -80,7 +80,7 @@ impl PaperTable {
     /// Writes it, whole or not at all, in the format that the extension represents.
     ///
     /// # Errors
-    /// Those of [`PaperTable::check`] and of writing.
+    /// The errors of [`PaperTable::check`] and of writing.
     pub fn write(&self, path: &Path) -> Result<(), IoError> {
         match Markup::of(path) {
             Some(markup) => {

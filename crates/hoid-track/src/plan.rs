@@ -85,7 +85,7 @@ impl TrackPlan {
     /// every candidate.
     ///
     /// # Errors
-    /// The entries of the search.
+    /// The errors of the search.
     pub fn choose(
         &self,
         span: &Record,

@@ -79,7 +79,7 @@ impl StartState {
     /// and that fit where it is known.
     ///
     /// # Errors
-    /// The entries of the batch fit; [`IdentError::BadStart`].
+    /// The errors of the batch fit; [`IdentError::BadStart`].
     pub fn new(
         setup: &Setup,
         span: Option<&Record>,

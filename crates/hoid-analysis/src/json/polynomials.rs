@@ -101,7 +101,7 @@ impl<'a> PolynomialAnswer<'a> {
     /// A model that was identified, with what follows from it.
     ///
     /// # Errors
-    /// The entries of a prediction of the records.
+    /// The errors of a prediction of the records.
     pub fn of<F>(found: &'a Identified<F>, fit: &'a Fit) -> Result<Self, AnalysisError> {
         let (data, with_input) = (&found.data, fit.model().structure().has_input());
         let validations = data.records.iter().map(|record| fit.validate(record));

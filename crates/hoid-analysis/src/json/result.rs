@@ -30,7 +30,7 @@ pub trait BatchAnswer: Answers + Serialize + DeserializeOwned {
     /// The object of the contract, without the state.
     ///
     /// # Errors
-    /// The entries of a prediction of its records.
+    /// The errors of a prediction of its records.
     fn object(found: &Identified<Self>) -> Result<Map<String, Value>, AnalysisError>;
 }
 
@@ -145,7 +145,7 @@ impl<F: BatchAnswer> Identified<F> {
     /// The result as an object: the contract with other programs, and its state.
     ///
     /// # Errors
-    /// The entries of a prediction of its records.
+    /// The errors of a prediction of its records.
     pub fn json(&self) -> Result<Map<String, Value>, AnalysisError> {
         if let Some(written) = &self.written {
             return Ok(written.clone());

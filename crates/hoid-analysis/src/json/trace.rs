@@ -24,7 +24,7 @@ impl Tracked {
     /// The object of the contract.
     ///
     /// # Errors
-    /// The entries of the quality of the start fit.
+    /// The errors of the quality of the start fit.
     pub fn json(&self) -> Result<Map<String, Value>, AnalysisError> {
         let trace = &self.trace;
         let counts = trace.counts();

@@ -40,7 +40,7 @@ impl Look {
     /// Looks at a file.
     ///
     /// # Errors
-    /// Those of [`survey`], where the file cannot be read at all.
+    /// The errors of [`survey`], where the file cannot be read at all.
     pub fn at(path: &Path, known: &LookOptions) -> Result<Self, IoError> {
         let found = survey(path)?;
         let roles = Roles::of(&names(&found), known.input.as_deref(), known.output.as_deref());

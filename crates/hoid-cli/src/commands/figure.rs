@@ -32,7 +32,7 @@ fn format_of(path: &Path) -> Result<FigureFormat, CliError> {
 /// Writes a figure, with a width on paper where one was given.
 ///
 /// # Errors
-/// The entries of the format and of writing.
+/// The errors of the format and of writing.
 pub fn write(path: &Path, svg: &str, width_mm: Option<f64>) -> Result<(), CliError> {
     let sized = width_mm.map(|mm| with_width_mm(svg, mm));
     let bytes = format_of(path)?.bytes(sized.as_deref().unwrap_or(svg))?;

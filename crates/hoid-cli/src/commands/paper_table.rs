@@ -24,7 +24,7 @@ pub fn check(show: &ShowArgs) -> Result<(), CliError> {
 /// Writes it where it is asked for, from the object of the result.
 ///
 /// # Errors
-/// The entries of the object and of writing.
+/// The errors of the object and of writing.
 pub fn write(show: &ShowArgs, object: impl FnOnce() -> Result<Map<String, Value>, CliError>) -> Result<(), CliError> {
     let Some(path) = &show.table else { return Ok(()) };
     match PaperTable::of(&object()?) {

@@ -67,7 +67,7 @@ impl Comparing {
     /// Compares.
     ///
     /// # Errors
-    /// The entries of factors without meaning, and [`CompareError::NotInJson`]. What cannot be estimated of a person is
+    /// The errors of factors without meaning, and [`CompareError::NotInJson`]. What cannot be estimated of a person is
     /// part of the result.
     pub fn run(&self, group: &GroupEstimates) -> Result<Comparison, CompareError> {
         let asked = match self.factors.is_empty() {

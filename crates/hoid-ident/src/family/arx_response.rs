@@ -39,7 +39,7 @@ impl ArxResponse {
     /// For all records together: a smooth record determines fewer coefficients.
     ///
     /// # Errors
-    /// The entries of the regression with the fewest coefficients.
+    /// The errors of the regression with the fewest coefficients.
     pub fn of(records: &[Record]) -> Result<Self, IdentError> {
         regressed(records, false, MOST_GAINS)
     }

@@ -74,7 +74,7 @@ impl<'a> Chosen<'_, 'a> {
     /// All that is informed of the person.
     ///
     /// # Errors
-    /// The entries of the model.
+    /// The errors of the model.
     pub fn result(self, workspace: &mut Workspace) -> Result<FamilyFit, IdentError> {
         let (fit, layout) = (&self.fit, self.fit.layout());
         let separate = if self.prediction.individual.is_empty() {

@@ -108,7 +108,7 @@ pub(super) struct Instrumental<'p, 'a> {
 
 impl<'p, 'a> Instrumental<'p, 'a> {
     /// # Errors
-    /// The entries of the channel: it is missing, constant, or a signal of the loop.
+    /// The errors of the channel: it is missing, constant, or a signal of the loop.
     pub fn new(
         prediction: &'p Prediction<'a>,
         fit: &'p PredictionFit<'a>,

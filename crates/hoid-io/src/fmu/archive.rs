@@ -136,7 +136,7 @@ impl Library {
 /// Writes a unit whose sample time is `step_s`. The same parts give the same bytes.
 ///
 /// # Errors
-/// The entries of files; [`IoError::NoLibrary`] for settings that contradict themselves, or two libraries of one
+/// The errors of files; [`IoError::NoLibrary`] for settings that contradict themselves, or two libraries of one
 /// platform.
 pub fn write_fmu(
     path: &Path,

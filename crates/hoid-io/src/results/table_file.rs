@@ -20,7 +20,7 @@ pub fn check_table_path(path: &Path) -> Result<(), IoError> {
 /// (`.parquet`, `.pq`), NPZ (`.npz`) or for MATLAB (`.mat`). The same table gives the same bytes.
 ///
 /// # Errors
-/// Those of [`check_table_path`]; [`IoError::ColumnLength`], [`IoError::NoColumns`],
+/// The errors of [`check_table_path`]; [`IoError::ColumnLength`], [`IoError::NoColumns`],
 /// [`IoError::DuplicateColumn`] or [`IoError::ChannelName`] for what cannot be written; those of
 /// [`write_atomically`](crate::write_atomically).
 ///

@@ -49,7 +49,7 @@ pub struct ColumnSurvey {
 /// Looks into a file of any format that is read.
 ///
 /// # Errors
-/// The entries of reading: [`IoError`], naming the place in the file.
+/// The errors of reading: [`IoError`], naming the place in the file.
 pub fn survey(path: &Path) -> Result<FileSurvey, IoError> {
     let file = path.display().to_string();
     let (format, mut bytes) = bytes_of(path)?;

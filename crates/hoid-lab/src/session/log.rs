@@ -149,7 +149,7 @@ impl RunLog {
     /// Appends a batch, all of it or nothing.
     ///
     /// # Errors
-    /// Those of [`RunLog::continued_by`]; [`LabError::File`], after which the files hold the batches before.
+    /// The errors of [`RunLog::continued_by`]; [`LabError::File`], after which the files hold the batches before.
     pub fn append(&mut self, batch: &Batch) -> Result<(), LabError> {
         let end = self.continued_by(batch)?;
         let mut texts = [String::new(), String::new(), String::new()];

@@ -229,7 +229,7 @@ impl Session {
     /// Ends a run: seals its files, checks it and writes down what came out.
     ///
     /// # Errors
-    /// The entries of files.
+    /// The errors of files.
     pub fn end(&mut self, stem: &Stem, how: How, counted: BTreeMap<String, f64>) -> Result<Checked, LabError> {
         if !APPENDED.iter().any(|end| stem.file(end).exists()) {
             // It was ended before its first tick.

@@ -36,7 +36,7 @@ fn orders_within(trace: &Trace, (from, to): (f64, f64)) -> Orders {
 /// the delay, with its report on it there.
 ///
 /// # Errors
-/// The entries of the fit.
+/// The errors of the fit.
 pub fn batch_fit(trace: &Trace, record: &Record, (from, to): (f64, f64)) -> Result<BatchFit, IdentError> {
     let options = trace.options();
     let estimator = Estimator {

@@ -70,7 +70,7 @@ impl Trace {
     /// orders, where there was one.
     ///
     /// # Errors
-    /// The entries of the residuals of the start fit.
+    /// The errors of the residuals of the start fit.
     pub fn verdict(&self, record: &Record, choice: Option<&Choice>) -> Result<Verdict, IdentError> {
         let mut all = self.start_findings(record, choice)?;
         let rows = self.rows_judged();

@@ -145,7 +145,7 @@ impl StreamStatus<'_> {
     /// Writes the line into a buffer, its end included.
     ///
     /// # Errors
-    /// The entries of the serialiser, which a buffer in memory does not have.
+    /// The errors of the serialiser, which a buffer in memory does not have.
     pub fn write(&self, buffer: &mut Vec<u8>) -> serde_json::Result<()> {
         let tracker: Option<&Tracker> = match self.live {
             Live::Tracking(tracker) => Some(tracker),

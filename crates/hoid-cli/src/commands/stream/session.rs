@@ -153,7 +153,7 @@ impl Session {
     /// one by one. What is not a sample is dropped: it may come from anyone.
     ///
     /// # Errors
-    /// The entries of the answers.
+    /// The errors of the answers.
     pub fn take_datagram(
         &mut self,
         bytes: &[u8],

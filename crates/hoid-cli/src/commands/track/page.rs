@@ -16,7 +16,7 @@ const COEFFICIENTS_SHOWN: usize = 6;
 /// A summary for people, and with `verbose` what is after it.
 ///
 /// # Errors
-/// The entries of the quality of the start fit.
+/// The errors of the quality of the start fit.
 pub fn page(tracked: &Tracked, out: Option<&str>, verbose: bool) -> Result<String, CliError> {
     let mut page = text::verdict(&tracked.verdict);
     page.push_str(&rows_shown(tracked));

@@ -61,7 +61,7 @@ impl Base {
 /// The runs of a case.
 ///
 /// # Errors
-/// The entries of the simulation.
+/// The errors of the simulation.
 pub fn base(who: Who, seed: u64, case: u64) -> Result<Base, SimError> {
     match who {
         Who::C1 | Who::C2 => of_text(who, seed, case),

@@ -92,7 +92,7 @@ pub struct Outcome {
 /// The fits of one person.
 ///
 /// # Errors
-/// The entries of the simulation.
+/// The errors of the simulation.
 pub fn outcomes(seed: u64, number: u64, variants: &[Variant]) -> Result<Vec<Outcome>, SimError> {
     let (cell, person, records) = recorded(seed, number)?;
     let true_form = person.state.operator.form();
