@@ -1,5 +1,5 @@
-//! What the crates of the workspace may bring with them, with all features, by `cargo metadata`: licences, crates that
-//! are not wanted, one version of each, and not more of them than there are reasons for.
+//! Rules for the dependencies of the workspace, with all features, by `cargo metadata`: licences, crates that are not
+//! wanted, one version of each, and not more of them than there are reasons for.
 //!
 //! An expression of licences is one of SPDX (Annex D: `OR` binds less than `AND`, that less than `WITH`), with the `/`
 //! of older manifests for `OR`. Advisories need the network and are examined by the hosted workflows.

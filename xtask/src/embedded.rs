@@ -1,7 +1,7 @@
 //! The kernel on bare processors: built for Cortex-M4F and RISC-V, run under QEMU, and its digits next to those of the
 //! host and of `hoid track`.
 //!
-//! What is not installed is reported and left out, with what installs it.
+//! Missing programs are reported and left out, with the command that installs them.
 
 use std::{
     env, fs,

@@ -18,7 +18,7 @@ use std::{
 
 use crate::process::{AS_TESTS, SHIPPED, cargo, output, run};
 
-/// What a program that links the static library links in addition.
+/// System libraries that a program needs with the static library.
 const SYSTEM_LIBRARIES: &str = if cfg!(target_os = "linux") {
     "-lpthread -ldl -lm -lgcc_s"
 } else {

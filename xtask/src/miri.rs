@@ -31,7 +31,7 @@ pub fn miri(arguments: &[String]) -> Result<(), String> {
         .env("MIRIFLAGS", flags))
 }
 
-/// What installs what is not here; none if all is.
+/// Command that installs missing programs; none if all are installed.
 fn lacking() -> Option<&'static str> {
     const INSTALL: &str = "rustup toolchain install nightly --profile minimal --component miri --component rust-src";
     let told = |arguments: &[&str]| output(Command::new("rustup").args(arguments)).unwrap_or_default();

@@ -52,7 +52,7 @@ pub fn output(command: &mut Command) -> Result<String, String> {
 /// The profile of what is shipped: programs, libraries, wheels.
 pub const SHIPPED: &str = "shipped";
 
-/// What chores next to the tests build: of the same features as the tests, so that nothing is compiled twice. Not
+/// Arguments of the builds for chores: of the same features as the tests, so that nothing is compiled twice. Not
 /// `--lib`: the module of Python is compiled by maturin, under settings of its own. The test brings the libraries for
 /// C, into the folder `deps`.
 pub const AS_TESTS: [&str; 6] = ["build", "--workspace", "--bins", "--examples", "--test", "symbols"];

@@ -1,4 +1,4 @@
-//! What runs on other processors than this one, for the places in which hoid runs and their tests.
+//! Builds for other processors, for the places in which hoid runs and their tests.
 
 use std::path::PathBuf;
 

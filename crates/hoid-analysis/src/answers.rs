@@ -1,6 +1,6 @@
 //! Reliability of each answer of a result: the response, crossover and phase margin, each parameter.
 //!
-//! What speaks against the data or against the fit speaks against all answers. In addition, an answer can be open by
+//! A finding against the data or the fit counts against all answers. In addition, an answer can be undetermined by
 //! itself: a parameter that the data do not determine, a crossover whose interval holds zero. The level of the whole is
 //! that of the answers that were asked for: a result whose delay is open is trustworthy in its report on the crossover,
 //! and not determined for a request for the delay. By default it is that of the response, and a loop that is open is a

@@ -94,8 +94,8 @@ impl Recordings {
     }
 }
 
-/// What a fit next to the lines is reported of them: what was searched for by name is missed, what was searched for by
-/// itself is not.
+/// The excitation for a fit that also uses the lines: a missing channel is an error if the user named it, and not
+/// otherwise.
 pub(crate) fn of_lines(
     described: &Result<Option<Description>, AnalysisError>,
     excitation: &Excitation,

@@ -1,4 +1,4 @@
-//! What ends a command early, and with which exit code.
+//! Errors that end a command, and their exit codes.
 
 use hoid::analysis::{AnalysisError, registry::estimator_setting};
 use hoid::design::{compare::CompareError, experiment::DesignError};
@@ -19,7 +19,7 @@ use crate::{
 /// Everything that a command can run into.
 #[derive(Debug, Error)]
 pub enum CliError {
-    /// What was typed contradicts itself or cannot be read.
+    /// The arguments are contradictory or invalid.
     #[error("{0}")]
     Usage(String),
     /// A file with other columns than were asked for, and the command that names them.
@@ -122,7 +122,7 @@ impl CliError {
         }
     }
 
-    /// What follows from the verdict on a result that has been printed.
+    /// Exit code for the verdict of a printed result.
     ///
     /// # Errors
     /// [`CliError::NotDetermined`] where the data do not determine what was asked.

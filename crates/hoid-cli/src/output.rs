@@ -108,7 +108,7 @@ fn wrapped(page: &str, width: usize) -> String {
 /// The report after the answer: words, and what they are reported about.
 static NOTICES: Mutex<Vec<(String, Vec<String>)>> = Mutex::new(Vec::new());
 
-/// What is before a remark that speaks of trouble.
+/// Prefix of a warning.
 const WARNING: &str = "warning: ";
 
 /// Keeps a warning, as [`notice`].

@@ -70,7 +70,7 @@ impl<const N: usize> ParameterStep<N> {
     };
 }
 
-/// What turns gradients into steps: [`crate::covariance::Covariance`] and
+/// An adaptation, which turns gradients into steps: [`crate::covariance::Covariance`] and
 /// [`crate::window::Window`].
 pub trait Adaptation<const N: usize> {
     /// The step for psi and the innovation eps at theta. `variance` is sigma^2, zero if it is not

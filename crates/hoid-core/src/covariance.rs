@@ -22,7 +22,7 @@ const NO_EXCITATION: f64 = 1e-100;
 const POWER_WEIGHT: f64 = 0.01;
 /// c of the normalised gradient, relative to the largest mean power of psi.
 const GRADIENT_OFFSET: f64 = 0.01;
-/// What an early sample forgets in addition is over below this.
+/// Lower limit of the additional forgetting of early samples.
 const NO_EARLY_FORGETTING: f64 = 1e-9;
 /// Longest period of the guard in samples.
 const LONGEST_PERIOD: f64 = 64.0;
@@ -42,11 +42,11 @@ pub struct Covariance<const N: usize> {
     bound: [f64; N],
     /// Information of the pseudo-measurement of each parameter, per unit of what is forgotten.
     guard: [f64; N],
-    /// What has been forgotten since the start, now and at the last pseudo-measurement of each
+    /// Accumulated forgetting since the start, now and at the last pseudo-measurement of each
     /// parameter.
     forgotten: f64,
     forgotten_at_turn: [f64; N],
-    /// What an early sample forgets in addition, and the factor by which that decays from sample to
+    /// Additional forgetting of an early sample, and the factor by which that decays from sample to
     /// sample.
     early: f64,
     early_decay: f64,

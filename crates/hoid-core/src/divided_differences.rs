@@ -237,9 +237,9 @@ mod tests {
         ]
     }
 
-    /// What rounding is measured by: the values themselves; where they pass zero, which they do
-    /// among fast complex poles, the amplitudes of sine and cosine; for those that are sums of
-    /// others, the sum of the magnitudes.
+    /// Scale of rounding errors: the values themselves; where they pass zero, which they do among
+    /// fast complex poles, the amplitudes of sine and cosine; for those that are sums of others,
+    /// the sum of the magnitudes.
     fn scales(s: f64, q: f64, values: &[f64; 8]) -> [f64; 8] {
         let [mut mean, mut phi1, phi2, mut phi2_slope, ..] = values.map(f64::abs);
         let x = s * s / 4.0 - q;

@@ -35,7 +35,7 @@ const ALL_PRIOR: f64 = 0.9;
 pub struct PooledPerson {
     /// Who.
     pub subject: String,
-    /// What their own data show, with the standard error; none if that is nothing.
+    /// Estimate from their own data, with the standard error; none without information.
     pub own: Option<(f64, f64)>,
     /// The estimate from all.
     pub value: f64,

@@ -22,7 +22,7 @@ const OPERATOR: [(&CStr, &CStr); 6] = [
     (c"zeta_nm", c""),
     (c"tau_e", c"s"),
 ];
-/// What a change is of.
+/// Quantities that a change refers to.
 const SHIFTED: [&CStr; HOID_SHIFTS] = [c"K_e", c"K_e_dot", c"omega_nm", c"zeta_nm", c"remnant", c"tau_e"];
 
 /// A tracker and the prior knowledge of it.

@@ -13,7 +13,8 @@ use hoid_ident::IdentError;
 use hoid_io::IoError;
 use hoid_model::ModelError;
 
-/// What a function answers: zero for done, positive where there is no value, negative for an error.
+/// Return code of a function: zero for done, positive where there is no value, negative for an
+/// error.
 pub type HoidStatus = i32;
 
 /// Done.

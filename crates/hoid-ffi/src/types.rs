@@ -4,7 +4,7 @@ use std::{ffi::c_char, ptr};
 
 use hoid_model::uncertainty::Estimate;
 
-/// What a sample led to.
+/// Result of a sample.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HoidOutcome {

@@ -129,7 +129,7 @@ pub enum IdentError {
         option: String,
         /// The value given.
         found: String,
-        /// What would be right.
+        /// The expected value.
         expected: String,
     },
     /// An option that contradicts another, or does not fit the estimator.

@@ -41,7 +41,7 @@ pub struct Fit {
     pub(crate) searched_delay: Option<SearchedDelay>,
 }
 
-/// What a grey box fitted: theta is a function of these.
+/// Physical parameters of a grey-box fit: theta is a function of these.
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub(crate) struct Physical {
     /// The fitted model, in a line.

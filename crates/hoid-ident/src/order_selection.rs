@@ -294,7 +294,7 @@ pub struct Choice {
     pub fit: Fit,
     /// All candidates in the order of [`OrderRanges::combinations`].
     pub candidates: Vec<Candidate>,
-    /// What decided.
+    /// The criterion of the choice.
     pub criterion: Criterion,
 }
 

@@ -30,7 +30,7 @@ const fn or_auto<const N: usize, const M: usize>(names: [&'static str; N]) -> [&
 /// A field of an estimator.
 pub type Field<E, T> = fn(&mut E) -> &mut T;
 
-/// What noise an operator has: which of the operators is fitted follows from it.
+/// Noise model of an operator, which determines the estimator.
 pub fn noise<E: 'static>(set: impl Fn(&mut E, &Setting, &str) -> Result<(), IdentError> + 'static) -> BatchOption<E> {
     let help =
         "Noise of the operator: ar an autoregression, arma with a moving average (nc), remnant the remnant of order m";

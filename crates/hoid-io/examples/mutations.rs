@@ -27,7 +27,7 @@ use mutations::{Case, case, originals::originals, readers, spent::Spent};
 
 /// The value for the page; the tests have another.
 const SEED: u64 = 2026;
-/// What one case may take.
+/// Time limit of one case.
 const LIMIT: Duration = Duration::from_secs(1);
 /// A process that does not go on for so long hangs.
 const PATIENCE: Duration = Duration::from_secs(60);

@@ -532,7 +532,7 @@ pub enum IoError {
         format: &'static str,
         /// The replacement.
         found: String,
-        /// What such a file starts with.
+        /// First bytes of such a file.
         expected: &'static str,
     },
     /// Bytes that contradict the format of the file.
@@ -540,10 +540,10 @@ pub enum IoError {
     Damaged {
         /// The file.
         file: String,
-        /// What contradicts the format, and where.
+        /// The violation of the format, and its place.
         found: String,
     },
-    /// What the format allows and hoid does not read.
+    /// Content that the format allows and hoid does not support.
     #[error("{file}: {found}, which hoid does not read; {remedy}")]
     Unsupported {
         /// The file.
@@ -553,7 +553,7 @@ pub enum IoError {
         /// Remedy.
         remedy: &'static str,
     },
-    /// What was read does not make a record.
+    /// The data do not form a record.
     #[error("{file}: {source}")]
     Model {
         /// The file.
@@ -563,7 +563,7 @@ pub enum IoError {
     },
 }
 
-/// What helps where a file cannot be written.
+/// Remedy for a file that cannot be written.
 fn remedy_of_writing(source: &std::io::Error) -> &'static str {
     use std::io::ErrorKind;
     // What the writer of CSV wraps.

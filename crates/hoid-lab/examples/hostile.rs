@@ -22,7 +22,7 @@ use std::{
 
 use hostile::Hostile;
 
-/// What one case may take.
+/// Time limit of one case.
 const LIMIT: Duration = Duration::from_secs(2);
 /// Panics, those that are caught among them.
 static PANICS: AtomicUsize = AtomicUsize::new(0);

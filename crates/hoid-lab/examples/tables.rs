@@ -10,7 +10,7 @@ use data_encoding::BASE64;
 use hoid_lab::{Config, order::plan, task::Task};
 use serde_json::json;
 
-/// What a page confirms where no file states anything else: nothing is stored by it.
+/// Default consent text of the page: nothing is stored by it.
 const CONSENT: &str = "You will follow a moving target by hand for a minute and a half. Stop at any time by the key \
 Escape or by closing the window. Do not take part if moving patterns make you unwell.";
 

@@ -29,7 +29,7 @@ use crate::{LabError, plant::MOST_STATES};
 pub struct Config {
     /// Its name.
     pub name: String,
-    /// What a person confirms before anything is measured.
+    /// Consent of the person before any measurement.
     pub consent: String,
     /// The order of the conditions.
     pub order: Order,
@@ -37,7 +37,7 @@ pub struct Config {
     pub live: LiveFor,
     /// The recursive method of the live estimate, as `hoid track --method` has it.
     pub method: String,
-    /// What makes a run unverified other than a bit that differs.
+    /// Limits beyond which a run is unverified.
     pub limits: Limits,
     /// The tracked signal, and how often.
     pub condition: Vec<Condition>,
@@ -80,7 +80,7 @@ pub enum Display {
     Preview,
 }
 
-/// What makes a run unverified other than a bit that differs.
+/// Limits beyond which a run is unverified.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Limits {
@@ -106,7 +106,7 @@ impl Default for Limits {
 pub struct Condition {
     /// Letters and digits: it is part of file names.
     pub name: String,
-    /// What the person reads before a run.
+    /// Instructions to the person before a run.
     pub text: String,
     /// A condition C1 to C6, or a scenario file; it is in place of the keys from
     /// `controlled_element` to `disturbance`.
@@ -214,7 +214,7 @@ impl Default for Condition {
 /// from the first seconds on.
 const DEFAULT_METHOD: &str = "adaptive";
 
-/// What a person confirms where the file carries no information else.
+/// Default consent text.
 const CONSENT: &str = "You will follow a moving target by hand for a few short runs. The program stores where your \
 hand was, what was on the screen and when, under a made-up name, on this computer only. It stores no name, no picture \
 and no sound. You may stop at any time by the key Escape or by closing the window; what was stored can be deleted with \

@@ -1,8 +1,8 @@
 //! The experiment as its pages see it: one session at a time, one page that tracks, any number that
 //! look on.
 //!
-//! What pages state comes from the threads of their sockets, one message at a time under one lock; what is reported to
-//! them goes into the queue of each. The estimate has a thread of its own, the pages of results too.
+//! Messages from pages arrive on the threads of their sockets, one at a time under one lock; messages to pages go into
+//! the queue of each. The estimate has a thread of its own, the pages of results too.
 //!
 //! | file | what it holds |
 //! |---|---|
@@ -37,7 +37,7 @@ use crate::{
     wire::{FromPage, Role, ToPage},
 };
 
-/// What goes to a page.
+/// Messages to a page.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Outgoing {
     /// A message.

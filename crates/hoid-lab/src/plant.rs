@@ -70,7 +70,7 @@ pub const MOST_STATES: usize = 16;
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct InputMap {
-    /// What the device reports at rest: pixels from the left edge, or 0 of a gamepad.
+    /// Value of the device at rest: pixels from the left edge, or 0 of a gamepad.
     pub centre: f64,
     /// From there to the full deflection.
     pub span: f64,

@@ -23,7 +23,7 @@ const GROUP: &str = "group";
 pub struct Pages(Vec<(String, String)>);
 
 impl Pages {
-    /// What they are, and where after the address of the page.
+    /// Titles of the pages, and their paths.
     pub fn links(&self) -> Vec<(String, String)> {
         self.0.clone()
     }

@@ -185,7 +185,7 @@ impl Server {
         Ok(())
     }
 
-    /// What an admitted request asks for.
+    /// Resource of an admitted request.
     fn routed(&self, request: &Request) -> Result<Route, Reply> {
         let parts: Vec<&str> = request.token().1.split('/').collect();
         let file = |found: Result<Option<(Vec<u8>, &'static str)>, LabError>| match found {

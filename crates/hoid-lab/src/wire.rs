@@ -53,7 +53,7 @@ pub enum FromPage {
         refresh_ms: f64,
         zero_ms: f64,
     },
-    /// What happened since the last batch.
+    /// Events since the last batch.
     Batch { number: usize, batch: Batch },
     /// The run reached its end.
     Finish {
@@ -91,7 +91,7 @@ pub enum ToPage<'a> {
     Verdict { done: &'a Done, measures: &'a Measures },
     /// The estimate while a run goes on.
     Live { number: usize, line: &'a LiveLine },
-    /// What was asked for cannot be; `elsewhere` if the session is in another window.
+    /// The request is refused; `elsewhere` if the session is in another window.
     Refused { words: String, elsewhere: bool },
     /// The session goes on in this window, whose other window is gone.
     Yours {},

@@ -79,7 +79,7 @@ pub enum ModelError {
         label: String,
         /// The findings.
         found: String,
-        /// What would do.
+        /// The expected value.
         expected: String,
     },
     /// Two records that do not follow each other.

@@ -1,5 +1,5 @@
-//! What hoid identifies, and the mathematics that needs no data: records, polynomial models, exact
-//! discretisation, the operator's parameters and the task in which an operator is measured.
+//! Models of hoid and mathematics that needs no data: records, polynomial models, exact discretisation, the operator's
+//! parameters and the task in which an operator is measured.
 //!
 //! A person who tracks a target sees the error e and answers with the control u. The operator model
 //! is a gain, a lead, a delay and the neuromuscular dynamics,

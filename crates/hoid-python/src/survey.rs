@@ -54,7 +54,7 @@ pub fn info<'py>(
     Ok(all)
 }
 
-/// What the file looks like, and how it is to be read.
+/// Layout of the file, and the keywords to read it.
 fn looked<'py>(py: Python<'py>, look: &Look) -> PyResult<Bound<'py, PyDict>> {
     let role = |role: &Role| -> PyResult<Bound<'py, PyDict>> {
         let all = PyDict::new(py);

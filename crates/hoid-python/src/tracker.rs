@@ -33,7 +33,7 @@ pub struct PyTracker {
     live: Live,
     choice: Option<Choice>,
     sample_time: SampleTime,
-    /// What lowers a high rate: error, control, target.
+    /// Decimator of error, control and target.
     decimator: Option<Decimator<3>>,
 }
 
@@ -358,7 +358,7 @@ impl PyTracker {
         Ok(all)
     }
 
-    /// What the guard found or did at the last sample, its times in s before that sample.
+    /// Event of the guard at the last sample, its times in s before that sample.
     #[getter]
     fn event<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
         let Live::Tracking(tracker) = &self.live else {

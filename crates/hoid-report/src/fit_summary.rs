@@ -65,7 +65,7 @@ pub(crate) fn verdict(v: &Verdict) -> Value {
     }
 }
 
-/// What people call the parameters of an operator, in the order of a sentence.
+/// Names of the parameters of an operator in sentences, in order.
 const WORDS: [(&str, &str, &str); 7] = [
     ("gain", "K", ""),
     ("gain", "K_e", ""),

@@ -75,7 +75,7 @@ pub fn sentence_of_operator(found: &Identified) -> Option<String> {
     )
 }
 
-/// What a parameter is that the data do not determine; nothing for one that they do.
+/// Mark of a parameter that the data do not determine; empty otherwise.
 pub fn undetermined(p: &Parameter) -> &'static str {
     match (p.determined, p.prior_share > 0.5) {
         (true, _) => "",

@@ -39,7 +39,7 @@ pub struct Report<'a> {
 pub struct Picture {
     /// The figure, as SVG text.
     pub svg: String,
-    /// What is seen, in a sentence.
+    /// Caption, in a sentence.
     pub caption: String,
 }
 

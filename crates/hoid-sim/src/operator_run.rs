@@ -1,9 +1,9 @@
 //! The operator of a scenario alone, a sample at a time: for a loop that is closed elsewhere.
 //!
-//! What [`Simulator`] does of `u = y(k - tau_e/Ts) + n`, with the same random numbers: a loop that
-//! answers u as its controlled element does gives the same run to the last bit. The control of a
-//! sample does not hang on the error of the same sample, for the operator's response holds e over a
-//! sample first.
+//! Simulates, as [`Simulator`] does in a loop, `u = y(k - tau_e/Ts) + n`, with the same random
+//! numbers: a loop that answers u as its controlled element does gives the same run to the last
+//! bit. The control of a sample does not hang on the error of the same sample, for the operator's
+//! response holds e over a sample first.
 
 use crate::{RunSeed, Simulator, cascade::MOST};
 

@@ -15,7 +15,7 @@ pub enum StudyError {
         path: String,
         /// Line, from 1, where one can be named.
         line: Option<usize>,
-        /// What is wrong and the expected value.
+        /// The problem and the expected value.
         reason: String,
     },
     /// A file that cannot be read or written.

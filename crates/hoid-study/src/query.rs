@@ -51,7 +51,7 @@ impl std::fmt::Display for Query {
     }
 }
 
-/// What describes a cell and an estimator.
+/// Description of a cell and an estimator.
 #[derive(Debug, Clone)]
 pub(crate) struct RowKey {
     pub cell: u64,

@@ -49,7 +49,7 @@ pub struct Progress {
     pub known: u64,
 }
 
-/// What a run has left behind.
+/// Result of a run.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Outcome {
     /// True when all blocks of the study (or of its shard) are there.

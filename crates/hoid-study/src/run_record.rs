@@ -74,7 +74,7 @@ impl RunRecord {
         Ok(hoid_io::write_atomically(&path, |file| writeln!(file, "{text}"))?)
     }
 
-    /// What keeps two parts from belonging to one study; none when they do.
+    /// Difference that prevents merging two parts into one study; none if they match.
     pub fn differs(&self, other: &Self) -> Option<String> {
         // What a user may have changed on purpose first: each of these also changes the hash of the
         // plan, which reports less.

@@ -58,7 +58,7 @@ pub(crate) fn write_block(
     })?)
 }
 
-/// What is on disk of a block.
+/// Part of a block on disk.
 pub(crate) fn on_disk(directory: &Path, plan_sha256: &str, block: u64) -> OnDisk {
     let path = seal_path(directory, block);
     if !path.exists() {

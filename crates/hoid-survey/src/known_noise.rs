@@ -1,5 +1,5 @@
-//! What methods in the operator's parameters have in common that know the noise model from a batch fit: their
-//! checks, and T_L of gains.
+//! Common parts of methods in the operator's parameters with the noise model of a batch fit: their checks, and T_L of
+//! gains.
 
 use hoid_ident::IdentError;
 use hoid_track::{

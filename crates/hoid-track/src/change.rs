@@ -39,7 +39,7 @@ pub struct Change {
 
 /// Change over its standard error from which a quantity is reported to have changed.
 const CHANGED: f64 = 2.0;
-/// What [`Change::z`] is of.
+/// Quantities of [`Change::z`].
 const QUANTITIES: [&str; 6] = ["K_e", "K_e_dot", "omega_nm", "zeta_nm", REMNANT, "tau_e"];
 const REMNANT: &str = "remnant";
 

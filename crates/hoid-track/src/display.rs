@@ -7,7 +7,7 @@ use crate::{
 };
 
 impl TrackOptions {
-    /// What the recursion remembers, and how.
+    /// Memory of the recursion.
     pub fn memory_as_text(&self, sample_time: SampleTime) -> String {
         let method = &self.method;
         if let Some(words) = method.memory_as_text() {

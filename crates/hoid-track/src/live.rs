@@ -12,7 +12,7 @@ use crate::{
 };
 use hoid_ident::{Choice, IdentError};
 
-/// What makes the options of a record of the warm-up, with what was searched for them.
+/// Computes the options from a record of the warm-up, with the searched values.
 pub type Choose<'a> = &'a dyn Fn(&Record) -> Result<(TrackOptions, Option<Choice>), IdentError>;
 
 /// Share of the warm-up that is collected in addition after a fit that failed.
@@ -31,7 +31,7 @@ pub enum Live {
     Tracking(Box<Tracker>),
 }
 
-/// What a sample led to.
+/// Result of a sample.
 #[derive(Debug, Default)]
 pub struct LiveOutcome {
     /// Report of the tracker, once there is one.
@@ -247,7 +247,7 @@ impl WarmUp {
         Ok((tracker, choice))
     }
 
-    /// What was collected as a record; a faulty value is the last good one.
+    /// The collected samples as a record; a faulty value is the last good one.
     fn record(&self) -> Result<Record, IdentError> {
         let channel = |name: &str, of: fn(&Sample) -> f64| {
             let mut last = self.samples.iter().map(of).find(|v| v.is_finite()).unwrap_or(0.0);

@@ -41,7 +41,7 @@ pub struct About {
     pub defaults: &'static [(&'static str, &'static str)],
 }
 
-/// What a method can do after a box: any that can be cloned and compared.
+/// Object-safe operations of a method: clone and comparison.
 pub trait Boxed: fmt::Debug + Send + Sync {
     /// A copy.
     fn boxed(&self) -> Box<dyn RecursiveMethod>;

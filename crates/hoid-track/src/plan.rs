@@ -1,5 +1,5 @@
-//! What is to be tracked while some orders may still be open: they are searched on the start span
-//! or the warm-up.
+//! Tracking plan with orders that may still be open: they are searched on the start span or the
+//! warm-up.
 
 use std::{collections::BTreeMap, ops::RangeInclusive};
 
@@ -140,10 +140,9 @@ fn default_ranges(method: &Method, ranges: &OrderRanges, sample_time: SampleTime
     }
 }
 
-/// What is searched: the ranges that are typical for structure and method, with the orders that are
-/// named in their place. Where nk is not named, the delay lies within the range that is tracked;
-/// where no other order is, orders that are still open are those of the coefficients of a start,
-/// named as f1 or b0.
+/// Search ranges: the defaults of structure and method, with named orders in their place. Where nk
+/// is not named, the delay lies within the range that is tracked; where no other order is, orders
+/// that are still open are those of the coefficients of a start, named as f1 or b0.
 ///
 /// # Errors
 /// [`IdentError::BadOption`] for a name that is not an order.
@@ -195,7 +194,7 @@ fn narrowed(
     ranges
 }
 
-/// What the recursion checks when it starts, before anything is read or searched.
+/// Checks of the recursion at its start, before data are read or orders searched.
 fn check(options: &TrackOptions, sample_time: SampleTime) -> Result<(), IdentError> {
     options.check_at(sample_time)?;
     for memory in options.memories()? {

@@ -1,5 +1,5 @@
-//! What a trace reports of a recursion in physical parameters whose noise model stays: the
-//! polynomials of the exact hold and the operator.
+//! Trace of a recursion in physical parameters with a fixed noise model: the polynomials of the
+//! exact hold and the operator.
 
 use hoid_core::{
     held_operator::held_operator,

@@ -1,4 +1,4 @@
-//! What a recursion without a guard does while nothing arrives.
+//! Behaviour of a recursion without a guard while the signals are constant.
 //!
 //! Where e and u stay constant the regressor is zero or constant, the innovations vanish, and their variance, a mean of
 //! `eps^2/(1 + h' Sigma h)` with an exponential memory ([`hoid_core::innovation_variance`]), is forgotten to zero: it
@@ -42,7 +42,7 @@ const MOST: u64 = 1 << 17;
 /// e and u.
 const CHANNELS: usize = 2;
 
-/// What a recursion does with a sample.
+/// Action of a recursion on a sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Act {
     /// It takes it.
@@ -284,7 +284,7 @@ impl StationaryWatch {
         }
     }
 
-    /// What represents so long that nothing arrives, and how many samples are to be taken back.
+    /// The channel that has been constant for too long, and the number of samples to undo.
     #[inline]
     fn stationary_channel(&self) -> Option<(GuardChannel, u64)> {
         let [e, u] = self.channels.map(|channel| channel.stands);

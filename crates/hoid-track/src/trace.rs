@@ -54,7 +54,7 @@ pub struct Trace {
     /// The batch fit that the recursion started from.
     pub(crate) start: Option<Fit>,
     pub(crate) failures: Option<(usize, String)>,
-    /// What the response at the end reports against who is reported to have held the loop.
+    /// Finding of the response at the end against the assumed operator.
     pub(crate) response_doubt: Option<Finding>,
     /// Every crossing of the loop at the end with its controlled element.
     pub(crate) loop_shape: Option<LoopShape>,

@@ -168,7 +168,7 @@ impl Tracker {
         }
     }
 
-    /// What the guard found or did at the last sample.
+    /// Event of the guard at the last sample.
     pub fn event(&self) -> Option<GuardEvent> {
         let of_guard = self.guard.as_ref().and_then(|guard| guard.event());
         of_guard.or_else(|| self.stationary.as_ref()?.event())
@@ -304,8 +304,8 @@ impl Tracker {
         LoopShape::of(known, element, self.sample_time)
     }
 
-    /// What the current response reports against who is reported to have held the loop: with a controlled element the
-    /// loop that they would make ([`LoopShape::doubt`]), without one the sign of the response at low frequencies.
+    /// Finding of the current response against the assumed operator: with a controlled element, the loop that it would
+    /// form ([`LoopShape::doubt`]), without one the sign of the response at low frequencies.
     pub(crate) fn response_doubt(&self) -> Option<Finding> {
         if let Some(element) = &self.options.controlled_element {
             let reach = match self.open_loop()? {

@@ -1,4 +1,4 @@
-//! What a trace explains of another run, and the covariance at the start that this chooses.
+//! Prediction of another run by a trace, and the choice of the initial covariance by it.
 //!
 //! The thesis measures models by the variance accounted for (eq. 39) and proposes that "the covariance matrix could be
 //! updated based on VAF from a validation data set, in order to reduce the strong oscillations" (section VII); how, it
@@ -98,7 +98,7 @@ impl Trace {
     }
 }
 
-/// What a second run must be, and what its trace.
+/// Checks a second run and its trace.
 fn check(other: &Record, options: &TrackOptions, ts: SampleTime) -> Result<(), IdentError> {
     let found = other.sample_time();
     if !found.matches(ts) {

@@ -74,7 +74,7 @@ pub enum Course {
     Intermittent,
 }
 
-/// What stick and recorder do.
+/// Effects of stick and recorder.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Blemish {
     /// Nothing.
@@ -113,7 +113,7 @@ pub struct Shift {
     pub factor: f64,
 }
 
-/// What a method is reported of the delay.
+/// Information about the delay that a method gets.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum DelayKnown {
     /// Its value, which is a whole number of samples.

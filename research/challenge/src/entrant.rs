@@ -98,7 +98,7 @@ pub struct Alarm {
     pub of_remnant: bool,
 }
 
-/// What an entrant answers.
+/// Result of an entrant.
 #[derive(Debug, Clone, Default)]
 pub struct EntrantResult {
     /// The report at each time that was asked for.

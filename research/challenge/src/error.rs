@@ -10,7 +10,7 @@ pub enum ChallengeError {
     /// A case, an entrant, a recording or a line that cannot be used.
     #[error("challenge: {reason}")]
     Refused {
-        /// What is wrong and the expected value.
+        /// The problem and the expected value.
         reason: String,
     },
     /// A file that cannot be read or written.

@@ -312,7 +312,7 @@ fn of_response(said: &ReportedResponse, truths: &[Complex64]) -> (f64, [usize; 2
     (error, covered)
 }
 
-/// What is asked in a run, for tests of entrants.
+/// Task of a run, for tests of entrants.
 #[cfg(test)]
 pub(super) fn posed_task(case: &Case, of: RunOf) -> Task {
     Posed::new(case, of).unwrap_or_else(|e| panic!("{e}")).task

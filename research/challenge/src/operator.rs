@@ -36,7 +36,7 @@ pub struct Operator {
     pub tau_e_s: f64,
 }
 
-/// What of an operator changes.
+/// Parameter of an operator that changes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Parameter {
     /// K_e: the gain at low frequencies, K_e_dot stays.

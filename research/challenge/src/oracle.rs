@@ -1,4 +1,4 @@
-//! What could be known: bounds that no method can be asked to pass.
+//! The available information: bounds that no method can exceed.
 //!
 //! **Evidence of a change.** The logarithm of the likelihood ratio of the true model after a change
 //! against the true model before it, the change's time, the remnant's spectrum, density and course
@@ -63,8 +63,8 @@ pub fn evidence(case: &Case, run: &Run, change: usize, seconds: f64) -> f64 {
         .sum()
 }
 
-/// What the batch fit shows at the times that are asked for, `changes_s` known; nothing if it has
-/// too few seconds or fails.
+/// Batch fit at the requested times, with known `changes_s`; nothing if it has too few seconds or
+/// fails.
 pub fn batch(task: &Task, changes_s: &[f64], tau_e_s: f64) -> Vec<ReportedResponse> {
     let nk = (tau_e_s / task.sample_time.s()).round() as usize + 1;
     let structure = Structure::BoxJenkins;

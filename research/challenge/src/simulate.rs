@@ -37,7 +37,7 @@ pub struct Run {
     pub excitation: Vec<f64>,
     /// The operator over time.
     pub truth: Truth,
-    /// What an oracle knows.
+    /// True values for an oracle.
     pub hidden: Hidden,
 }
 
@@ -100,7 +100,7 @@ fn held(operator: &Operator, omega_rad_s: f64, sample_time: SampleTime) -> Compl
 /// Aliases on either side; they fall as the square of their number, or faster.
 const ALIASES: i32 = 100;
 
-/// What only an oracle knows, sample by sample.
+/// True values, sample by sample.
 #[derive(Debug, Clone)]
 pub struct Hidden {
     /// Remnant, before stick and recorder.
@@ -285,7 +285,7 @@ fn of_person(case: &Case, run: RunOf, operator: Operator, sample_time: SampleTim
 }
 
 impl Run {
-    /// What the recorder makes of it.
+    /// The signals as recorded.
     fn recorded(&mut self, case: &Case, run: RunOf, [sigma_u, sigma_e]: [f64; 2]) {
         let ts = self.sample_time.s();
         let at = |t_s: f64| ((t_s / ts).round() as usize).min(self.e.len());

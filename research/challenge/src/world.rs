@@ -106,7 +106,7 @@ impl World {
         }
     }
 
-    /// What reaches the operator at start, middle and end of the step that starts at a place, in steps.
+    /// Input of the operator at start, middle and end of the step that starts at a place, in steps.
     fn input(&self, place: f64) -> [f64; 3] {
         match self.sight {
             Sight::Held => [self.mean_held(place); 3],

@@ -191,7 +191,7 @@ impl Tables {
         }
     }
 
-    /// What a method declares: false alarms, hours, found in %, median lag in s.
+    /// Declared changes of a method: false alarms, hours, found in %, median lag in s.
     fn declared(&self, name: &str, scenario: &str, conditions: &[&str]) -> [f64; 4] {
         let all = |quantity: &str| -> Vec<f64> {
             let of = |condition: &&str| {

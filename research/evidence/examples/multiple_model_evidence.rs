@@ -410,8 +410,8 @@ fn recording(path: &str) -> [Vec<f64>; 2] {
     [e, control]
 }
 
-/// What is declared around the joint of two recordings of a person: the first 30 s start it, up to
-/// 40 s nothing changes.
+/// Changes declared around the junction of two recordings of a person: the first 30 s start it, up
+/// to 40 s nothing changes.
 fn joined(files: &[String]) {
     let (start_s, seam_s) = (30.0, 40.0);
     let sample_time = SampleTime::new(1.0 / 60.0).unwrap();

@@ -1,4 +1,4 @@
-//! What the guard reports recordings: of those as they are, and of faults that are put into them.
+//! Events of the guard on recordings: on unmodified ones, and on ones with inserted faults.
 //!
 //! `HOID_PILOT_DATA=DIR cargo run --release -p hoid-evidence --example recorded_faults --
 //! [RUNS|all] [METHOD]`

@@ -1,5 +1,5 @@
-//! What someone could know at most: the likelihood ratio of the person after a change against the person before it,
-//! where both are known.
+//! Upper bound of the available information: the likelihood ratio of the person after a change against the person
+//! before it, where both are known.
 //!
 //! The gains s of each are those of all trials of that element (but the one that is examined), in the basis of the
 //! default person; after the whitening filter of the first trial's remnant, with its variance,

@@ -1,5 +1,5 @@
-//! What is identified from recordings: an estimator, the self-description of is taken out of the data for it, and what
-//! its fit alone.
+//! Estimators for recordings: the estimator, the trend that is removed from the data for it, and the verdict on its
+//! fit.
 //!
 //! | file | the estimator |
 //! |---|---|
@@ -32,7 +32,7 @@ pub trait BatchEstimator: Sized + 'static {
     /// Whose records it judges: of a person, who answers an error within a second, one without a response is reported.
     const OF: Of = Of::Person;
 
-    /// What the registry knows of it: one entry, or one for each of its methods.
+    /// Entries of the registry: one entry, or one for each of its methods.
     fn specs() -> Vec<MethodSpec>;
 
     /// Its options and those of the analysis around it that it has use for, in the order in which they are set

@@ -1,5 +1,5 @@
-//! What may be chosen of a polynomial structure: the fields of [`Polynomials`], and the names under which texts
-//! set them. An option is declared here and nowhere else.
+//! Options of a polynomial structure: the fields of [`Polynomials`], and the names under which texts set them. An
+//! option is declared here and nowhere else.
 
 use std::{collections::BTreeMap, ops::RangeInclusive};
 
@@ -126,7 +126,7 @@ fn searched() -> Vec<BatchOption<Polynomials>> {
     ]
 }
 
-/// What the prediction error method alone has.
+/// Options of the prediction error method alone.
 fn by_prediction() -> Vec<BatchOption<Polynomials>> {
     let focus = "What the model is to be good at: one-step prediction, or simulation from the input alone";
     let start = "Start of the search, all coefficients as f1=-1.9,f2=.92,b0=.04,...";
@@ -208,7 +208,7 @@ fn by_prediction() -> Vec<BatchOption<Polynomials>> {
     all
 }
 
-/// What instrumental variables alone have.
+/// Options of instrumental variables alone.
 fn by_instruments() -> Vec<BatchOption<Polynomials>> {
     let help = "Instruments: a channel that the noise does not reach, or `simulated` from the input, for an open loop";
     let setting =

@@ -43,7 +43,7 @@ impl Answers for PolynomialFit {
 }
 
 impl Polynomials {
-    /// What is searched at a sample time.
+    /// Search ranges at a sample time.
     ///
     /// # Errors
     /// [`AnalysisError`] for orders that the structure does not have, or that are too many.

@@ -285,7 +285,7 @@ pub fn fault(record: &str, found: &FoundFault) -> Value {
     object
 }
 
-/// What the library writes about itself, one object each.
+/// List of serialised items, one object each.
 pub fn list<T: Serialize>(items: &[T]) -> Value {
     // Numbers that JSON does not have become null; nothing else can fail.
     serde_json::to_value(items).unwrap_or(Value::Null)

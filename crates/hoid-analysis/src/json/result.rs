@@ -91,7 +91,7 @@ struct IssueFields {
     text: String,
 }
 
-/// What is written of a result, and read.
+/// Serialised form of a result.
 #[derive(Serialize)]
 struct Written<'a, F> {
     fit: &'a F,

@@ -24,7 +24,7 @@ pub struct Look {
     pub(super) known: LookOptions,
 }
 
-/// What is found in the record of a file.
+/// Summary of the record of a file.
 #[derive(Debug)]
 pub struct RecordSummary {
     /// The record, as it was recorded.

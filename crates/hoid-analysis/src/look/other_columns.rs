@@ -14,7 +14,7 @@ use super::{advice::typed, columns::Roles, file::names};
 pub struct OtherColumns {
     /// The file.
     pub file: String,
-    /// What was asked for and is not there.
+    /// The missing request.
     pub missing: String,
     /// The columns that there are.
     pub available: String,

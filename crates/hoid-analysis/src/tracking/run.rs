@@ -163,7 +163,7 @@ impl Tracking {
         })
     }
 
-    /// What contradicts itself or the record.
+    /// Checks for contradictions in the plan and with the record.
     fn check(&self, plan: &TrackPlan, record: &Record) -> Result<(), AnalysisError> {
         let method = &plan.options().method;
         if self.start_span_s.is_some() && matches!(self.recursion.start, RequestedStart::Coefficients(_)) {

@@ -61,7 +61,7 @@ pub fn settings_of_recursion(
     list
 }
 
-/// What is not of the recursion: the second run, the start, the rows.
+/// Settings other than those of the recursion: the second run, the start, the rows.
 pub(super) struct OwnSettings<'a> {
     pub trace: &'a Trace,
     pub options: &'a TrackOptions,

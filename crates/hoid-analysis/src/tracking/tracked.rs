@@ -13,7 +13,7 @@ use crate::{
     settings::Setting,
 };
 
-/// What a second run showed about the covariance, and the name of that run.
+/// Covariance from a second run, and the name of that run.
 #[derive(Debug, Clone)]
 pub enum Covariance {
     /// The one at the start.
@@ -37,7 +37,7 @@ pub struct Tracked {
     pub operators: Vec<Result<OperatorEstimate, NotConvertible>>,
     /// The search for the orders, where there was one.
     pub choice: Option<Choice>,
-    /// What a second run showed.
+    /// Result of a second run.
     pub covariance: Option<Covariance>,
     /// The settings that were used.
     pub settings: Vec<Setting>,

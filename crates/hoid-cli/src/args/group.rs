@@ -117,7 +117,7 @@ pub struct SimulateGroupArgs {
     pub trouble: Vec<SamplingDefect>,
 }
 
-/// What --people takes in addition.
+/// Additional options of --people.
 #[derive(Debug, Args)]
 pub struct PeopleOptions {
     /// With --people: controlled elements 1/s, 1/(s(s+1)), 1/s^2 by name, separated by commas

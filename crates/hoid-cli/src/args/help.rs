@@ -1,4 +1,4 @@
-//! What help shows: `hoid -h` lists the commands by what they are for; `hoid COMMAND -h` shows the
+//! Help pages: `hoid -h` lists the commands by what they are for; `hoid COMMAND -h` shows the
 //! options that most people need, under headings, and two examples; `--help` shows everything.
 //!
 //! The tables here hold names of commands and options alone: what an option does is reported where
@@ -350,7 +350,7 @@ fn in_any_case(arg: Arg) -> Arg {
     arg.ignore_case(takes_value)
 }
 
-/// What most people do not need is shown by `--help` alone.
+/// Rarely needed options are shown by `--help` alone.
 fn argument(arg: Arg, help: &Help) -> Arg {
     let id = arg.get_id().as_str().to_owned();
     let hidden = !arg.is_positional() && !help.shown.is_empty() && !help.shown.contains(&id.as_str());

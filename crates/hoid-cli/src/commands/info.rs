@@ -41,7 +41,7 @@ fn faults_of(look: &Look) -> Vec<Fault> {
     repaired.map_or_else(Vec::new, |repaired| repaired.faults)
 }
 
-/// What the file looks like, and the command to type next.
+/// Layout of the file, and the next command.
 fn looks_like(look: &Look, file: &str) -> String {
     let role = |role: &Role| format!("{} ({})", role.column, role.why);
     let mut rows = vec![("input", role(&look.roles.input)), ("output", role(&look.roles.output))];

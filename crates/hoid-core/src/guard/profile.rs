@@ -41,7 +41,7 @@ const OTHER: f64 = 2.0;
 const LARGER_BLOCKS: u32 = 2;
 const SWAPPED_DRIFT: f64 = 1.0;
 const SWAPPED: f64 = 6.0;
-/// What one block shows at most.
+/// Largest evidence of one block.
 const MOST_EVIDENCE: f64 = 4.0;
 const MISFIT: f64 = 4.0;
 /// R below which no model predicts too little.

@@ -20,7 +20,7 @@ pub const ROOM: usize = 16;
 pub const DRIFT: f64 = 0.2;
 /// Sum at which the estimate is diverged.
 pub const ASTRAY: f64 = 40.0;
-/// What one block shows at most.
+/// Largest evidence of one block.
 const MOST: f64 = 15.0;
 
 /// Orders of the model: na, nb, nc, nd, nf.

@@ -32,7 +32,7 @@ named_choice!(Adjustment, "adjustment", 2, {
     None => "none",
 });
 
-/// What differs from run to run.
+/// A covariate that differs between runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Covariate {
     /// The number of the run.

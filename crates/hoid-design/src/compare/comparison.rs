@@ -99,7 +99,7 @@ pub struct Learning {
 /// An estimate that is not there, and why.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct LeftOut {
-    /// What was compared without it.
+    /// The quantity that was compared without it.
     pub quantity: Quantity,
     /// Who.
     pub subject: String,
@@ -130,7 +130,7 @@ pub struct Comparison {
     pub verdict: Verdict,
 }
 
-/// What [`Comparison::json`] calls itself.
+/// Kind in the JSON of [`Comparison::json`].
 const KIND: &str = "comparison";
 
 impl Comparison {

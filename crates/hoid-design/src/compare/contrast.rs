@@ -1,4 +1,4 @@
-//! What is compared of each person: a sum of their conditions with weights.
+//! Quantity compared for each person: a sum of their conditions with weights.
 //!
 //! - A factor **within** people: the mean over the conditions of the one level less that over those of the other, so
 //!   that a second factor is averaged out. One contrast a person, and its mean over people: no assumption on how the

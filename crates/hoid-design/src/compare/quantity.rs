@@ -31,7 +31,7 @@ pub enum Quantity {
 }
 
 impl Quantity {
-    /// What is compared where nothing is asked for.
+    /// Default quantities of a comparison.
     pub fn defaults() -> Vec<Self> {
         vec![Self::Crossover, Self::PhaseMargin, Self::Parameter(DELAY.to_owned())]
     }

@@ -90,7 +90,7 @@ const STEPS_OF_TRIAL: usize = 60;
 /// By how many multiples a line is moved, and rounds of it.
 const MOVES: [i64; 6] = [-4, -2, -1, 1, 2, 4];
 const ROUNDS: usize = 3;
-/// What a move must be worth.
+/// Least improvement for a move.
 const WORTH: f64 = 1e-3;
 
 impl Designing {

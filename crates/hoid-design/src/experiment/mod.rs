@@ -46,7 +46,7 @@ pub enum DesignError {
         /// Parameters of the person.
         coordinates: usize,
     },
-    /// What is wanted and is not a parameter of the person.
+    /// A requested quantity that is not a parameter of the person.
     #[error("{name} is nothing that this person has; expected one of {expected}")]
     NotThere {
         /// The requested item.

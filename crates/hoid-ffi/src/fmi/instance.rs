@@ -158,7 +158,7 @@ impl Instance {
         Ok(())
     }
 
-    /// What represents the parameters and inputs.
+    /// Values of the parameters and inputs.
     fn given(&self) -> VariableValues<'_> {
         VariableValues {
             variables: &self.variables,

@@ -1,4 +1,4 @@
-//! What takes the samples of a unit.
+//! The recursion or operator of a unit.
 
 use hoid_io::fmu::{DETERMINED, FmuKind, FmuSettings, FmuStart};
 use hoid_track::Sample;

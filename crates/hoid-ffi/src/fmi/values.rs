@@ -1,4 +1,4 @@
-//! What a unit has been given: parameters and inputs, by their names.
+//! Parameters and inputs of a unit, by their names.
 
 use hoid_io::fmu::{FmuStart, FmuVariable};
 

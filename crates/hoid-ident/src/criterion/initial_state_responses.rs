@@ -39,7 +39,7 @@ pub(crate) struct InitialStateResponses {
     prior_rows: usize,
 }
 
-/// What the past of a record may have been.
+/// Possible past of a record.
 pub(crate) struct InitialHistory<'a> {
     pub c: &'a [f64],
     /// The polynomial that whitens v together with C.

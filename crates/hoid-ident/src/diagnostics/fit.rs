@@ -48,7 +48,7 @@ impl Fit {
         Ok(Verdict::of(all))
     }
 
-    /// What the residuals are of u, as a share of its power, where that is the rounding of the data.
+    /// Residuals as a share of the power of u, if they are the rounding of the data.
     pub fn rounding(&self) -> Option<f64> {
         let share = self.loss / self.output_variance;
         (share < ROUNDING).then_some(share)

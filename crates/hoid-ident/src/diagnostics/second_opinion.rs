@@ -85,7 +85,7 @@ impl Without {
     }
 }
 
-/// What the same fit to the records without each of `all` states; `again` gives the quantities of both fits.
+/// The same fit to the records without each of `all`; `again` gives the quantities of both fits.
 fn opinions(
     all: &[Without],
     records: &[Record],
@@ -111,7 +111,7 @@ pub fn of_polynomials(
     })
 }
 
-/// What is slow compared with a system: the periods of a person, or ten of its slowest pole.
+/// Period that is slow compared with a system: the periods of a person, or ten of its slowest pole.
 fn slow_period_s(fit: &Fit) -> f64 {
     let poles = fit.roots();
     let poles = poles.iter().filter(|root| matches!(root.polynomial, 'a' | 'f'));
@@ -212,8 +212,8 @@ pub fn of_sigmoid(estimator: &SigmoidChange, fit: &SigmoidFit, records: &[Record
     without.finding(compared(constant(fit), constant(&other)))
 }
 
-/// What a level that is left in e and u does to a fit of polynomials, by a fit without their means: a
-/// doubt where a parameter moves by more than `LEVEL` standard errors.
+/// Effect of a remaining level of e and u on a fit of polynomials, from a fit without their means: a doubt where a
+/// parameter moves by more than `LEVEL` standard errors.
 pub fn of_level(estimator: &Estimator, fit: &Fit, records: &[Record]) -> Option<Finding> {
     let without: Vec<Record> = records.iter().map(|r| r.clone().detrended(Detrend::Mean)).collect();
     let other = again(estimator, fit, &without)?;

@@ -104,8 +104,8 @@ impl SigmoidFit {
     }
 }
 
-/// What of operators of the family is not distinguished from zero, and poles of no person. A gain
-/// or a lead that is open is named; where neither end has a response, nothing is known.
+/// Parameters of operators of the family that do not differ from zero, and implausible poles. A
+/// gain or a lead that is open is named; where neither end has a response, nothing is known.
 fn family_findings(operators: &[(&str, &ChangedOperator)], sample_time: SampleTime) -> Vec<Finding> {
     let mut all = Vec::new();
     let mut open = Vec::new();

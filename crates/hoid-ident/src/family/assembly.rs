@@ -35,7 +35,7 @@ use crate::{
     optimize::minimise,
 };
 
-/// What the lines of the excitation gave for a form.
+/// Result of the lines of the excitation for a form.
 pub(super) struct AtLines<'d> {
     pub describing: Option<&'d DescribingFunction>,
     pub fit: Option<LineFit>,
@@ -258,9 +258,9 @@ impl<'a> Chosen<'_, 'a> {
     }
 }
 
-/// What the fit may be off by becomes a part of its errors: its difference to the fit at the lines, and, for what the
-/// lines leave to the prior or without lines, its differences to fits with other noise models ([`super::sensitivity`]).
-/// `unseen` is false if there is little noise, and little of what no noise model shows.
+/// The bias of the fit is included in its errors: its difference to the fit at the lines, and, for what the lines leave
+/// to the prior or without lines, its differences to fits with other noise models ([`super::sensitivity`]). `unseen` is
+/// false if there is little noise, and little of what no noise model shows.
 fn add_bias(
     errors: &mut Errors,
     fit: &PredictionFit<'_>,

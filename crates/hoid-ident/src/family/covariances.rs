@@ -123,7 +123,7 @@ pub(super) fn response_errors(
     }))
 }
 
-/// What the operator's elements off their bounds differ by from another estimate.
+/// Difference from another estimate in the elements of the operator that are not at a bound.
 fn differences(fit: &PredictionFit<'_>, other: &[f64]) -> Vec<(usize, f64)> {
     let elements = fit.layout().operator_elements();
     let free = fit.free().into_iter().filter(|place| *place < elements);

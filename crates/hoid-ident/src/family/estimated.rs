@@ -212,7 +212,7 @@ pub(super) fn operator_of(
     })
 }
 
-/// What has the name of a parameter in each of the forms, averaged.
+/// Average over the forms of the parameter with the same name.
 fn averaged(own: &Parameter, weighed: &[WeighedForm], record: usize, clusters: usize) -> Option<Parameter> {
     let each = weighed.iter().filter_map(|form| {
         let mut all = form.of(record)?.parameters.iter();

@@ -97,7 +97,7 @@ struct Zero {
     steps: usize,
 }
 
-/// What the iteration needs at each of its points.
+/// Data of the iteration at each of its points.
 pub(super) struct Instrumental<'p, 'a> {
     prediction: &'p Prediction<'a>,
     /// For the prediction error fit: its prior, weighed as there, its limits, its clusters.

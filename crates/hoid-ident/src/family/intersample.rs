@@ -33,7 +33,7 @@ named_choice!(Intersample, "course between samples", 3, {
 });
 
 impl Intersample {
-    /// What the course of the error does to a sinusoid.
+    /// Response of the intersample behaviour of the error to a sinusoid.
     pub(super) fn response(self, omega_rad_s: f64, sample_time: SampleTime) -> Complex64 {
         let half = 0.5 * omega_rad_s * sample_time.s();
         let sinc = if half.abs() < 1e-8 { 1.0 } else { half.sin() / half };

@@ -39,7 +39,7 @@ pub struct LoopMeasures {
     pub phase_margin_deg: Estimate,
     /// Its interval of 95 %.
     pub phase_margin_interval: Option<(f64, f64)>,
-    /// What one per cent of the gain moves both by, times 100: `d/d ln K`.
+    /// Effect of one per cent of gain on both, times 100: `d/d ln K`.
     by_gain: [f64; 2],
     /// Standard errors of both as those of the person, whose gain varies from run to run.
     pub of_person: [Option<f64>; 2],

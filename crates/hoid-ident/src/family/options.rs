@@ -1,5 +1,5 @@
-//! What may be chosen of the operator of a person: the fields of [`FamilyEstimator`], and the names under which
-//! texts set them. An option is declared here and nowhere else.
+//! Options of the operator of a person: the fields of [`FamilyEstimator`], and the names under which texts set them. An
+//! option is declared here and nowhere else.
 
 use hoid_model::{Detrend, Form, operator_family::Coordinate};
 

@@ -6,7 +6,7 @@
 
 use hoid_model::{NotConvertible, SampleTime, operator_family::Coordinate, polynomial, polynomial_model::monic};
 
-/// What a real pole was read as.
+/// Interpretation of a real pole.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PoleRole {
     /// The lag: `T_I = 1/rate`.

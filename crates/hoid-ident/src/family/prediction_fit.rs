@@ -39,7 +39,7 @@ impl PredictionFit<'_> {
         &self.minimum.theta
     }
 
-    /// What the search minimised: sum of squares with the prior.
+    /// Minimum of the objective: sum of squares with the prior.
     pub fn objective(&self) -> f64 {
         self.minimum.at.sum_of_squares
     }

@@ -124,7 +124,7 @@ impl OperatorPrior {
         Ok(Self { entries })
     }
 
-    /// What another fit found, from name, estimate, and whether it is determined: of the parameters
+    /// Prior from another fit, from name, estimate, and whether it is determined: of the parameters
     /// that can have a prior those that are determined and have an error, `standard error/value`
     /// the spread of the logarithm to first order. It may be that none is left.
     ///

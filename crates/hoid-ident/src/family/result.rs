@@ -108,7 +108,7 @@ pub struct FamilyFit {
     pub agreement: Option<Agreement>,
     /// Box-Jenkins of the same orders.
     pub free_model: Option<FreeModel>,
-    /// What the error bars are made from.
+    /// Clusters of the error bars.
     pub cluster_kind: ClusterKind,
     /// How many clusters.
     pub clusters: usize,
@@ -235,9 +235,9 @@ impl FamilyFit {
         omega_rad_s.iter().map(point).collect()
     }
 
-    /// What the loop of a record with a controlled element reports against the result: a record that stays bounded was
-    /// made in a stable loop, which has a crossover and no phase margin below zero, and a person's has none above 120
-    /// deg. `None` if nothing is against it.
+    /// Finding from the loop of a record with a controlled element: a record that stays bounded was made in a stable
+    /// loop, which has a crossover and no phase margin below zero, and a person's has none above 120 deg. `None` if
+    /// nothing is against it.
     pub fn loop_finding(&self, record: usize, element: &ContinuousTransferFunction) -> Option<Finding> {
         let reach = (self.loop_measures_in_front(record, element))
             .and_then(|found| found.phase_margin_interval)

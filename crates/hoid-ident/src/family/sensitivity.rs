@@ -1,4 +1,4 @@
-//! What the estimate owes to the choice of a noise model.
+//! Effect of the choice of a noise model on the estimate.
 //!
 //! In a closed loop the prediction error method is biased by as much as the noise model is wrong (L. Ljung, *System
 //! Identification*, 1999, section 13.4: by the part of the spectrum of e that the remnant makes, times what the noise

@@ -159,7 +159,7 @@ fn excitations(others: &mut [Channel], record: &Record) -> Vec<Fault> {
     all
 }
 
-/// What is left between cuts.
+/// Segments between cuts.
 fn segments(n: usize, places: &[(FaultSpan, FaultAction)], shortest: usize) -> Vec<Range<usize>> {
     let mut out = vec![false; n];
     let mut ends = vec![false; n + 1];

@@ -83,7 +83,7 @@ impl Line {
     }
 }
 
-/// What one run shows by itself.
+/// Summary of one run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RunSummary {
     /// Label of its record.

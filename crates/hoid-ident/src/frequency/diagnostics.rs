@@ -219,7 +219,7 @@ fn of_loop(open_loop: &OpenLoop, margins: &DescribingMargins) -> Vec<Finding> {
     findings
 }
 
-/// What the excitation has at frequencies other than its lines: a span of no whole periods, a file
+/// Power of the excitation at frequencies other than its lines: a span of no whole periods, a file
 /// that is damaged, or a channel that was measured with noise.
 fn leakage(found: &DiagnosticInputs<'_>, records: &[Record]) -> Result<Option<Finding>, IdentError> {
     let Some(channel) = found.channel else {

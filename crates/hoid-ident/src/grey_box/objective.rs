@@ -50,7 +50,7 @@ impl fmt::Debug for AdditionalTerm<'_> {
 }
 
 impl AdditionalTerm<'_> {
-    /// What it adds at eta to a linearisation of as many parameters.
+    /// Adds its contribution at eta to a linearisation.
     pub fn add_to(&self, eta: &[f64], total: &mut Linearisation, workspace: &mut Workspace) {
         let (p, q) = (eta.len(), self.elements);
         let own = self.criterion.linearise(&eta[..q], workspace);
@@ -101,7 +101,7 @@ impl Penalty {
         self.variance * self.precision
     }
 
-    /// What it adds to the sum of squares.
+    /// Contribution to the sum of squares.
     pub fn at(&self, eta: &[f64]) -> f64 {
         let (value, _) = self.value_and_slope(eta);
         self.weight() * (self.mean - value).powi(2)
@@ -272,7 +272,7 @@ impl<'a, P: Parametrisation> PhysicalCriterion<'a, P> {
         crate::optimize::free_parameters(self, eta, descent)
     }
 
-    /// What the polynomials of a record are at eta.
+    /// Polynomials of a record at eta.
     pub fn model_of(&self, eta: &[f64], record: usize) -> Result<Mapped, IdentError> {
         Ok(self.layout.map(eta, record, None)?)
     }

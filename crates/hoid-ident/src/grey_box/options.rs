@@ -1,5 +1,5 @@
-//! What may be chosen of the operator with a remnant of order m: the fields of [`GreyBox`], and the names under
-//! which texts set them. An option is declared here and nowhere else.
+//! Options of the operator with a remnant of order m: the fields of [`GreyBox`], and the names under which texts set
+//! them. An option is declared here and nowhere else.
 
 use std::{collections::BTreeMap, ops::RangeInclusive};
 

@@ -1,4 +1,4 @@
-//! What a method of instrumental variables gives to the estimator, and gets from it.
+//! Interface between a method of instrumental variables and the estimator.
 
 use hoid_model::Structure;
 

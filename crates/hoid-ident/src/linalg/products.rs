@@ -239,7 +239,7 @@ impl FourLaneTask for Gram<'_, '_> {
     }
 }
 
-/// What the product of columns i and j has more than that of the columns before them.
+/// Difference of the product of columns i and j from that of the columns before them.
 fn ends(columns: &[Lagged<'_>], i: usize, j: usize) -> f64 {
     let (x, y) = (columns[i - 1].values, columns[j - 1].values);
     let last = x.len() - 1;

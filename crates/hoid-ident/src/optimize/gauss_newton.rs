@@ -30,8 +30,8 @@ pub(crate) struct GaussNewton<'s> {
     growth: f64,
     /// Decrease that the quadratic model predicts for the undamped step of this iteration.
     predicted_decrease: f64,
-    /// What the Gauss-Newton matrix lacks of half the second derivative, from the gradients of the
-    /// last steps; empty if that is not used.
+    /// Difference of half the second derivative from the Gauss-Newton matrix, from the gradients of
+    /// the last steps; empty if that is not used.
     secant: Vec<f64>,
     trial: Trial,
     /// Where the derivatives are needed next.

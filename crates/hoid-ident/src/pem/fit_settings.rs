@@ -1,4 +1,4 @@
-//! What a fit by the prediction error method needs to know next to the records.
+//! Settings of a fit by the prediction error method.
 
 use std::collections::BTreeMap;
 

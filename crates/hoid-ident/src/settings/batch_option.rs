@@ -5,7 +5,7 @@ use hoid_model::SampleTime;
 use super::setting::Setting;
 use crate::IdentError;
 
-/// What a text makes of an estimator.
+/// Sets an option of an estimator from a text.
 type Set<E, X> = Box<dyn Fn(&mut E, &Setting, &str) -> Result<(), X>>;
 /// The value as text at a sample time; `None` for one that is not worth a line.
 type Words<E> = Box<dyn Fn(&E, SampleTime) -> Option<String>>;

@@ -44,7 +44,7 @@ pub enum Kind {
     Named(&'static Kind),
 }
 
-/// What numbers may be.
+/// Bounds of numbers.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Bounds {
     /// Any number.

@@ -19,7 +19,7 @@ pub struct Setting {
     pub unit: &'static str,
     /// Default as text, or as text; empty if nothing represents it.
     pub default: String,
-    /// What its numbers may be.
+    /// Bounds of its numbers.
     pub bounds: Bounds,
     /// Its behaviour, without a full stop.
     pub help: String,

@@ -267,7 +267,7 @@ choices!(Stable { "predictor" = Stable::Predictor, "noise" = Stable::PredictorAn
 mod tests {
     use super::*;
 
-    /// What is written is read back as the same value.
+    /// A written value is read back unchanged.
     fn returns<V: Value + PartialEq + std::fmt::Debug>(text: &str, value: V) {
         assert_eq!(V::read(text), Ok(value));
         let read = V::read(text).ok().and_then(|v| v.text()).unwrap_or_default();

@@ -27,7 +27,7 @@ const FASTEST_GIVEN: f64 = 10.0;
 /// are hardly distinguished from a line.
 const SLOWEST: f64 = 5.0;
 
-/// What bounds depend on.
+/// Quantities that determine bounds.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Frame {
     pub ts_s: f64,

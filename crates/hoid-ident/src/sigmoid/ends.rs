@@ -56,7 +56,7 @@ impl ChangedOperator {
     }
 }
 
-/// What theta is known to.
+/// Theta with its covariance.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct ThetaEstimate<'a> {
     pub layout: &'a Layout,

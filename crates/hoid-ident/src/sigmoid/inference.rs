@@ -1,4 +1,4 @@
-//! What the two minima, with a change and without, say: covariance, which parameters have a
+//! Inference from the two minima, with a change and without: covariance, which parameters have a
 //! standard error, and whether there was a change.
 //!
 //! The covariance is `sigma^2 (psi' psi)^-1` of the parameters that were free, with the initial
@@ -81,7 +81,7 @@ pub struct Comparison {
     pub bic_difference: f64,
 }
 
-/// What the minimum with a change reports next to theta.
+/// Inference at the minimum with a change.
 pub(super) struct Inference {
     /// Variance of the innovations, weighted where the noise level changes.
     pub innovation_variance: f64,

@@ -1,6 +1,6 @@
 //! Order and meaning of the parameters.
 //!
-//! What changes has two places in theta, before and after the change; what does not has one:
+//! A parameter that changes has two places in theta, before and after the change; a constant one has one place:
 //!
 //! `theta = [v1 v2 of each of the numerator, t_M, ln G, 1/T_I, omega_nm, zeta_nm, tau_e, d1 .. d_nd]`
 //!

@@ -1,5 +1,5 @@
-//! What may be chosen of an operator who changes once: the fields of [`SigmoidChange`], and the names under which
-//! texts set them. An option is declared here and nowhere else.
+//! Options of an operator that changes once: the fields of [`SigmoidChange`], and the names under which texts set them.
+//! An option is declared here and nowhere else.
 
 use std::collections::BTreeMap;
 

@@ -33,7 +33,7 @@ pub(crate) struct Interval {
     pub high: f64,
 }
 
-/// What a walk along the profile came upon.
+/// Result of a walk along the profile.
 #[derive(Debug)]
 pub(crate) enum Profile {
     /// An interval.

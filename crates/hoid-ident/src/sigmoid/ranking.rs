@@ -112,7 +112,7 @@ impl<'c, 'a> Ranking<'c, 'a> {
         (rank.is_finite() && values.iter().all(|g| g.is_finite())).then_some((rank, values))
     }
 
-    /// What the best numerators of a theta leave of u, in each record.
+    /// The part of u that the best numerators for a theta leave unexplained, in each record.
     pub fn unexplained(&self, theta: &[f64]) -> Option<Vec<Vec<f64>>> {
         let (layout, mut all) = (&self.criterion.layout, Vec::new());
         for (record, (first, y, u)) in self.signals.iter().enumerate() {

@@ -19,7 +19,7 @@ pub struct Library {
     platform: Platform,
 }
 
-/// What a shared library runs on: names of the folders, ending.
+/// Platform of a shared library: names of the folders, ending.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Platform {
     in_two: &'static str,

@@ -1,4 +1,4 @@
-//! What the library of a unit reads when it starts, from the resources of the unit.
+//! Settings in the resources of a unit, which its library reads at start.
 
 use std::collections::BTreeMap;
 

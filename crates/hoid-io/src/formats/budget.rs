@@ -15,7 +15,7 @@ const FACTOR: u64 = 64;
 const CEILING: u64 = 16 << 30;
 /// The variable of the environment that raises what a file may unpack to, MB.
 const UNPACKED: &str = "HOID_MAX_UNPACKED_MB";
-/// What a text takes next to its characters, as it is held and copied.
+/// Overhead of a text in addition to its characters, bytes.
 const TEXT: u64 = 64;
 /// Structures inside of structures, at most.
 pub(super) const MOST_NESTED: usize = 32;
@@ -66,7 +66,7 @@ impl Budget {
     }
 }
 
-/// What the environment allows, bytes.
+/// Limit from the environment, bytes.
 fn raised() -> Option<u64> {
     let megabytes: u64 = std::env::var(UNPACKED).ok()?.trim().parse().ok()?;
     megabytes.checked_mul(1 << 20)

@@ -1,5 +1,4 @@
-//! What the rest of the crate knows of a file format: its name, its endings, how it is read and how
-//! it is written.
+//! Interface of a file format: its name, its endings, how it is read and how it is written.
 //!
 //! A format states all of this in one [`Format`], in its own module of `formats`; reading, writing,
 //! the survey of a file and all messages go through it.

@@ -1,4 +1,4 @@
-//! What holds for each file and directory that is written, whatever is in it.
+//! Rules for each file and directory that is written.
 //!
 //! | module | what it holds |
 //! |---|---|

@@ -20,7 +20,7 @@ const SUFFIX: &str = ".part";
 /// Attempts to make a part that another process sweeps before it is locked; one is the rule.
 const ATTEMPTS: usize = 16;
 
-/// What this process has on its way, and which directories it has swept.
+/// Files in progress of this process, and the directories that it has cleaned.
 struct PartFiles {
     parts: BTreeSet<PathBuf>,
     swept: BTreeSet<PathBuf>,

@@ -17,7 +17,7 @@ use crate::wording::{list, named};
 pub struct ReadRecord {
     /// The record, labelled with the name of the file without extension.
     pub record: Record,
-    /// What was not read or looks odd, such as columns left out; one sentence each.
+    /// Notes on parts that were not read or look wrong, one sentence each.
     pub notes: Vec<String>,
     /// Processing applied to the numbers of the file, in this order.
     pub steps: Vec<Step>,

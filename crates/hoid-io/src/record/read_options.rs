@@ -8,7 +8,7 @@ use crate::IoError;
 use crate::table::ColumnExpression;
 use crate::time::TimeChoice;
 
-/// What may be repaired in a damaged record. By default nothing is.
+/// Repairs of a damaged record. Default: none.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Repair {
     /// Interpolate linearly from an uneven t, also over gaps, to an even grid. The grid starts at
@@ -38,7 +38,7 @@ pub struct ReadOptions {
     pub sampling_hz: Option<f64>,
     /// The samples with `from <= t < to`, s; anything outside is not used. By default all.
     pub span_s: (Option<f64>, Option<f64>),
-    /// What may be repaired.
+    /// Permitted repairs.
     pub repair: Repair,
 }
 

@@ -1,4 +1,4 @@
-//! What hoid has found, in files and out of them.
+//! Files of results of hoid: writing and reading.
 //!
 //! | module | what it holds |
 //! |---|---|

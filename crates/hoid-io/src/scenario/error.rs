@@ -36,7 +36,7 @@ pub enum ScenarioFileError {
         key: String,
         /// The value found.
         found: String,
-        /// What has a meaning, and the remedy.
+        /// The valid values, and the remedy.
         expected: String,
     },
     /// Keys that are missing or contradict each other.

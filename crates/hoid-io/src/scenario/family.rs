@@ -367,8 +367,8 @@ impl FamilyStateTable {
         ]
     }
 
-    /// What this leaves out is that of `base`. For two ways to state the gain it is the one
-    /// reported here.
+    /// Missing settings are those of `base`. Of two ways to state the gain, the one stated here
+    /// counts.
     fn over(&self, base: &Self) -> Self {
         let says_gain = self.k.is_some() || self.k_over_t_i.is_some();
         let gain = |own: Option<f64>, of_base: Option<f64>| if says_gain { own } else { of_base };

@@ -10,7 +10,7 @@ use super::keys::File;
 use super::values::{Source, line_of};
 use crate::wording::printable;
 
-/// What a scenario file describes.
+/// A scenario of either kind.
 #[derive(Debug, Clone, PartialEq)]
 pub enum AnyScenario {
     /// The task of the thesis, or one near it.

@@ -1,5 +1,4 @@
-//! What is inside of a file, before anything is chosen: columns, their sampling and ranges, and
-//! what is suspicious in them.
+//! Contents of a file before any choice: columns, their sampling and ranges, and suspicious values.
 //!
 //! Nothing is judged finally here: a channel may rightly be constant. What is suspicious is found
 //! by `data_quality`, in columns that belong to one time together; a column that is constant is
@@ -42,7 +41,7 @@ pub struct ColumnSurvey {
     pub kind: String,
     /// The number of its rows; 0 for what is not read.
     pub rows: usize,
-    /// What its numbers are, where it holds any finite one.
+    /// Statistics of its finite numbers, if there are any.
     pub values: Option<ValueSurvey>,
 }
 

@@ -1,4 +1,4 @@
-//! What is inside of a file, before anything is chosen: its columns, their sampling and ranges.
+//! Contents of a file before any choice: columns, their sampling and ranges.
 //!
 //! | module | what it holds |
 //! |---|---|

@@ -257,7 +257,7 @@ impl Shared {
     }
 }
 
-/// What the disk does not take cannot be verified: the run is over, and the session goes on.
+/// A run that cannot be written cannot be verified: it ends, and the session continues.
 fn not_taken(error: LabError) -> LabError {
     let what = match &error {
         LabError::File { file, source } => format!("{file}: {source}"),

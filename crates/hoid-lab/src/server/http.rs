@@ -10,7 +10,7 @@ const LONGEST: usize = 16 * 1024;
 /// Most lines of a head.
 const MOST_LINES: usize = 64;
 
-/// What of a request matters here.
+/// The used parts of a request.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Request {
     pub method: String,

@@ -24,7 +24,7 @@ pub(super) fn check_subject(subject: &str) -> Result<(), LabError> {
     )))
 }
 
-/// What the names of all files of a run start with.
+/// Common start of the names of all files of a run.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Stem {
     folder: PathBuf,

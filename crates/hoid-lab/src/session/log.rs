@@ -1,4 +1,4 @@
-//! What is appended while a run goes on: a journal, of which each line is whole or not there.
+//! Journal of a run in progress: each line is complete or absent.
 //!
 //! A line is whole with its end. A batch that cannot be written to its end is taken back: the files
 //! are cut to the last whole batch, and its ticks count only once all three have them. A disk that
@@ -74,7 +74,7 @@ impl From<(f64, f64, f64, f64)> for Frame {
     }
 }
 
-/// What a page sends at once.
+/// One message of a page.
 #[derive(Debug, Clone, PartialEq, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Batch {

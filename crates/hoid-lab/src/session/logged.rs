@@ -1,4 +1,4 @@
-//! What was appended, read back.
+//! The journal, read back.
 
 use std::path::Path;
 

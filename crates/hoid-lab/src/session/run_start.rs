@@ -73,7 +73,7 @@ pub struct Ended {
     pub how: How,
     /// When, in UTC.
     pub utc: String,
-    /// What the page counted: events that no hand made, megabytes of its memory.
+    /// Counts of the page: events that no hand made, megabytes of its memory.
     #[serde(default)]
     pub counted: BTreeMap<String, f64>,
     /// SHA-256 of ticks, events and frames, in that order.

@@ -31,7 +31,7 @@ fn is_session(folder: &Path) -> bool {
     [FACTS, FACTS_AGAIN].iter().any(|name| folder.join(name).exists())
 }
 
-/// What `lab.toml` of a session holds.
+/// Contents of `lab.toml` in a session.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Facts {

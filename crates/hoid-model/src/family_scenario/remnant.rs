@@ -1,4 +1,4 @@
-//! What u holds next to the response to the error: the remnant, and a stick that is not at rest.
+//! Components of u other than the response to the error: the remnant, and a stick that is not at rest.
 //!
 //! The remnant is a sum of independent parts. Each part is a sequence of unit variance through a
 //! shaping filter and a gain,
@@ -62,7 +62,7 @@ pub enum PartStrength {
     },
 }
 
-/// What the strength of a signal-dependent remnant follows.
+/// Signal that drives a signal-dependent remnant.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Followed {
     /// The running rms of u.

@@ -23,7 +23,7 @@ pub const MANUAL_CONTROL_RANGE_RAD_S: (f64, f64) = (1e-3, 1e3);
 pub struct Crossing {
     /// The frequency, rad/s.
     pub omega_rad_s: f64,
-    /// What is left there: of unit gain the phase margin in deg, of the axis the gain margin in dB.
+    /// The margin there: phase margin in deg at unit gain, gain margin in dB at the axis.
     pub margin: f64,
 }
 

@@ -40,7 +40,7 @@ pub struct HeldFamily {
     pub jacobian: Vec<[f64; PARTIALS]>,
 }
 
-/// What poles and delay make of a sample, whatever the numerator.
+/// Response of poles and delay to a sample, for any numerator.
 struct HeldPoles {
     /// omega^2, where there is a neuromuscular part.
     gain: Option<Dual>,
@@ -132,7 +132,7 @@ impl FamilyOperator {
             .collect()
     }
 
-    /// What the poles and the delay make of a sample.
+    /// Response of the poles and the delay to a sample.
     fn held_poles(&self, variables: &[Dual], sample: usize, ts: f64) -> HeldPoles {
         let delay = variables[variables.len() - 1];
         // In units of a sample: all matrices have entries of moderate size.

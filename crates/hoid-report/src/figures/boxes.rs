@@ -91,8 +91,7 @@ pub struct BoxGrid {
     pub shared_ordinates: bool,
     /// True when zero is in every range, with a line.
     pub with_zero: bool,
-    /// What every range reaches to both sides of its middle at least, so that rounding is not drawn
-    /// as a spread; zero for none.
+    /// Least half width of every range, so that rounding is not drawn as a spread; zero for none.
     pub least_reach: f64,
 }
 

@@ -11,7 +11,7 @@ pub struct GroupReport<'a> {
     pub manifest: &'a Manifest,
     /// Failures, people and the overall verdict.
     pub summary: &'a GroupSummary,
-    /// What came out.
+    /// The results.
     pub tables: GroupTables<'a>,
     /// The processing and its inputs, as name and value.
     pub settings: Vec<(String, String)>,

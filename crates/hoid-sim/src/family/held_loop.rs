@@ -25,7 +25,7 @@ const SMALLEST: f64 = 1e-9;
 #[derive(Debug, Clone)]
 pub(super) struct HeldLoop {
     operator: HeldSystem,
-    /// What passes of e(k), e(k-1), e(k-2) in addition.
+    /// Additional weights of e(k), e(k-1), e(k-2).
     taps: [f64; 3],
     delay: usize,
     element: HeldSystem,
@@ -76,7 +76,7 @@ pub(super) struct OperatorOutput {
     past: f64,
     /// The same after the delay: what u has of it.
     pub known: f64,
-    /// What u has of the error of the sample in addition.
+    /// Direct response of u to the error of the sample.
     tap: f64,
 }
 

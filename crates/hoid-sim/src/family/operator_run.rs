@@ -1,9 +1,9 @@
 //! The operator of a scenario of the family alone, a sample at a time: for a loop that is closed elsewhere.
 //!
-//! What [`FamilySimulator`] does of `u = r(k - l) + n`, with the same random numbers and the strength of remnant that
-//! the loop of the scenario gives: a loop that answers u as its controlled element does gives the same run to the last
-//! bit. Contribution of the recorder to e and u (`offset_e`, `offset_u`) is not the operator's. The control of a sample
-//! must not hang on the error of the same sample.
+//! Simulates, as [`FamilySimulator`] does in a loop, `u = r(k - l) + n`, with the same random numbers and the strength
+//! of remnant that the loop of the scenario gives: a loop that answers u as its controlled element does gives the same
+//! run to the last bit. Contribution of the recorder to e and u (`offset_e`, `offset_u`) is not the operator's. The
+//! control of a sample must not hang on the error of the same sample.
 
 use super::{
     FamilySimulator,

@@ -1,4 +1,4 @@
-//! What u holds next to the response, sample by sample: the parts of the remnant, and the walk of the stick.
+//! Components of u other than the response, sample by sample: the parts of the remnant, and the walk of the stick.
 //!
 //! `n(k) = walk(k) + sum of K_i(k) G_i(q) w_i(k)`, with K_i of [`calibration`](super::calibration) and w_i of
 //! [`noise`](super::noise), scaled by what it follows where it depends on the signal. All of it is known before the

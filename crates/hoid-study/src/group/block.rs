@@ -1,4 +1,4 @@
-//! What is analysed at once and is a part on disk: a run, or all runs of a person in a condition.
+//! Unit of analysis, which is one part on disk: a run, or all runs of a person in a condition.
 
 use super::manifest::{Manifest, RunEntry};
 
@@ -16,7 +16,7 @@ impl Cell<'_> {
     }
 }
 
-/// What is analysed at once and is a part on disk.
+/// Unit of analysis, which is one part on disk.
 pub(super) enum Block<'a> {
     Run(&'a RunEntry),
     Cell(Cell<'a>),

@@ -247,7 +247,7 @@ impl Manifest {
         self.prepare.preparation(of_condition)
     }
 
-    /// What a high rate by itself makes of the runs of a condition.
+    /// Decimation of the runs of a condition because of a high rate.
     ///
     /// # Errors
     /// As [`Manifest::preparation`].

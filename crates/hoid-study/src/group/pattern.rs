@@ -88,7 +88,7 @@ impl Pattern {
         Ok(Self(parts))
     }
 
-    /// What the names represent in a file name; none if it does not match.
+    /// Values of the placeholders in a file name; none if it does not match.
     pub fn matches(&self, name: &str) -> Option<FileNameParts> {
         let mut found = FileNameParts::default();
         found_in(&self.0, name, &mut found).then_some(found)

@@ -84,7 +84,7 @@ impl PreparationSettings {
         (of.decimate.as_ref(), of.rate_hz)
     }
 
-    /// What a high rate by itself makes of the runs of a condition: nothing if the rate is named.
+    /// Decimation of the runs of a condition because of a high rate: nothing if the rate is named.
     ///
     /// # Errors
     /// The key that has no meaning, and why.

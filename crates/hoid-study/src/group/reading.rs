@@ -176,7 +176,7 @@ pub(super) struct Run {
     pub factor: usize,
     /// Amount by which a sample of the input is taken later than that of the output next to it, s.
     pub input_lead_s: f64,
-    /// What an identification takes; nothing of a run that is joined of two, whose task changes at the seam.
+    /// Recorded run for an identification; none for a run that is joined of two, whose task changes at the seam.
     pub recorded: Option<Recorded>,
 }
 

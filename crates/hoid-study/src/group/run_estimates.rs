@@ -1,5 +1,5 @@
-//! What a finished group found in each of its runs, read back from its tables: the operator in the form of the
-//! person, root mean squares, and responses.
+//! Results of a finished group for each of its runs, read back from its tables: the operator in the form of the person,
+//! root mean squares, and responses.
 
 use std::{collections::BTreeMap, path::Path};
 

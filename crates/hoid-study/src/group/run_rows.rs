@@ -72,7 +72,7 @@ impl<'a> RunRows<'a> {
         }
     }
 
-    /// What counts samples of the recording, in those of a run.
+    /// Converts options that count samples of the recording to samples of a run.
     pub fn at_the_rate_of(&mut self, run: &Run) {
         self.condition.offset_samples = run.samples(self.condition.offset_samples);
         self.input_lead_s = run.input_lead_s;

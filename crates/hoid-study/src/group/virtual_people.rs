@@ -66,7 +66,7 @@ impl Default for PeopleExperiment {
 
 /// Columns of a file other than t.
 const COLUMNS: [&str; 4] = ["e", "u", "d", "y"];
-/// What else is true.
+/// Other true statements.
 const OTHERS: [&str; 7] = [
     "crossover_rad_s",
     "phase_margin_deg",

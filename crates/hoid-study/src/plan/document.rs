@@ -62,7 +62,7 @@ pub struct Cell {
     pub scenario: String,
     /// The condition from which it started, empty for none.
     pub condition: String,
-    /// What represents the lists of its table.
+    /// Axes that replace the lists of its table.
     pub axes: Vec<Axis>,
     /// The scenario, ready to be simulated.
     pub resolved: ResolvedScenario,
@@ -70,7 +70,7 @@ pub struct Cell {
     pub replications: u64,
 }
 
-/// What a scenario of a plan has next to the keys of a scenario file.
+/// Additional keys of a scenario in a plan.
 #[derive(Debug, Deserialize)]
 struct OwnKeys {
     name: Option<String>,

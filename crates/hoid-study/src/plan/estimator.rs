@@ -35,7 +35,7 @@ pub struct EstimatorCell {
     pub name: String,
     /// The name, and what represents the lists of its table.
     pub label: String,
-    /// What represents the lists.
+    /// Axes that replace the lists.
     pub axes: Vec<Axis>,
     /// The estimator from whose VAF that of this one is counted.
     pub versus: Option<String>,
@@ -64,14 +64,14 @@ pub enum Task {
     Fit(Box<Estimator>),
     /// The operator's parameters are fitted.
     GreyBox(Box<GreyBox>),
-    /// What is done as `hoid identify` does it, verdict included.
+    /// Analysis as by `hoid identify`, verdict included.
     Analysis(Box<ResolvedRequest>),
     /// The operator is tracked.
     Track(Box<TrackOptions>),
 }
 
 impl Task {
-    /// What is done as `hoid identify` does it; none of the others.
+    /// Analysis as by `hoid identify`; none for the other estimators.
     pub(crate) fn analysis(&self) -> Option<&ResolvedRequest> {
         match self {
             Self::Analysis(asked) => Some(asked),

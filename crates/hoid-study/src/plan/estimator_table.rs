@@ -123,8 +123,7 @@ pub(super) enum Change {
     Sigmoid,
 }
 
-/// What is estimated from each record, and how. Each value may be a list, which makes it an axis of
-/// the grid.
+/// Estimator of each record. Each value may be a list, which makes it an axis of the grid.
 #[derive(Debug, Deserialize, JsonSchema)]
 pub(crate) struct EstimatorTable {
     /// Name in the results.

@@ -23,7 +23,7 @@ pub struct Variant {
     pub text: String,
     /// Line of the plan, from 1, of each line of `text`.
     pub lines: Vec<usize>,
-    /// What represents the lists, in the order of the file.
+    /// Axes that replace the lists, in the order of the file.
     pub axes: Vec<Axis>,
 }
 

@@ -161,7 +161,7 @@ struct DualEkf {
     bounds: [[f64; 2]; LARGEST],
     delay: DelayLine<Vec<f64>>,
     reported: Reported,
-    /// What enters next to e, a share of its size; the mean square of e so far, where it is not given.
+    /// Additional noise of e, as a share of its size; the mean square of e so far, where it is not given.
     state_noise: f64,
     size_is_given: bool,
     power: f64,

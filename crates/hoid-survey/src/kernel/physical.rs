@@ -33,7 +33,7 @@ const ZETA: usize = 3;
 /// Place of tau_e in eta, where it is a parameter.
 const TAU: usize = 4;
 
-/// What the recursion estimates, and within which bounds.
+/// Parameters of the recursion and their bounds.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PhysicalModel<S, const N: usize> {
     /// Orders: nc and nd are free, na = 0, nf = 2 and nb = 2, or 3 when tau_e is a parameter.

@@ -49,7 +49,7 @@ const DELAYS_PROPOSED: usize = 8;
 const DELAY_ODDS: f64 = 1.0;
 const DELAY_JUMP_S: f64 = 0.05;
 const NEIGHBOUR: f64 = 0.15;
-/// What 0.01 s of delay is worth in K_e, K_e_dot, omega_nm and zeta_nm, in the units of
+/// Effect of 0.01 s of delay on K_e, K_e_dot, omega_nm and zeta_nm, in the units of
 /// [`DelayPrior::error_per_sample`].
 const WORTH: [f64; OPERATOR] = [0.01, 0.03, 0.04, 0.08];
 

@@ -286,9 +286,9 @@ struct ForwardBackward<'a> {
 }
 
 impl<'a> ForwardBackward<'a> {
-    /// What the difference takes from the logarithm of the weight, at least: `z'z` is no less than
-    /// the square of one difference over its variance. As S is larger than either covariance,
-    /// neither of these bounds is crossed except for rounding.
+    /// Lower bound of the decrease of the log weight by the difference: `z'z` is no less than the
+    /// square of one difference over its variance. As S is larger than either covariance, neither
+    /// of these bounds is crossed except for rounding.
     fn half_square(f: &Side, b: &Side) -> f64 {
         let apart = b.level[0] - f.level[0];
         let mut square = 0.0_f64;

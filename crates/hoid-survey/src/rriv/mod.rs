@@ -62,7 +62,7 @@ const LEAST_SHARE: f64 = 1.0 / 1024.0;
 /// Smallest innovation variance as a share of the one at the start.
 const LEAST: f64 = 1e-16;
 
-/// What the recursion goes on from: a batch fit, or a guess.
+/// Start of the recursion: a batch fit, or a guess.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct RefinedStart<'a> {
     /// In the order of [`Orders::parameter_names`].

@@ -20,7 +20,7 @@
 //!    when none of its parts holds even in part, and holds in part otherwise. When no part is
 //!    decided, it cannot be tested.
 //!
-//! What words mean, the same for all claims:
+//! Meaning of words, the same for all claims:
 //!
 //! | wording | test |
 //! |---|---|

@@ -58,8 +58,8 @@ impl Followed {
         }
     }
 
-    /// What a method with an operator found at the next sample that was asked for; its response is that of the
-    /// operator, NaN if there is none.
+    /// Result of a method with an operator at the next requested sample; its response is that of the operator, NaN if
+    /// there is none.
     pub(super) fn push(&mut self, task: &Task<'_>, operator: Option<OperatorParameters>) -> Result<(), ThesisError> {
         self.response.push(match &operator {
             Some(operator) => response_of(operator, task.record.sample_time(), task.omega_rad_s)?,

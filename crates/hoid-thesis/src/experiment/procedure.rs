@@ -1,4 +1,4 @@
-//! What the text does with one run of the experiment.
+//! Procedure of the thesis for one run of the experiment.
 
 use hoid_ident::{Estimator, Fit, validation::vaf};
 use hoid_model::{

@@ -59,7 +59,7 @@ pub enum ReproductionEvent<'a> {
     Note(&'a str),
 }
 
-/// What has been reproduced.
+/// Summary of a reproduction.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ReproductionSummary {
     /// The page that shows it all.

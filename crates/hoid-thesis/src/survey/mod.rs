@@ -11,8 +11,8 @@
 //! radians = 6
 //! ```
 //!
-//! What all methods give is the response `H(j omega, t)`, so that is what they are measured by
-//! ([`measure`]); the parameters only of those that have them.
+//! All methods give the response `H(j omega, t)`, so that they are compared by it ([`measure`]); parameters are
+//! compared only for methods that have them.
 //!
 //! | module | what it holds |
 //! |---|---|

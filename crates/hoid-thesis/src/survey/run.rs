@@ -30,7 +30,7 @@ pub struct MethodErrors {
     pub cell: u64,
     /// Name of the method in the plan.
     pub name: String,
-    /// What it was reported next to e and u; empty for nothing.
+    /// Information given in addition to e and u; empty for none.
     pub told: &'static str,
     /// Errors by run; why there are none if it failed.
     pub runs: Vec<Result<Errors, String>>,
@@ -80,7 +80,7 @@ pub fn survey(plan: &SurveyPlan, each: &(dyn Fn(&str) + Sync)) -> Result<Vec<Met
     Ok(all)
 }
 
-/// What one method found in one run.
+/// Result of one method in one run.
 struct MethodResult {
     name: String,
     told: &'static str,
@@ -126,7 +126,7 @@ fn methods_of(plan: &SurveyPlan, cell: &Cell, record: &Record, validation: &Reco
     estimators.chain(comparators).collect()
 }
 
-/// What an estimator of a study finds: a recursion at each time, a batch fit the same at all.
+/// Result of an estimator of a study: a recursion at each time, a batch fit the same at all.
 fn of_estimator(estimator: &EstimatorCell, cell: &Cell, task: &Task<'_>) -> Result<Followed, ThesisError> {
     match estimator.task_for(&cell.resolved) {
         StudyTask::Track(options) => of_trace(&track(task.record, &options, EVERY)?, task),

@@ -44,7 +44,7 @@ impl Trace {
         all
     }
 
-    /// What is found of each stretch, the most unlikely first; p-values count the stretches.
+    /// Test result for each stretch, the most significant first; p-values count the stretches.
     pub(super) fn unsteady(&self, record: &Record) -> Vec<Unsteady> {
         let Some((_, signals)) = self.signals(record) else {
             return Vec::new();

@@ -88,7 +88,7 @@ impl Trace {
     }
 }
 
-/// What a signal is after the lag once more: with it the lag of the basis has a correction, as poles and delay have.
+/// A signal filtered by the lag once more: with it the lag of the basis has a correction, as poles and delay have.
 fn slower(signal: &[f64], lag_s: f64, sample_time_s: f64) -> Vec<f64> {
     let pole = (-sample_time_s / lag_s).exp();
     let step = |state: &mut f64, z: &f64| {

@@ -36,7 +36,7 @@ settings! {
     }
 }
 
-/// What an innovation may move an estimate at most, in standard deviations.
+/// Limit of an innovation in the update, in standard deviations.
 pub const DEFAULT_LIMIT: f64 = 5.0;
 
 impl RecursiveMethod for RpemOptions {

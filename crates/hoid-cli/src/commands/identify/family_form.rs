@@ -93,8 +93,8 @@ impl FamilyReport<'_> {
         Ok(page)
     }
 
-    /// What tau_e owes to the course of the error between its samples: the other delay that the data may mean, where
-    /// half a sample is more than the error bar reports.
+    /// Effect of the intersample behaviour of the error on tau_e: the alternative delay, if half a sample exceeds the
+    /// standard error.
     fn between_samples(&self) -> String {
         let fit = self.fit;
         let named = fit.operator(0).parameters.iter().find(|p| p.name == "tau_e");

@@ -122,7 +122,7 @@ fn description(args: &IdentifyArgs, data: &Recordings) -> Option<Description> {
         .flatten()
 }
 
-/// What is written takes the place of nothing that is read; `--prior` may name a file.
+/// Outputs must not overwrite inputs; `--prior` may name a file.
 fn check_places(args: &IdentifyArgs) -> Result<(), CliError> {
     let mut inputs: Vec<&Path> = args.records.iter().map(PathBuf::as_path).collect();
     inputs.extend(args.validate.as_deref());

@@ -47,7 +47,7 @@ pub fn run(
     CliError::of_verdict(verdict)
 }
 
-/// What changes over the time of a record, with standard errors where they are all known.
+/// Parameters that change over a record, with standard errors if all are known.
 fn trace(fit: &SigmoidFit, record: &Record) -> Result<Record, CliError> {
     let gains = fit.trace(record);
     let mut trace: Option<Record> = None;

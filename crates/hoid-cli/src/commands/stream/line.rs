@@ -43,7 +43,7 @@ struct Line<'a> {
     change: Option<ChangeLine>,
     #[serde(flatten)]
     counts: Counts,
-    /// What the guard found since the last line, the last where there is more.
+    /// Last event of the guard since the last line.
     #[serde(skip_serializing_if = "Option::is_none")]
     event: Option<Value>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -131,7 +131,7 @@ pub struct StreamStatus<'a> {
     /// The last change since the last line, with the time at which it was declared, s.
     pub change: Option<(Option<f64>, Change)>,
     pub counts: Counts,
-    /// What the guard found last since the last line.
+    /// Last event of the guard since the last line.
     pub event: Option<TrackFault>,
     /// Faults since the last line.
     pub fault: Option<String>,

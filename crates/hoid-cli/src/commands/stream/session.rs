@@ -29,7 +29,7 @@ pub struct Session {
     live: Live,
     /// Time between two samples of the stream.
     sample_time: SampleTime,
-    /// What lowers a high rate: error, control, target.
+    /// Decimator of error, control and target.
     decimator: Option<Decimator<3>>,
     /// Factor of e and u.
     scale: (f64, f64),
@@ -44,13 +44,13 @@ pub struct Session {
     innovation: Option<f64>,
     /// A change that no line has reported yet, and when it was declared, s.
     change: Option<(Option<f64>, Change)>,
-    /// What the guard found and no line has reported yet.
+    /// Events of the guard that no line has reported yet.
     event: Option<TrackFault>,
     names: Vec<String>,
     faults: VecDeque<String>,
     /// That the times go at another rate has been reported.
     rate_told: bool,
-    /// What they go at.
+    /// Rate of the time stamps.
     rate: Option<Finding>,
 }
 
@@ -354,7 +354,7 @@ impl Session {
         }
     }
 
-    /// What there was, for the end.
+    /// Summary for the end.
     pub fn summary(&self) -> String {
         let c = self.counts;
         let mut text = format!(

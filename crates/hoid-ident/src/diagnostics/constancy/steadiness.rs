@@ -109,7 +109,7 @@ mod tests {
 
     const TS: f64 = 0.02;
 
-    /// What is found where the gain of u goes so, in 80 s.
+    /// Faults found for this course of the gain of u, in 80 s.
     fn of(seed: u64, gain: impl Fn(f64) -> f64) -> Vec<Unsteady> {
         let mut seed = seed;
         let n = 4000;

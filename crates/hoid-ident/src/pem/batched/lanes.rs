@@ -142,7 +142,7 @@ impl Lanes {
         }
     }
 
-    /// What a pass has found in a lane.
+    /// Result of a pass in a lane.
     pub fn linearisation(&self, lane: usize) -> Linearisation {
         let o = &self.orders;
         let p = o.parameters();

@@ -20,7 +20,7 @@ pub(crate) const OBJECT: &str = "an object of the class";
 pub(crate) enum Value {
     Array(Array),
     Texts(Vec<String>),
-    /// What is not read, as text.
+    /// Unsupported content, as text.
     Unread(String),
 }
 

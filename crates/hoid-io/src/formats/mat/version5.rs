@@ -26,7 +26,7 @@ const OPAQUE: u32 = 17;
 const COMPLEX: u32 = 0x800;
 /// MATLAB takes 63 characters.
 const LONGEST_NAME: usize = 256;
-/// What an entry takes next to its path and its values, about.
+/// Approximate memory of an entry in addition to its path and its values, bytes.
 const ENTRY_BYTES: u64 = 256;
 
 /// Why a variable is not read: the format is contradicted, or something else is wrong.

@@ -12,7 +12,7 @@ use crate::formats::budget::{Budget, MOST_NESTED};
 use crate::formats::guarded::guarded;
 use crate::wording::told;
 
-/// What the visit of a group or a dataset counts for, bytes: links may lead in circles.
+/// Cost of visiting a group or a dataset, bytes: links may be circular.
 const VISIT: u64 = 1 << 13;
 /// Arrays of structures and cells of more elements are not columns.
 const MOST_REFERENCES: u64 = 1 << 16;

@@ -144,7 +144,7 @@ pub(super) fn entries(
     Ok(entries)
 }
 
-/// What the items take as they are read, next to the bytes that they are in.
+/// Memory of the items when read, in addition to their bytes.
 fn unpacked(header: &Header, budget: &mut Budget, file: &str) -> Result<(), IoError> {
     let count = header
         .shape

@@ -1,4 +1,4 @@
-//! What the pages of a column unpack to, before any of them is unpacked.
+//! Unpacked size of the pages of a column, before unpacking.
 //!
 //! The footer states how long a column is when unpacked, each page states it again in its header, and no one has to be
 //! right: a page of a few kB may state 2 GB, which Snappy and LZ4 then fill with zeros, and gzip unpacks until it ends,
@@ -13,7 +13,7 @@
 //! | 5.1, 8.1 | values of a data page |
 //! | 8.5, 8.6, 8.7 | bytes of levels in front of the values, and whether these are packed |
 //!
-//! What is not packed, or packed by Snappy and LZ4, is as long as stated or refused by the crate. A page in
+//! Pages without compression, or with Snappy and LZ4, have the stated length or are refused by the crate. A page in
 //! gzip is unpacked here into nothing, as far as it is stated and one byte further.
 
 use std::io::{self, Read as _};

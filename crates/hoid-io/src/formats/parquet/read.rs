@@ -33,8 +33,8 @@ const TIME: &str = "a date or time";
 /// ns in a µs and in a ms.
 const MICRO: i64 = 1_000;
 const MILLI: i64 = 1_000_000;
-/// What a value takes as a number and as its place among those that are none, and a text next to
-/// its letters, bytes.
+/// Memory of a value as a number and as an index of missing ones, and of a text in addition to its
+/// characters, bytes.
 const VALUE: u64 = 16;
 const TEXT: u64 = 24;
 /// Values that are fetched together.
@@ -310,7 +310,7 @@ impl ColumnPath<'_> {
     }
 }
 
-/// What a value holds next to itself.
+/// Memory of a value in addition to itself.
 trait Weight {
     /// Bytes.
     fn bytes(&self) -> u64 {

@@ -10,7 +10,7 @@ use crate::table::{Cell, Column, Precision, Source, Table, asides, check_names};
 use crate::time::{Moments, is_time, seconds};
 use crate::wording::shown;
 
-/// What was in the cells that are not finite numbers.
+/// Contents of the cells that are not finite numbers.
 struct ParquetSource<'a> {
     file: &'a str,
     columns: Vec<Cells>,

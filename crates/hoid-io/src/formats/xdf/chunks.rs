@@ -150,7 +150,7 @@ fn empty(format: &str) -> Option<Samples> {
 }
 
 impl Stream {
-    /// What the footer states against the read data.
+    /// Compares the footer with the data.
     ///
     /// # Errors
     /// What is not there.

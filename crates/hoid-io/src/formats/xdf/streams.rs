@@ -10,7 +10,7 @@ use crate::formats::arrays::{Array, Contents, Entry, Indexing, Numbers, Value};
 use crate::formats::budget::Budget;
 use crate::wording::shown;
 
-/// What an entry takes, bytes, about.
+/// Approximate memory of an entry, bytes.
 const ENTRY: u64 = 512;
 
 /// The streams in the bytes of a file.

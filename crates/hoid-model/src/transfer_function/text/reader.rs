@@ -253,7 +253,7 @@ impl Reader {
         }
     }
 
-    /// What a step gives must stay a number, and of a degree that someone means.
+    /// The result of a step must be finite and of a reasonable degree.
     fn checked(&mut self, ratio: Ratio, at: usize) -> Result<Ratio, String> {
         if ratio.num.len().max(ratio.den.len()) > HIGHEST_DEGREE + 1 {
             self.at = at;

@@ -26,9 +26,9 @@ pub struct Change {
     pub samples_ago: u64,
     /// Lambda.
     pub log_odds: f64,
-    /// What held before.
+    /// The operator before.
     pub before: Snapshot,
-    /// What holds now.
+    /// The current operator.
     pub after: Snapshot,
     /// Change of K_e, K_e_dot, omega_nm, zeta_nm, of the innovation variance and of the delay, each
     /// over its standard error.
