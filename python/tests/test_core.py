@@ -1,4 +1,4 @@
-"""What a fit, a trace and a tracker are, beyond the digits."""
+"""Properties of fits, traces and trackers beyond their digits."""
 
 from __future__ import annotations
 

@@ -85,7 +85,7 @@ pub fn check() -> Result<(), String> {
     let mut metadata = cargo_command();
     metadata.args(["metadata", "--format-version", "1", "--locked", "--all-features"]);
     let metadata: Value = serde_json::from_str(&output(&mut metadata)?)
-        .map_err(|error| format!("cargo metadata gives no JSON: {error}"))?;
+        .map_err(|error| format!("the output of cargo metadata is not JSON: {error}"))?;
     let packages = packages(&metadata);
     if packages.is_empty() {
         return Err(String::from("cargo metadata names no packages"));

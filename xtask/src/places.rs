@@ -2,7 +2,7 @@
 //! what is shipped, as a table between the markers of the page "In your simulator".
 //!
 //! The places are in `python/tests/places`, which the tests run too (`test_places.py`); here are their requirements,
-//! built by the profile of what is shipped. What is not installed is a row of the table that reports it.
+//! built by the profile of shipped programs. What is not installed is a row of the table that reports it.
 
 use std::{env, process::Command};
 

@@ -49,7 +49,7 @@ pub fn output(command: &mut Command) -> Result<String, String> {
     }
 }
 
-/// The profile of what is shipped: programs, libraries, wheels.
+/// The profile of shipped programs: programs, libraries, wheels.
 pub const SHIPPED: &str = "shipped";
 
 /// Arguments of the builds for chores: of the same features as the tests, so that nothing is compiled twice. Not

@@ -15,12 +15,12 @@ use crate::AnalysisError;
 pub const RESPONSE: &str = "response";
 /// Crossover frequency and phase margin of the loop.
 pub const LOOP: [&str; 2] = ["crossover", "phase_margin"];
-/// Kind of what makes an answer open by itself.
+/// Kind of the finding that makes a single answer undetermined.
 const OPEN: &str = "open-answer";
 /// Errors of the crossover, as a part of it, and of the margin in deg, beyond which they are open.
 const LARGEST_ERRORS: [f64; 2] = [0.5, 30.0];
 
-/// An answer, and what makes it open by itself.
+/// An answer, and the reason why it is undetermined.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Answered {
     /// `response`, `crossover`, `phase_margin`, or the name of a parameter.

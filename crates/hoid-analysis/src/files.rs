@@ -41,7 +41,7 @@ impl Reading {
         Ok(all)
     }
 
-    /// Reads one file: the record in it, or the records between what is left out.
+    /// Reads one file: the record in it, or the records between the parts left out.
     ///
     /// # Errors
     /// As [`Reading::files`].

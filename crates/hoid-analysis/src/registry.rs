@@ -1,4 +1,4 @@
-//! The registry of batch estimators: what each is called, what it is, and which options it takes.
+//! The registry of batch estimators: name, description and options of each.
 //!
 //! Flags and help of the command line, keys of plans, keywords of Python, the page of options and the names of printed
 //! settings are made from this list. An option is in the file of its estimator

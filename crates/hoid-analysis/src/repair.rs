@@ -14,8 +14,8 @@ use crate::{
 const MOST_LEVELS: usize = 16;
 
 impl Recordings {
-    /// The recordings without their faults; one that is cut gives several. Report of was found and what it on any
-    /// result is in the account of the first of them.
+    /// The recordings without their faults; one that is cut gives several. Report of the findings and their effect on
+    /// any result is in the account of the first of them.
     ///
     /// # Errors
     /// [`AnalysisError::SameSamples`] for runs that are given twice.

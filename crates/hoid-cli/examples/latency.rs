@@ -1,4 +1,4 @@
-//! How long `hoid stream` takes to answer a sample, and what happens when readers stop, either side starts again,
+//! How long `hoid stream` takes to answer a sample, and the behaviour when readers stop, either side starts again,
 //! clocks jump and datagrams are hostile. The numbers of the page "In your simulator".
 //!
 //! `cargo xtask slow latency [--seconds N] [--seed N] [--program FILE] [--python FILE]`: each way and rate for 600 s,

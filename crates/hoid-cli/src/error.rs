@@ -31,8 +31,9 @@ pub enum CliError {
     /// A result that was made and could not be printed.
     #[error("standard output cannot be written: {0}; what was asked is not there, or is cut: make room for it")]
     Output(std::io::Error),
-    /// A result that was printed, and reports that the data do not determine what was asked.
-    #[error("the data do not determine what was asked: {0}")]
+    /// A result that was printed, and reports that the data do not determine the requested
+    /// quantity.
+    #[error("the data do not determine the requested quantity: {0}")]
     NotDetermined(String),
     /// Work that was interrupted and can be resumed.
     #[error("{0}")]
@@ -125,7 +126,7 @@ impl CliError {
     /// Exit code for the verdict of a printed result.
     ///
     /// # Errors
-    /// [`CliError::NotDetermined`] where the data do not determine what was asked.
+    /// [`CliError::NotDetermined`] where the data do not determine the requested quantity.
     pub fn of_verdict(verdict: &Verdict) -> Result<(), Self> {
         match verdict.level {
             VerdictLevel::NotDetermined => {
@@ -136,8 +137,7 @@ impl CliError {
         }
     }
 
-    /// 2 for wrong usage, 1 for data and tasks that give no result, 128 and its number for what a signal
-    /// stopped.
+    /// 2 for wrong usage, 1 for data and tasks that give no result, 128 and its number after a signal.
     pub fn exit_code(&self) -> u8 {
         match self {
             Self::Usage(_)

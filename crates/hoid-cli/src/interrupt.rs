@@ -1,7 +1,7 @@
 //! Interrupts: Ctrl-C, and where the system has them SIGTERM and SIGHUP, which end a command with
 //! its files whole. SIGXFSZ (a limit of the size of files) is an error of writing instead of an end.
 //!
-//! By default what is on its way is removed and the program ends with 128 and the number of the
+//! By default output in progress is removed and the program ends with 128 and the number of the
 //! signal. A command that can stop, or has something to report at its end, sets its own answer.
 
 use std::sync::{
@@ -34,13 +34,13 @@ pub fn on_interrupt(new: impl FnMut(i32) + Send + 'static) {
     *answer() = Some(Box::new(new));
 }
 
-/// Ends the program; what is on its way to a file is removed.
+/// Ends the program; output in progress to a file is removed.
 pub fn end(code: i32) -> ! {
     hoid::io::remove_unfinished_files();
     std::process::exit(code)
 }
 
-/// The exit code of what an interrupt stopped, as shells have it.
+/// The exit code after an interrupt, as shells have it.
 pub fn exit_code() -> i32 {
     128 + LAST.load(Ordering::Relaxed)
 }

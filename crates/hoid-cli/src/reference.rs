@@ -55,7 +55,7 @@ fn options_page(methods: &[MethodSpec]) -> String {
             structures.join(", "),
             spec.source
         ));
-        page.push_str("| option | type | unit | default | bounds | what it does |\n|---|---|---|---|---|---|\n");
+        page.push_str("| option | type | unit | default | bounds | effect |\n|---|---|---|---|---|---|\n");
         for setting in &spec.settings {
             let bounds = match setting.kind {
                 Kind::Count | Kind::Number | Kind::NumberOrOff | Kind::Span | Kind::Named(Kind::Number) => {

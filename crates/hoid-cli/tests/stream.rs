@@ -429,7 +429,7 @@ fn a_warm_up_that_fails_goes_on_until_there_is_something_to_fit() {
     let directory = TempDir::new().unwrap();
     let text = simulated(directory.path(), "1");
     let mut input = String::new();
-    // Silence, then the run: what is silent is left out, and the warm-up waits for as much of the run.
+    // Silence, then the run: the silence is left out, and the warm-up waits for as much of the run.
     for _ in 0..600 {
         input.push_str("0,0\n");
     }

@@ -4,8 +4,8 @@
 //!
 //! **Windup.** Where nothing excites a direction, forgetting alone would let P grow without limit.
 //! In turn each parameter gets a pseudo-measurement of the value that it has: the estimate stays,
-//! and `P^{-1} >= diag(1/bound_i)` up to what is forgotten in one round. Its information is the
-//! part of `1/bound_i` that was forgotten since the last turn of that parameter.
+//! and `P^{-1} >= diag(1/bound_i)` up to the forgetting of one round. Its information is the part
+//! of `1/bound_i` that was forgotten since the last turn of that parameter.
 
 use crate::{
     adaptation::{Adaptation, Forgetting, ParameterStep},

@@ -63,7 +63,7 @@
 //! # Ok::<(), &str>(())
 //! ```
 //!
-//! | module | what it holds |
+//! | module | contents |
 //! |---|---|
 //! | [`rls`], [`rpem`] | the recursions: least squares, prediction-error method |
 //! | [`adaptive`] | gains in a basis that people share, a noise model and a level of its own, a test for changes |

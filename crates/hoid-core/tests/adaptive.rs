@@ -74,7 +74,7 @@ struct Person {
     past: Vec<f64>,
     e: f64,
     v: [f64; 2],
-    /// What the error of the last sample was answered with.
+    /// The response to the error of the last sample.
     w: f64,
 }
 

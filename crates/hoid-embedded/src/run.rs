@@ -36,7 +36,7 @@ pub const STATE_BYTES: usize = size_of::<Filter>();
 /// Reads samples to their end and writes estimates.
 ///
 /// # Errors
-/// A sentence about what cannot be read or written.
+/// A sentence about input or output that failed.
 pub fn run(
     read: impl FnMut(&mut [u8]) -> Result<usize, &'static str>,
     mut write: impl FnMut(Arguments<'_>) -> Result<(), &'static str>,

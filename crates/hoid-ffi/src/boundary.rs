@@ -1,8 +1,8 @@
 //! Pointers of the caller: all that this crate believes.
 //!
-//! A pointer that is null or not aligned is refused. That it points to what the header states, and
-//! that the caller does not use it at the same time from another thread, cannot be checked: it is
-//! the contract of every function here.
+//! A pointer that is null or not aligned is refused. Two conditions cannot be checked and are the
+//! contract of every function here: the pointer refers to an object as the header describes it, and
+//! no other thread uses it at the same time.
 
 use std::{
     ffi::{CStr, c_char},

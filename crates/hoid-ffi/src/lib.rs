@@ -14,7 +14,7 @@
 //!
 //! Names, order and units are those of Rust and Python.
 //!
-//! | module | what it holds |
+//! | module | contents |
 //! |---|---|
 //! | `session` | a tracker as its options ask for it, and the prior knowledge of it |
 //! | `options` | options in JSON, by the keywords of Python |

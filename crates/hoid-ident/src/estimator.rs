@@ -94,7 +94,7 @@ impl Estimator {
     /// Checks structure, orders and options against each other.
     ///
     /// # Errors
-    /// [`IdentError`] with what is wrong.
+    /// [`IdentError`] with the problem.
     pub fn check(&self) -> Result<(), IdentError> {
         self.orders.check(self.structure)?;
         let mut named = self.constraints.keys().chain(self.priors.keys()).peekable();

@@ -33,7 +33,7 @@ pub struct Fit {
     pub(crate) output_variance: f64,
     /// True if the innovation variance is the square of a robust scale.
     pub(crate) robust: bool,
-    /// True if instruments was in place of the regressors.
+    /// True if instruments replaced the regressors.
     pub(crate) instrumented: bool,
     /// The physical parameters that theta was computed from, for a grey box.
     pub(crate) physical: Option<Box<Physical>>,
@@ -160,7 +160,7 @@ impl Fit {
         self.termination
     }
 
-    /// The start that won.
+    /// The best start.
     pub fn start(&self) -> &str {
         &self.start
     }
@@ -322,8 +322,8 @@ impl Fit {
         Ok(output_less(record, self.errors_of(orders, &theta, record)?))
     }
 
-    /// Variance of what has the gradient `by_theta` and changes with the delay by `by_delay` (1/s);
-    /// `None` without a covariance.
+    /// Variance of a quantity with the gradient `by_theta` and changes with the delay by `by_delay`
+    /// (1/s); `None` without a covariance.
     pub(crate) fn variance_of(&self, by_theta: &[f64], by_delay: f64) -> Option<f64> {
         let covariance = self.covariance.as_ref()?;
         // The covariance holds (g's)^2 var tau already.

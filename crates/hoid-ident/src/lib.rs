@@ -50,7 +50,7 @@
 //!
 //! **Where to find what**
 //!
-//! | module | what it holds |
+//! | module | contents |
 //! |---|---|
 //! | [`Estimator`] | the prediction error method: structure, orders, options; `fit`, `fit_each` |
 //! | [`Fit`] | the model, its covariance and criteria; prediction, simulation, frequency response, poles and margins |
@@ -68,7 +68,7 @@
 //!
 //! and inside, each using those before it:
 //!
-//! | module | what it holds |
+//! | module | contents |
 //! |---|---|
 //! | `optimize` | minimisation of a sum of squares, also along the border of stability |
 //! | `criterion` | the prediction-error criterion of the general model and its gradients; initial states |

@@ -36,7 +36,7 @@ pub struct OrderRanges {
 /// Orders by their names (na, nb, nc, nd, nf, nk), each with its range.
 pub type NamedOrders = BTreeMap<String, RangeInclusive<usize>>;
 
-/// Refuses what is not an order, and orders that no model has.
+/// Refuses values that are not orders, and orders that no model has.
 ///
 /// # Errors
 /// [`IdentError::BadOption`].

@@ -138,7 +138,7 @@ fn standard_errors_cover_the_truth() {
         );
     }
     println!("{converged} of {runs} converged, {:.1} % covered", 100.0 * covered);
-    // One standard error of the coverage is .6 %, more for what is correlated.
+    // One standard error of the coverage is .6 %, more for correlated quantities.
     assert!(converged as f64 >= 0.99 * runs as f64 && (covered - 0.95).abs() < 0.03);
 }
 

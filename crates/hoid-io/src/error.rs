@@ -37,7 +37,7 @@ pub enum IoError {
         /// The data read.
         input: String,
     },
-    /// Results among what they are made of.
+    /// Results must not overwrite their inputs.
     #[error(
         "{directory} holds {input}, which is read by the same command and may be lost; take another directory for the results"
     )]
@@ -345,7 +345,7 @@ pub enum IoError {
         /// The time before, s.
         previous: f64,
     },
-    /// Samples that are not there.
+    /// Missing samples.
     #[error(
         "{file}: samples missing after {place}, t = {after_s} s: {missing} (the next is at {next_s} s, the sample time is {sample_time_s:.6} s; gaps in all: {gaps}); interpolate over them with --resample, or use the part before or after with --from and --to"
     )]

@@ -22,7 +22,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! | module | what it holds |
+//! | module | contents |
 //! |---|---|
 //! | `formats` | the formats, a module each, and what they share; [`readable_endings`] |
 //! | `table` | the columns of any format; [`ColumnExpression`], [`error_among`]: which of them are meant |

@@ -50,7 +50,7 @@ pub enum Order {
     /// The value for the person's row of a balanced Latin square.
     #[default]
     Latin,
-    /// The value for the file.
+    /// The value in the file.
     Given,
 }
 

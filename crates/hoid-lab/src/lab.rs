@@ -4,7 +4,7 @@
 //! Messages from pages arrive on the threads of their sockets, one at a time under one lock; messages to pages go into
 //! the queue of each. The estimate has a thread of its own, the pages of results too.
 //!
-//! | file | what it holds |
+//! | file | contents |
 //! |---|---|
 //! | `runs` | a run: sent, started, taken batch by batch, ended |
 //! | `told` | what the pages are reported |
@@ -285,7 +285,7 @@ impl Shared {
     fn hello(&self, id: u64, role: Role, browser: BTreeMap<String, String>) -> Result<(), LabError> {
         let long = |(name, value): (&String, &String)| name.len() > 64 || value.len() > 512;
         if browser.len() > 32 || browser.iter().any(long) {
-            return Err(LabError::Message("the page states too much of its browser".to_owned()));
+            return Err(LabError::Message("the message of the page about its browser is too long".to_owned()));
         }
         if let Some(page) = self.pages().get_mut(&id) {
             page.role = Some(role);

@@ -107,7 +107,7 @@ impl LagFits {
         self.u.push(sample.u);
     }
 
-    /// Forgets what was before a change of the person, s.
+    /// Forgets the data before a change of the person, s.
     pub fn changed(&mut self, at_s: f64) {
         let past = ((at_s - self.from_s) / self.ts.s())
             .ceil()

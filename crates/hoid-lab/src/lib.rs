@@ -4,7 +4,7 @@
 //! frame, and sends them in batches. Here they are appended to the folder of the session, followed by the tracker, and
 //! after the run recomputed to the last bit.
 //!
-//! | module | what it holds |
+//! | module | contents |
 //! |---|---|
 //! | [`config`] | [`Config`]: the experiment, `lab.toml` |
 //! | [`course`] | [`Course`](course::Course): the controlled element at each time |

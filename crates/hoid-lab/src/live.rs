@@ -83,7 +83,7 @@ pub struct LiveRun {
 }
 
 impl LiveRun {
-    /// For a method by its name, for a task.
+    /// A live estimate with the named method, for a task.
     ///
     /// # Errors
     /// [`LabError::Ident`] for a method that cannot run live.

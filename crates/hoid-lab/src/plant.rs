@@ -63,7 +63,7 @@ impl Plant {
 /// Most states of a controlled element.
 pub const MOST_STATES: usize = 16;
 
-/// From what a device reports to u.
+/// From the output of a device to u.
 ///
 /// `w = (raw - centre)/span`, within -1 to 1; `|w| <= dead` gives 0, what is beyond is stretched so
 /// that the ends stay; `u = gain w`. The gain holds sensitivity, direction and the full deflection.

@@ -139,7 +139,7 @@ fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }
 
-/// The pages that are there.
+/// The existing pages.
 pub fn found(folder: &Path) -> Pages {
     let mut pages = Vec::new();
     for (number, stem) in Stem::all(folder).unwrap_or_default() {

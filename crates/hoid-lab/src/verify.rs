@@ -62,7 +62,7 @@ pub struct Measures {
     pub input_age_ms: f64,
     /// Root mean square of e in the measurement.
     pub rms_e: f64,
-    /// The value for what was to be followed or held off.
+    /// The value for the target or disturbance.
     pub rms_forcing: f64,
     /// 100 for no error, 0 for as much as hands at rest would leave.
     pub score: f64,

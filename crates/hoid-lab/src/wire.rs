@@ -112,7 +112,7 @@ pub struct State {
     pub calibrate: bool,
     /// The session, as `sub-P01/ses-01`.
     pub session: Option<String>,
-    /// Sessions that can go on.
+    /// Sessions that can be resumed.
     pub open: Vec<String>,
     /// Runs that ended.
     pub done: Vec<Done>,
@@ -128,7 +128,7 @@ pub struct State {
     pub running: Option<usize>,
     /// True while pages are being made.
     pub reporting: bool,
-    /// Pages that were made: what they are, and where.
+    /// Pages that were written: titles and paths.
     pub reports: Vec<(String, String)>,
     /// Answers of the calibration.
     pub calibration: Vec<(String, String)>,

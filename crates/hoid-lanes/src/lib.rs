@@ -49,7 +49,7 @@
 //! # Ok::<(), &str>(())
 //! ```
 //!
-//! | item | what it is |
+//! | item | meaning |
 //! |---|---|
 //! | [`Number`] | an f64, or several in lanes |
 //! | [`LaneTask`], [`InstructionSet::with_lanes`] | a computation over numbers, and its run in the lanes of the chosen registers |

@@ -16,10 +16,10 @@ pub enum ModelError {
         quantity: &'static str,
         /// The value given.
         found: f64,
-        /// The range that has a meaning.
+        /// The valid range.
         expected: &'static str,
     },
-    /// A name that has no meaning.
+    /// A name without a meaning.
     #[error(transparent)]
     UnknownName(#[from] UnknownName),
     /// A sample that is NaN or infinite.

@@ -1,4 +1,4 @@
-//! A fault of recorded data: what it is, where, how large, and the actions taken about it.
+//! A fault of recorded data: kind, place, size, and the actions taken about it.
 //!
 //! A [`Fault`] is a place in one channel of a record (or in all of them) where the numbers cannot be what the channel
 //! did. How faults are found is reported where that is done; this text describes one, so that a file, a fit and a
@@ -148,7 +148,7 @@ impl fmt::Display for Fault {
             FaultKind::Scale => write!(f, "{channel} is {size} times larger than elsewhere, {span}")?,
             FaultKind::TimeUnit => write!(f, "a sample time of {size} s: no person is recorded so")?,
             FaultKind::Exchanged => {
-                f.write_str("input and output look exchanged: the output answers at once, and is answered late")?;
+                f.write_str("input and output seem exchanged: the output responds immediately, and the input responds late")?;
             }
             FaultKind::Sign => f.write_str("the output answers the input with the wrong sign")?,
         }

@@ -22,7 +22,7 @@ pub enum Severity {
     Note,
     /// The result may be wrong.
     Doubt,
-    /// The data do not determine what was asked.
+    /// The data do not determine the requested quantity.
     Undetermined,
 }
 

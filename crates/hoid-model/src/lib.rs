@@ -36,7 +36,7 @@
 //!
 //! Notation and units are those of the symbol table in the documentation (`docs/src/symbols.md`).
 //!
-//! | module | what it holds |
+//! | module | contents |
 //! |---|---|
 //! | [`record`] | [`Record`]: evenly sampled input, output and what else was measured |
 //! | [`polynomial`] | polynomials in `q^-1`, their roots and stability |

@@ -34,7 +34,7 @@ pub trait NamedChoice: Copy + PartialEq + Sized + 'static {
     }
 }
 
-/// A name that has no meaning.
+/// A name without a meaning.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[error("there is no {what} {found}; expected {expected}")]
 pub struct UnknownName {

@@ -202,7 +202,7 @@ impl Orders {
     /// Checks the orders against the structure.
     ///
     /// # Errors
-    /// [`ModelError::Orders`] with what is wrong.
+    /// [`ModelError::Orders`] with the problem.
     pub fn check(&self, structure: Structure) -> Result<(), ModelError> {
         let refuse = |expected: String| {
             Err(ModelError::Orders {

@@ -1,6 +1,6 @@
 //! Small numerics that the crates of hoid share, each written once.
 //!
-//! | module | what it holds |
+//! | module | contents |
 //! |---|---|
 //! | [`statistics`] | mean, variance, root mean square; quantiles by three definitions |
 //! | [`products`] | the product of two vectors |

@@ -18,7 +18,7 @@ use crate::{
 /// it.
 type ReadParts<'py> = (Bound<'py, PyDict>, Vec<String>, Vec<String>);
 
-/// The record of a file, or the records between what is masked.
+/// The record of a file, or the records between the masked parts.
 #[pyfunction]
 #[pyo3(signature = (path, *, input, output, time, trial, all_trials, sampling_frequency, start, stop, resample, fill, detrend, drop_repeated, unit, scale, offset, decimate,
     new_sampling_frequency, run_in, mask, shortest))]

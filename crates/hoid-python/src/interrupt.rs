@@ -38,7 +38,7 @@ impl RunStatus {
         self.done.fetch_add(1, Ordering::Relaxed);
     }
 
-    /// This much of the whole work is done.
+    /// Completed share of the work.
     pub fn set(&self, done: u64, total: u64) {
         self.total.store(total, Ordering::Relaxed);
         self.done.store(done, Ordering::Relaxed);

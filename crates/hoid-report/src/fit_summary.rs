@@ -84,7 +84,7 @@ pub fn sentence<'a>(
     phase_margin_deg: Option<Estimate>,
 ) -> Option<String> {
     let known: Vec<(&str, f64)> = parameters.into_iter().filter(|(_, value)| value.is_finite()).collect();
-    // K/T_I is what is left to report where the gain itself is not known.
+    // K/T_I is reported where the gain itself is not known.
     let has_gain = known.iter().any(|(name, _)| *name == "K");
     let of = |(word, name, unit): &(&str, &str, &str)| {
         let found = known.iter().find(|(known, _)| known == name);

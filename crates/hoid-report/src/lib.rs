@@ -35,7 +35,7 @@
 //! # }
 //! ```
 //!
-//! | module | what it holds |
+//! | module | contents |
 //! |---|---|
 //! | [`FitSummary`], [`sentence`] | the head of a page: verdict, the answer as text, parameters with errors |
 //! | [`Report`], [`ModelSection`], [`model_figure`] | one self-contained HTML page about one or several fitted models |

@@ -58,8 +58,7 @@ fn report<'a>(record: &'a Record, traces: Vec<TraceSection<'a>>) -> TrackReport<
     }
 }
 
-/// What every page must keep: nothing from outside, no NaN, no two equal ids, references that
-/// exist.
+/// Properties of every page: nothing from outside, no NaN, no two equal ids, references that exist.
 fn check_page(html: &str) {
     let without_namespace = html.replace("xmlns=\"http://www.w3.org/2000/svg\"", "");
     for outside in ["http", "src=", "<link", "<script", "@import", "url(\"", "//cdn"] {

@@ -180,7 +180,7 @@ impl<'a> CellRun<'a> {
             Task::Track(options) => {
                 let kept = self.plan.trace_every.unwrap_or(ERRORS_EVERY);
                 let every = greatest_common_divisor(kept, ERRORS_EVERY);
-                // The recursion reports what went wrong with its start fit.
+                // The recursion reports the error of its start fit.
                 let start = fit.and_then(|fit| fit.as_ref().ok());
                 let trace = track_from(record, options, every, start).map_err(text)?;
                 self.rows.track_row(&trace, record);

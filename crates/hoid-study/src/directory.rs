@@ -39,7 +39,7 @@ pub(crate) fn write_source(path: &Path, text: &str) -> Result<(), StudyError> {
     Ok(hoid_io::write_atomically(path, |file| file.write_all(text.as_bytes()))?)
 }
 
-/// Removes what a killed run was writing: everything in `parts` that has not got its name yet.
+/// Removes the partial output of a killed run: everything in `parts` that has not got its name yet.
 pub(crate) fn sweep(parts: &Path) -> Result<(), StudyError> {
     hoid_io::make_directory(parts)?;
     let unwritable = |source| IoError::Unwritable {

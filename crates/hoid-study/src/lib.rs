@@ -45,7 +45,7 @@
 //! (`resume`), shards of a study can run on several machines and are joined by [`merge`], and the
 //! bytes of the tables depend on neither.
 //!
-//! | module | what it holds |
+//! | module | contents |
 //! |---|---|
 //! | [`plan`] | [`Plan`]: scenarios and estimators as grids, read from TOML and checked |
 //! | [`plans`] | plans that come with the program |

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-/// A description of rows: what it does not name may be anything.
+/// A description of rows; keys that it does not name may have any value.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Query {
     quantity: Option<String>,

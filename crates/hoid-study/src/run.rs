@@ -145,7 +145,7 @@ pub fn run(
     })
 }
 
-/// Writes what came out of a block.
+/// Writes the results of a block.
 pub(crate) fn write_tables(
     directory: &Path,
     plan_sha256: &str,
@@ -199,7 +199,7 @@ fn prepare(plan: &Plan, directory: &Path, manifest: &RunRecord, resume: bool) ->
     Ok(manifest.clone())
 }
 
-/// Makes a directory that is known ready to go on: what was on its way is removed, and what an
+/// Makes a directory that is known ready to go on: output in progress is removed, and what an
 /// earlier program left without seals is named as sealed from here on, for it has no block yet.
 pub(crate) fn ready(directory: &Path, found: &RunRecord, record: &RunRecord) -> Result<(), StudyError> {
     if found.complete {

@@ -30,7 +30,7 @@ struct Seal {
 pub(crate) enum OnDisk {
     Whole,
     Missing,
-    /// Why it is not what it reports.
+    /// Why its content does not match its header.
     Damaged(String),
 }
 

@@ -131,7 +131,8 @@ fn is_operator(table: &OutputTable, row: usize, found: &Identified) {
     }
 }
 
-/// Each row is what the analysis of that run gives, to the last bit, with the options of the plan.
+/// Each row is the result of the analysis of that run, to the last bit, with the options of the
+/// plan.
 #[test]
 fn a_row_is_the_analysis_of_the_run() {
     let (directory, fits) = fits(PLAN);

@@ -1,5 +1,5 @@
 //! Plans of studies, manifests of groups and scenarios whose text was changed: read or refused as
-//! text that name the file, and never a panic; what is read can be read again.
+//! text that name the file, and never a panic; data that are read can be read again.
 #![allow(clippy::unwrap_used)]
 
 use std::{fs, path::Path};

@@ -10,7 +10,7 @@ use hoid_track::{
 /// Largest order of the noise model.
 pub(crate) const LARGEST_ND: usize = 8;
 
-/// Checks what a method needs that has a model of how the person changes.
+/// Checks the requirements of a method that has a model of how the person changes.
 ///
 /// # Errors
 /// [`IdentError::BadOption`].

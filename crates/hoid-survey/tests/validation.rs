@@ -71,7 +71,7 @@ fn the_best_of_the_grid_is_taken() {
         assert_eq!(chosen.method.covariance(), Some(choice.covariance));
         let most = choice.candidates.iter().map(|(_, vaf)| *vaf).fold(0.0, f64::max);
         assert_eq!(choice.vaf(), most, "{method}");
-        // What it reports is what the trace with it has.
+        // Its output is that of the trace.
         let trace = track(&record, &chosen, 1).unwrap();
         assert_eq!(trace.vaf_of(&other).unwrap(), (most, choice.span_s));
         assert!(most > 80.0, "{method}: {choice:?}");

@@ -36,7 +36,7 @@ pub enum ThesisError {
         method: &'static str,
         /// The problem.
         quantity: String,
-        /// As it was found.
+        /// The value as found.
         found: String,
         /// As it should be.
         expected: String,

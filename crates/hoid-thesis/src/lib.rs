@@ -25,7 +25,7 @@
 //! # Ok::<(), hoid_thesis::ThesisError>(())
 //! ```
 //!
-//! | module | what it holds |
+//! | module | contents |
 //! |---|---|
 //! | [`plans`] | the studies of the text as named plans |
 //! | [`reproduction`] | tables, figures and claims in a directory, from the results of the studies |

@@ -33,7 +33,7 @@ pub const SURVEY: &NamedPlan = &NamedPlan {
     text: include_str!("../plans/survey.toml"),
 };
 
-/// The named plans of the list: those of the thesis, and those of what goes beyond it.
+/// The named plans of the list: those of the thesis, and those beyond it.
 pub fn named_plans() -> impl Iterator<Item = &'static NamedPlan> {
     TEXT_PLANS.iter().chain(PLANS)
 }

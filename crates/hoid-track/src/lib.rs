@@ -24,7 +24,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! | module | what it holds |
+//! | module | contents |
 //! |---|---|
 //! | `methods`, `method` | [`Method`]: the recursive methods, a file or folder each; the self-description of each |
 //! | [`building`] | what a method is made of, for those in other crates |

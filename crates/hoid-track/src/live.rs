@@ -219,8 +219,8 @@ impl WarmUp {
         self.collected += 1;
     }
 
-    /// Leaves out what came before the run started, and collects as much in its place; false if
-    /// there is nothing of the kind.
+    /// Leaves out the data before the run, and collects as much in its place; false if there is
+    /// nothing of the kind.
     fn leave_out_idle(&mut self) -> bool {
         let Ok(record) = self.record() else { return false };
         let idle = idle_head(&record);

@@ -92,13 +92,13 @@ pub trait RecursiveMethod: Settings + Boxed + 'static {
     /// Checks the options against structure and orders.
     ///
     /// # Errors
-    /// [`IdentError::BadOption`] with what is wrong.
+    /// [`IdentError::BadOption`] with the problem.
     fn check(&self, setup: &Setup) -> Result<(), IdentError>;
 
-    /// Checks what depends on the sample time.
+    /// Checks that depend on the sample time.
     ///
     /// # Errors
-    /// [`IdentError::BadOption`] with what is wrong.
+    /// [`IdentError::BadOption`] with the problem.
     fn check_at(&self, _sample_time: SampleTime) -> Result<(), IdentError> {
         Ok(())
     }
@@ -236,7 +236,7 @@ pub trait RecursiveMethod: Settings + Boxed + 'static {
         false
     }
 
-    /// Takes from a record what has a default there.
+    /// Takes settings with a default from a record.
     fn prepare(&mut self, _record: &Record) {}
 
     /// Leaves out what was reported about parameters that are not known.

@@ -159,7 +159,7 @@ impl TrackOptions {
     /// As [`TrackOptions::check`], with what depends on the sample time.
     ///
     /// # Errors
-    /// [`IdentError`] with what is wrong.
+    /// [`IdentError`] with the problem.
     pub(crate) fn check_at(&self, sample_time: SampleTime) -> Result<(), IdentError> {
         check_sample_time(sample_time)?;
         self.check()?;
@@ -173,7 +173,7 @@ impl TrackOptions {
     /// Checks method, structure, orders and options against each other.
     ///
     /// # Errors
-    /// [`IdentError`] with what is wrong.
+    /// [`IdentError`] with the problem.
     pub fn check(&self) -> Result<(), IdentError> {
         self.orders.check(self.structure)?;
         let (setup, method) = (self.setup()?, &self.method);

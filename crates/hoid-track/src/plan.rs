@@ -166,7 +166,7 @@ pub fn ranges_of(
     Ok(narrowed(default.with(named)?, delay, of_start, sample_time))
 }
 
-/// Narrows ranges to what is known in addition.
+/// Narrows ranges by additional knowledge.
 fn narrowed(
     mut ranges: OrderRanges,
     track_delay_s: Option<(f64, f64)>,

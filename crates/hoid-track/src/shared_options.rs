@@ -15,7 +15,7 @@ use crate::{forgetting::ForgettingRule, memory::MemoryOptions};
 pub enum WindupGuard {
     /// As far as forgetting takes them: equations 5.26 and 31 of the thesis unchanged.
     Off,
-    /// To this multiple of what they are at the start.
+    /// To this multiple of their initial value.
     Bound(f64),
 }
 
@@ -58,7 +58,7 @@ settings! {
         #[setting(bounds(Bounds::Positive))]
         pub limit: Option<f64> = None,
         /// How far each variance in P may grow where nothing excites its parameter, as a multiple of
-        /// what it is at the start; off: without end
+        /// its initial value; off: without end
         #[setting(bounds(Bounds::AtLeast(1.0)), default("1e4 with a covariance or without a start fit, else 10 times what the memory has under the excitation of that fit"))]
         pub windup_guard: Option<WindupGuard> = None,
     }
@@ -114,7 +114,7 @@ settings! {
 }
 
 settings! {
-    /// A delay that is followed.
+    /// A tracked delay.
     pub struct DelayOptions {
         /// Follow the delay tau_e too, within this range: as a parameter by physical, in whole
         /// samples by rpem and multiple-model

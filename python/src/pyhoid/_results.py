@@ -1,7 +1,7 @@
 """What the results of `identify` share: records, settings, JSON both ways, equality, pickles.
 
 A result is written as the JSON of ``hoid identify --json``, with a state from which the model comes back as
-it was, every bit of it. What is equal and what a pickle holds is that text.
+it was, every bit of it. Equality and pickles use that text.
 """
 
 from __future__ import annotations

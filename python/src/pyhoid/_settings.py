@@ -322,7 +322,7 @@ SETTINGS = """covariance : float
             rls, rpem, physical, multiple-model, adaptive, fused.
         windup_guard : float | Literal['off']
             How far each variance in P may grow where nothing excites its parameter, as a
-            multiple of what it is at the start; off: without end. For rls, rpem, physical.
+            multiple of its initial value; off: without end. For rls, rpem, physical.
         memory_of : Mapping[str, float | str]
             Memory of single parameters, or of all of one letter, as b0=256,f=inf,K_e=5s. For
             rls, rpem, physical, rriv, fused.

@@ -113,7 +113,7 @@ def identify(
         rivbj for bj (Young 2011).
     faults : {{"bridge", "cut", "report", "keep"}}
         What is done about faults of the records (spikes, dropouts, frozen and idle stretches):
-        bridge what lasts up to 0.1 s and cut at what is longer, cut all, report only, or look for
+        bridge faults of up to 0.1 s and cut at longer ones, cut all, report only, or look for
         none. What was found is ``fit.faults``. For recorded data a level of u is estimated too
         (``fit.levels``), and ``fit.records`` are without their means; keep leaves data as they are.
     decimate : "auto", "off" or int

@@ -86,7 +86,7 @@ def reproduce(
     )
     if made is None:
         raise StudyStateError(
-            f"the reproduction was stopped; what is done is in {target};"
+            f"the reproduction was stopped; completed parts are in {target};"
             " make the same call again to go on"
         )
     page, _, tally = made

@@ -261,7 +261,7 @@ def study(
     )
     if not finished:
         raise StudyStateError(
-            f"{found.name} was stopped; what is done is in {target}; go on with resume=True"
+            f"{found.name} was stopped; completed parts are in {target}; go on with resume=True"
         )
     return Results(target, finished=bool(tables), estimates=estimates)
 

@@ -38,7 +38,7 @@ pub enum Sight {
     /// Error and control are held over each sample, as on a display that is drawn again and a stick
     /// that is read.
     Held,
-    /// All the time; the recorder samples.
+    /// Continuously; the recorder samples.
     Continuous,
 }
 

@@ -34,7 +34,7 @@ pub fn cases() -> Vec<Case> {
     all
 }
 
-/// A spectrum, a course, a blemish under a name.
+/// A named spectrum, course or blemish.
 type Kind = (&'static str, &'static str, Spectrum, Course, Blemish);
 
 /// Every remnant, and every thing that stick and recorder do.

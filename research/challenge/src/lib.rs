@@ -7,7 +7,7 @@
 //! and a batch fit that knows the change. There are two sets of seeds, one for making a method and one for its
 //! judgement, run once.
 //!
-//! | file | what it holds |
+//! | file | contents |
 //! |---|---|
 //! | `case`, `cases` | [`Case`]: what a case is; [`cases()`]: all of them |
 //! | `operator` | [`Operator`], [`Plant`]: who acts on what, in continuous time |

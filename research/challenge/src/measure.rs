@@ -118,7 +118,7 @@ pub(super) fn asked(changes_s: &[f64], start_s: f64, length_s: f64, is_long: boo
     all
 }
 
-/// A run with what is asked of it.
+/// A run with its task.
 pub struct Posed {
     case: Case,
     number: u64,

@@ -23,7 +23,8 @@ use super::{
 
 /// Logarithm of the likelihood ratio from which a change is certain.
 pub const CERTAIN: f64 = 12.0;
-/// Least course of the strength: at a zero of the error the remnant would report everything.
+/// Lower limit of the strength: at a zero of the error the remnant would vanish and reveal the
+/// response.
 const LEAST_LEVEL: f64 = 0.05;
 /// Order of the noise model of the batch fit, and the least seconds that it takes.
 const ND: usize = 4;

@@ -24,7 +24,7 @@ pub fn page(lines: &[Line], measured: &str) -> String {
          ## Results\n"
     );
     text += &tables(lines);
-    text += "\n## The cases\n\n| case | theme | what it is |\n|---|---|---|\n";
+    text += "\n## The cases\n\n| case | theme | description |\n|---|---|---|\n";
     for case in cases() {
         let _ = writeln!(text, "| {} | {} | {} |", case.name, case.theme, case.meaning);
     }

@@ -65,10 +65,10 @@ struct Trial {
 /// The trials of a person on a plant.
 type Cells = BTreeMap<(String, String), Vec<Trial>>;
 
-/// Runs what is not there yet.
+/// Runs the missing parts.
 ///
 /// # Errors
-/// [`ChallengeError`] for recordings that cannot be read, names that are none, files.
+/// [`ChallengeError`] for recordings that cannot be read, unknown names, and failures of files.
 pub fn challenge_people(options: &PeopleOptions, each: &(dyn Fn(&str) + Sync)) -> Result<Vec<Line>, ChallengeError> {
     let cells = read_all(&options.recordings)?;
     let (entrants, _) = chosen_entrants(&options.methods)?;
@@ -267,7 +267,7 @@ impl Joined {
     }
 }
 
-/// A joined record with what is asked of it.
+/// A joined record with its task.
 struct Posed {
     case: String,
     number: u64,

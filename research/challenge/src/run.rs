@@ -79,7 +79,7 @@ pub(super) fn refused(reason: String) -> ChallengeError {
     ChallengeError::Refused { reason }
 }
 
-/// Runs what is not there yet; the lines of all that was chosen, in the order of cases, runs and
+/// Runs the missing parts; the lines of all that was chosen, in the order of cases, runs and
 /// entrants. `each` is called after every run.
 ///
 /// # Errors

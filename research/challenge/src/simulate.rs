@@ -359,7 +359,7 @@ mod tests {
             };
             let run = simulate(&quiet, RUN).unwrap();
             let per_second = quiet.rate_hz as usize;
-            // Late enough for what the start stirs up to be gone.
+            // Late enough for the transient of the start to be gone.
             let span = 60 * per_second..80 * per_second;
             for multiple in [2.0, 3.0, 5.0, 11.0, 19.0] {
                 let omega = multiple * TAU / 20.0;

@@ -1,7 +1,7 @@
 //! Common parts of the studies of this crate. A study is a file in `examples/`; its head states
 //! what it counts and what its arguments are.
 //!
-//! | module | what it holds |
+//! | module | contents |
 //! |---|---|
 //! | [`task`] | the conditions of the thesis, and runs on all cores |
 //! | [`told`] | methods that are given the delay |

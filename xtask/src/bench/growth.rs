@@ -24,7 +24,7 @@ use crate::process::output;
 struct Point {
     n: usize,
     seconds: f64,
-    /// Memory beyond what was before, bytes; none if the system does not report.
+    /// Additional memory, bytes; none if the system does not report.
     memory: Option<u64>,
 }
 

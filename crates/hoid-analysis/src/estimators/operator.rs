@@ -65,7 +65,7 @@ impl BatchEstimator for FamilyEstimator {
     fn fit(with: &Identification<Self>, data: &mut Recordings) -> Result<Fitted<FamilyFit>, AnalysisError> {
         let described = data.described(&with.excitation, with.period_s, with.faults);
         let channel = match &described {
-            // The findings, or what was named: instruments need no lines.
+            // The findings, or the named channel: instruments need no lines.
             Ok(Some(found)) => found.channel.clone(),
             _ => with.excitation.named().map(str::to_owned),
         };

@@ -17,9 +17,9 @@ use crate::{
     settings::Setting,
 };
 
-/// Kind of what is an operator.
+/// Kind of an operator.
 pub(super) const OPERATOR: &str = "operator";
-/// Kind of what is a polynomial model.
+/// Kind of a polynomial model.
 pub(super) const POLYNOMIAL: &str = "polynomial";
 
 /// A fit that writes itself.
@@ -186,7 +186,7 @@ impl<F: BatchAnswer> Identified<F> {
         Ok(format!("{:#}", Value::Object(self.json()?)))
     }
 
-    /// Reads what [`Self::to_json`] wrote: everything but the samples of its recordings. The model predicts,
+    /// Reads the output of [`Self::to_json`]: everything but the samples of its recordings. The model predicts,
     /// simulates and validates as before, on records that are given to it.
     ///
     /// # Errors

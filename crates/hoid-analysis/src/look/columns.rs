@@ -4,7 +4,7 @@ use hoid_io::{control_among, error_among};
 
 /// Names of the tracked signals.
 const TARGETS: [&str; 7] = ["r", "ref", "reference", "target", "track", "setpoint", "f_t"];
-/// Names of what is steered.
+/// Names of the steered quantities.
 const OUTPUTS: [&str; 7] = ["y", "output", "position", "state", "cursor", "response", "x"];
 
 /// A column in its role, and why.

@@ -4,7 +4,7 @@
 //! Command line, groups and Python look at a file by this alone, and nothing is chosen silently: what is found is
 //! shown, with the evidence, as [`Advice`] on how to read the file. What was asked for is not searched for.
 //!
-//! | file | what it finds |
+//! | file | contents |
 //! |---|---|
 //! | `options` | what is known already |
 //! | `columns` | error and control by the names that people give them |

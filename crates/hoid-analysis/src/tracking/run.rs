@@ -59,7 +59,7 @@ impl Tracking {
     /// The plan for a recording, at the rate at which it is tracked.
     ///
     /// # Errors
-    /// [`AnalysisError::Options`] for what contradicts itself.
+    /// [`AnalysisError::Options`] for contradictory options.
     pub fn plan(&self, recordings: &Recordings) -> Result<TrackPlan, AnalysisError> {
         let read = recordings
             .records

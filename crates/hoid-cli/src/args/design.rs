@@ -32,7 +32,7 @@ pub struct DesignArgs {
     /// Length of a run in s: the period of the forcing function
     #[arg(long, value_name = "S", default_value_t = 81.92)]
     pub length: f64,
-    /// Number of runs [default: what is wanted needs, else 1]
+    /// Number of runs [default: the number for the target, else 1]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub runs: Option<u32>,
     /// Lines of the forcing function

@@ -16,7 +16,7 @@ struct Help {
     shown: &'static [&'static str],
 }
 
-/// The commands by what they are for, in the order of the first page.
+/// The commands by purpose, in the order of the first page.
 const GROUPS: [(&str, &[&str]); 4] = [
     (
         "Recordings",
@@ -362,7 +362,7 @@ fn argument(arg: Arg, help: &Help) -> Arg {
     arg.help_heading(heading.map_or("Model", |(heading, _)| heading))
 }
 
-/// The list of commands by what they are for.
+/// The list of commands by purpose.
 fn first_page(program: &mut Command) -> String {
     let about = |name: &str| {
         let command = program.get_subcommands().find(|c| c.get_name() == name);

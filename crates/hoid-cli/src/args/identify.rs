@@ -1,5 +1,4 @@
-//! Options of `hoid identify`: what is read and written. The entries of the estimators are in the registry of the
-//! library.
+//! Options of `hoid identify`: input and output. Options of the estimators are in the registry of the library.
 
 use std::path::PathBuf;
 

@@ -95,7 +95,7 @@ impl DecimateArgs {
     }
 }
 
-/// Parts left out of a record.
+/// Parts that are left out of a record.
 #[derive(Debug, Args)]
 pub struct MaskArgs {
     /// Leave out the problems of the sampling (see `hoid info`): the record is cut there, and each
@@ -110,9 +110,8 @@ pub struct MaskArgs {
 /// Treatment of faults of a recording.
 #[derive(Debug, Clone, Copy, Args)]
 pub struct FaultArgs {
-    /// Faults of the recording (spikes, dropouts, frozen and idle stretches, wraps, steps): bridge what
-    /// lasts up to 0.1 s and cut the record at what is longer, cut all, report and leave the data as
-    /// they are, or keep: look for none
+    /// Faults of the recording (spikes, dropouts, frozen and idle stretches, wraps, steps): bridge faults of up to 0.1
+    /// s and cut the record at longer ones, cut all, report and leave the data as they are, or keep: look for none
     #[arg(long, value_name = "WHAT", default_value = "bridge", value_parser = choice_of(&FaultHandling::ALL))]
     pub faults: FaultHandling,
 }

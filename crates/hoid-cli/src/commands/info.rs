@@ -1,4 +1,4 @@
-//! `hoid info`: what is inside of a file, before anything is identified.
+//! `hoid info`: contents of a file, before any identification.
 
 use std::collections::BTreeMap;
 

@@ -130,7 +130,7 @@ mod tests {
         assert!(told.covariance[6][6] < 0.1, "{}", told.covariance[6][6]);
         let told = Difference::of(&contrast([0.0, 1.5, 0.0, 0.0, 2.0, 0.0, 0.0])).unwrap();
         assert_eq!(told.changed, [true, true, false]);
-        // All together are what the difference is.
+        // All together give the difference.
         let difference = [2.0, 2.0, 2.0, 2.0, 2.0, 2.0, -12.0];
         let told = Difference::of(&contrast(difference)).unwrap();
         assert_eq!(told.changed, [true; 3]);

@@ -1,4 +1,4 @@
-//! One signal: what its next sample may be.
+//! Guard of one signal: limits for its next sample.
 //!
 //! **Prediction.** With `nabla x(t) = x(t) - x(t-1)`, the polynomial of degree j-1 through the last j samples goes on
 //! to a value from which x(t) differs by exactly `r_j(t) = nabla^j x(t)` (Newton's backward formula). The backward

@@ -4,7 +4,7 @@
 //! samples later, and stays in them for the time constants of F. To limit innovations is therefore not enough: the
 //! samples themselves are compared with what the signal predicts, before anything sees them.
 //!
-//! | file | what it holds |
+//! | file | contents |
 //! |---|---|
 //! | [`channel`] | one signal: the causal prediction of its next sample, the scale of its errors, samples that are held back |
 //! | [`profile`] | both signals over a second: sizes and smoothness against those of the past; idle, frozen and swapped channels, a model that predicts less than the past of u alone |

@@ -178,7 +178,7 @@ impl Comparison {
         format!("{:#}", Value::Object(self.json()))
     }
 
-    /// Reads what [`Self::to_json`] wrote.
+    /// Reads the output of [`Self::to_json`].
     ///
     /// # Errors
     /// [`AnalysisError::NotAResult`] for a text that is none, is damaged, or is of another version.

@@ -16,7 +16,7 @@ use super::{
     factor::{CONDITION, Factor, Variation},
 };
 
-/// A level with what belongs to it.
+/// A level with its data.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Members {
     pub name: String,
@@ -84,7 +84,7 @@ impl Resolved {
         let pool = if of_people { &subjects } else { &conditions };
         if let Some(other) = all.iter().find(|member| !pool.contains(member)) {
             return Err(bad(format!(
-                "{other} is not a condition and no one in this group: the conditions are {}, the people {}",
+                "{other} is neither a condition nor a person of this group: the conditions are {}, the people {}",
                 conditions.join(", "),
                 subjects.join(", ")
             )));
@@ -108,7 +108,7 @@ impl Resolved {
             }
             (Some(Variation::Within), None) => {
                 return Err(bad(
-                    "no one is in two of its levels: it varies between people".to_owned()
+                    "no person is in two of its levels: it varies between people".to_owned()
                 ));
             }
             (_, Some(_)) => Variation::Within,

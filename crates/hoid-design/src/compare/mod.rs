@@ -4,7 +4,7 @@
 //! their conditions (`contrast`), and the mean of those over people, or the difference of groups of people, is a
 //! random-effects meta-analysis: people who are known well count more, as far as people are alike.
 //!
-//! | module | what it holds |
+//! | module | contents |
 //! |---|---|
 //! | [`meta_regression`](fn@meta_regression) | estimates of people with their errors: restricted likelihood, interval by Hartung and Knapp |
 //! | [`EffectSize`] | d_z, Hedges g, with intervals |

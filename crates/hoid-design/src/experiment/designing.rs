@@ -256,7 +256,7 @@ impl Search<'_> {
         Ok((shares, last))
     }
 
-    /// Takes from lines what is more than they may have, and makes the sum one.
+    /// Limits lines to their largest amplitude, and spreads the rest, and makes the sum one.
     fn limit(&self, places: &[u32], shares: &mut [f64]) {
         let lines: Vec<(f64, bool)> = places
             .iter()

@@ -35,7 +35,7 @@ use super::DesignError;
 /// Where the forcing function enters the loop.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Enters {
-    /// It is what is to be followed.
+    /// It is the signal to be tracked.
     #[default]
     Target,
     /// It is added at the input of the controlled element.

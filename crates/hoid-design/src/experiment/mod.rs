@@ -1,6 +1,6 @@
 //! Report of an experiment will, before it is done.
 //!
-//! | module | what it holds |
+//! | module | contents |
 //! |---|---|
 //! | [`expected`] | standard errors of a person by the information of the lines of a forcing function |
 //! | [`Designing`] | amplitudes and places of the lines that are most informative, under limits |

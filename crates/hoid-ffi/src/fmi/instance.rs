@@ -32,7 +32,7 @@ pub(super) struct Instance {
     pub(super) settings: FmuSettings,
     pub(super) variables: Vec<FmuVariable>,
     pub(super) values: Vec<FmuStart>,
-    /// Texts as C wants them, by value reference; empty for what is not a text.
+    /// Texts as C strings, by value reference; empty for values that are not texts.
     texts: Vec<CString>,
     first_output: usize,
     pub(super) phase: Phase,

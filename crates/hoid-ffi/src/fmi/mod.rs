@@ -1,9 +1,9 @@
 //! Functional mock-up units: the tracker, and the operator of a scenario, for simulators.
 //!
-//! The shared library is that of the C ABI; `hoid fmu` packs it with a description. What a unit has
-//! is reported by [`hoid_io::fmu`]; here is its effect.
+//! The shared library is the one of the C ABI; `hoid fmu` packs it with a description. What a unit
+//! has is reported by [`hoid_io::fmu`]; here is its effect.
 //!
-//! | file | what it holds |
+//! | file | contents |
 //! |---|---|
 //! | `instance` | an instance: its values, its phases, when a sample is due |
 //! | `given` | parameters and inputs, by their names |

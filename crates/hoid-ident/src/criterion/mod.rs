@@ -35,10 +35,10 @@
 //!
 //! **Weights** multiply the squared residuals; they serve the robust loss.
 //!
-//! **A long record** passes span by span after its first part ([`pass`]), so that a fit needs no memory compared with
-//! the record.
+//! **A long record** passes span by span after its first part ([`pass`]), so that a fit needs little memory in addition
+//! to the record.
 //!
-//! | module | what it holds |
+//! | module | contents |
 //! |---|---|
 //! | `prediction_error` | the criterion: records, orders, which residuals count |
 //! | `initial_state` | what is assumed about the time before a record |

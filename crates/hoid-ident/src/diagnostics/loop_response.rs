@@ -17,7 +17,7 @@ const LATEST_S: f64 = 0.25;
 pub struct LoopResponse {
     /// Probability of so much where it does not.
     pub p_value: f64,
-    /// Share of what the past leaves of e that the latest outputs explain.
+    /// Share of the part of e that the past leaves unexplained and that the latest outputs explain.
     pub share: f64,
 }
 

@@ -3,7 +3,7 @@
 //! Each rule is one observation with its own kind ([`hoid_model::Finding`]), and the [`hoid_model::Verdict`] follows
 //! from them. The limits are where they are used.
 //!
-//! | kind | what was observed |
+//! | kind | observation |
 //! |---|---|
 //! | `not-converged`, `border` | how the search ended |
 //! | `delay-at-bound`, `parameter-at-bound` | the delay lies at the end of its range, another at a bound |
@@ -16,7 +16,7 @@
 //! | `no-response` | nothing that could not be chance |
 //! | `exact-fit`, `no-change`, `change-point` | worth knowing; the result remains valid |
 //!
-//! | file | what it holds |
+//! | file | contents |
 //! |---|---|
 //! | `residuals` | how far residuals are from white; also for the family |
 //! | `constancy` | whether parameters change; also for the family |

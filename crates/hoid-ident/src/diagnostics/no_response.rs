@@ -192,7 +192,7 @@ impl Spectra {
 
 /// The thinned channel after its own autoregression, and its coefficients.
 fn whitened(channel: &[f64], thin: usize) -> Option<(Vec<f64>, Vec<f64>)> {
-    // The mean of what is left out holds what is faster.
+    // The mean of the removed part contains the faster components.
     let mut thinned: Vec<f64> = (channel.chunks_exact(thin)).map(mean).collect();
     let mean = mean(&thinned);
     thinned.iter_mut().for_each(|v| *v -= mean);

@@ -222,7 +222,7 @@ impl<'a> Chosen<'_, 'a> {
         Some(found.and_then(|method| method.fit(&auxiliary, workspace)))
     }
 
-    /// Scales the weights of what is left to one; the figures of all forms, with these weights.
+    /// Normalises the remaining weights; the figures of all forms, with these weights.
     fn with_weights_of(&self, weighed: &mut [WeighedForm]) -> Vec<FormFigures> {
         let total: f64 = weighed.iter().map(|form| form.weight).sum();
         weighed.iter_mut().for_each(|form| form.weight /= total);

@@ -1,4 +1,4 @@
-//! Which forms the data leave, and which of them is in front.
+//! Forms that the data do not refute, and the best of them.
 //!
 //! Each form has Akaike's criterion, `chi^2 + 2 p` at the lines of an excitation, or `n ln V/kappa + 2 p` of the
 //! prediction error, kappa the inflation of variances; with little noise Schwarz's ([`super::comparison`]). Estimates
@@ -18,7 +18,7 @@ pub struct FormFigures {
     /// Akaike's criterion: `chi^2 + 2 p` at the lines, or `n ln V/kappa + 2 p`; with little noise Schwarz's, `ln n` in
     /// place of 2.
     pub criterion: Option<f64>,
-    /// Weight in what is averaged over forms; zero for a form that the data cannot determine, or refute.
+    /// Weight in averages over forms; zero for a form that the data cannot determine, or refute.
     pub weight: f64,
     /// chi^2 at the lines of held-out runs, each by the fit to the others, summed over runs.
     pub held_out: Option<f64>,
@@ -37,8 +37,8 @@ const LEAST_WEIGHT: f64 = 0.02;
 /// Most forms that are averaged.
 const MOST_FORMS: usize = 4;
 
-/// The form in front and the weight of each, from their criteria, simplest form first; `None` for a form that
-/// does not count. No form for no criterion.
+/// The best form and the weight of each, from their criteria, simplest form first; `None` for a form that does not
+/// count. No form for no criterion.
 pub(super) fn weigh(criteria: &[Option<f64>]) -> Option<(usize, Vec<f64>)> {
     let least = criteria.iter().flatten().copied().min_by(f64::total_cmp)?;
     let front = criteria

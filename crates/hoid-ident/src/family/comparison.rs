@@ -18,7 +18,7 @@ use super::{
 };
 use crate::IdentError;
 
-/// Difference of criteria of two forms that are one.
+/// Difference of criteria at which two forms count as equal.
 const THE_SAME: f64 = 0.05;
 /// Sums of squares over another, without noise, that are no worse.
 const NO_BETTER: f64 = 1.1;

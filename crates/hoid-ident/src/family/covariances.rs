@@ -94,8 +94,8 @@ impl Covariances {
         }
     }
 
-    /// Intervals by profile likelihood know of kappa alone: where variances are larger, their ends
-    /// move out in the ratio of the standard errors.
+    /// Intervals by profile likelihood include kappa alone: if variances are larger, their ends are
+    /// moved out in the ratio of the standard errors.
     pub fn widen(&self, fit: &PredictionFit<'_>, profiles: &mut [Option<(f64, f64)>]) {
         let p = fit.parameters();
         for (i, profile) in profiles.iter_mut().enumerate() {

@@ -141,7 +141,7 @@ fn at_bound(parameter: &Parameter) -> bool {
     parameter.standard_error.is_none()
 }
 
-/// A parameter that the data determine and the prior moves: from where to where.
+/// A parameter that the data determine and the prior moves: its values without and with the prior.
 fn pulled(parameter: &Parameter, prior: &OperatorPrior) -> Option<String> {
     let pull = prior.pull(parameter)?;
     let errors = pull.abs() * parameter.value / parameter.standard_error?;

@@ -107,7 +107,7 @@ impl Estimated {
         let covariances = errors.covariances.as_ref();
         let covariance = covariances.map(|c| part(&c.clustered));
         let model_based = covariances.map(|c| part(&c.model_based));
-        // Of single parameters: with what they are uncertain by in addition.
+        // Errors of single parameters, with their additional uncertainty.
         let of_parameters = covariances.zip(covariance.clone()).map(|(c, mut of_all)| {
             for (i, &place) in places.iter().enumerate() {
                 of_all[i * places.len() + i] += c.extra_variance[place];

@@ -7,10 +7,10 @@
 //!
 //! `g(x) = Z' eps(x) + sum_i w_i g_i'(x) (m_i - g_i(x))`,  `eps(x) = D (u - Y(x) e)`,  `Z = D dY/dx xi`,
 //!
-//! with xi the part of e that follows the excitation ([`crate::iv`]), D the autoregression of what Y leaves of u, and
-//! the second term the prior. Z and D belong to an auxiliary operator; for given Z and D, Newton's step is
-//! `(Z' Psi + P)^-1 g`, `Psi = D dY/dx e`, halved until `g' (Z'Z + P)^-1 g` falls; a coordinate that it drives out of
-//! the search range goes to its bound.
+//! with xi the part of e that follows the excitation ([`crate::iv`]), D the autoregression of the part of u that Y
+//! leaves unexplained, and the second term the prior. Z and D belong to an auxiliary operator; for given Z and D,
+//! Newton's step is `(Z' Psi + P)^-1 g`, `Psi = D dY/dx e`, halved until `g' (Z'Z + P)^-1 g` falls; a coordinate that
+//! it drives out of the search range goes to its bound.
 //!
 //! **The auxiliary operator** is that of the fit at the lines, and where its instruments lead to no zero that of the
 //! prediction error fit, or the middle of both. RIV-BJ as it is usually written takes the last estimate: where the
@@ -26,9 +26,9 @@
 //! samples with the prediction error fit, but nothing of e that follows the remnant.
 //!
 //! **Errors.** x less its truth is `A^-1 Z' eps`, `A = Z' Psi + P`, to first order: the covariance is
-//! `kappa sigma^2 A^-1 Z'Z A^-T` with the kappa of the prediction error fit, and what the prior leaves
-//! open. Where most of e is the person's own remnant, instruments are weak and the first order is
-//! short: with virtual people, one in 24 had gain and lead five standard errors off.
+//! `kappa sigma^2 A^-1 Z'Z A^-T` with the kappa of the prediction error fit, and the part of the prior. Where most of e
+//! is the person's own remnant, instruments are weak and the first order is short: with virtual people, one in 24 had
+//! gain and lead five standard errors off.
 
 use std::ops::Range;
 
@@ -60,7 +60,7 @@ const HALVINGS: usize = 6;
 pub struct InstrumentalFit {
     /// The operator.
     pub operator: FamilyOperator,
-    /// Covariance of its coordinates by rows: by runs or blocks, with what the prior leaves open.
+    /// Covariance of its coordinates by rows: by runs or blocks, with the part of the prior.
     pub covariance: Option<Vec<f64>>,
     /// Order of the autoregression D.
     pub noise_order: usize,
@@ -165,7 +165,7 @@ impl<'p, 'a> Instrumental<'p, 'a> {
         &self.fit.criterion.limits[..self.fit.layout().coordinates()]
     }
 
-    /// D for what the operator leaves of u.
+    /// D for the part of u that the operator leaves unexplained.
     fn noise(&self, x: &[f64], workspace: &mut Workspace) -> Result<Vec<f64>, IdentError> {
         let layout = self.fit.layout();
         let left = self
@@ -355,7 +355,7 @@ impl<'p, 'a> Instrumental<'p, 'a> {
         }
     }
 
-    /// `kappa sigma^2 A^-1 Z'Z A^-T`, and what the prior leaves open; zero at bounds.
+    /// `kappa sigma^2 A^-1 Z'Z A^-T`, and the part of the prior; zero at bounds.
     fn covariance(&self, x: &[f64], a: &DMatrix<f64>, products: &[f64], variance: f64) -> Option<Vec<f64>> {
         let p = x.len();
         let scale = variance * self.fit.inflation;

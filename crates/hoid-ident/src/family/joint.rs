@@ -17,7 +17,7 @@
 //!
 //! `sum eps^2 + kappa sigma^2 w chi^2`, `w = s/(1 - s) V_L/V_P`:
 //!
-//! where one coordinate is left, its minimum is at s of the way. What the lines do not determine is left to the
+//! with one coordinate, its minimum is at the share s of the way. What the lines do not determine is left to the
 //! samples.
 
 use std::{borrow::Cow, sync::Arc};

@@ -7,8 +7,8 @@
 //! and from there the noise is modelled. Without any noise it is the truth, to the digits of the data, also of what the
 //! error does between its samples ([`Intersample`]).
 //!
-//! **Level.** The means that were taken out of e and u are those of a steady state, and a record is none: what a response
-//! owes to the time before its first sample stays in u as a constant. Where a mean was taken out, c is an unknown of each
+//! **Level.** The means that were taken out of e and u are those of a steady state, and a record is none: the effect of
+//! the time before its first sample stays in u as a constant. Where a mean was taken out, c is an unknown of each
 //! record, eliminated with the initial states ([`crate::criterion::Data::level`]).
 
 use hoid_model::Form;
@@ -24,7 +24,7 @@ use crate::{SearchOptions, criterion::Workspace, optimize::Objective};
 const LARGEST_AT_START: f64 = 0.05;
 /// Share that the best of them may leave where the noise is little: of a person's u no operator explains so much.
 const LITTLE: f64 = 5e-3;
-/// Share below which what is left is rounding, which no search is to go on for.
+/// Share below which the residual is rounding, which no search is to go on for.
 const ROUNDING: f64 = 1e-25;
 /// Points of a grid from which a form is searched that has not been found without noise, and how often: the second time
 /// next to the best that the first has found.
@@ -135,8 +135,8 @@ impl LittleNoise {
         }
     }
 
-    /// The course of the error that fits better, of a smooth one and a held one that were both searched, and whether that
-    /// settles what the error does.
+    /// The intersample behaviour with the better fit, of a smooth and a held error that were both searched, and whether
+    /// the difference is decisive.
     pub fn course(smooth: &Self, held: &Self) -> (Intersample, bool) {
         match held.share.max(ROUNDING) / smooth.share.max(ROUNDING) {
             ratio if ratio < DECIDES => (Intersample::Zoh, true),

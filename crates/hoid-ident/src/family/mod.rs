@@ -18,7 +18,7 @@
 //!    methods next to each other ([`Agreement`]), a free model of the same orders ([`FreeModel`]), and the
 //!    [`Verdict`](hoid_model::Verdict) on all of it.
 //!
-//! | file | what it holds |
+//! | file | contents |
 //! |---|---|
 //! | `options` | [`FamilyEstimator`]: what may be chosen, by fields and by names |
 //! | `estimator` | the searches of all forms |
@@ -49,7 +49,7 @@
 //! | `low_noise` | starts by output error, where there is little noise or none |
 //! | `open_loop` | crossover and phase margin |
 //! | `loop_shape` | every crossing, and whether the closed loop is stable |
-//! | `of_polynomials`, `pole_reading` | polynomials back to an operator; which pole is what |
+//! | `of_polynomials`, `pole_reading` | polynomials back to an operator; interpretation of poles |
 //! | `diagnostics` | what makes a result doubtful |
 
 mod agreement;

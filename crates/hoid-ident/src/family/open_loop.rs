@@ -67,7 +67,7 @@ impl LoopMeasures {
         }
     }
 
-    /// With what the gain of the person varies by beyond these runs, as a part of it.
+    /// With the variation of the gain of the person by beyond these runs, as a part of it.
     pub(super) fn with_run_to_run(self, share: f64) -> Self {
         let both = [self.crossover_rad_s, self.phase_margin_deg];
         let wider = |k: usize| {

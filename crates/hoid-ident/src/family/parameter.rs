@@ -5,9 +5,9 @@
 //! is long, `1/T_I` has a symmetric error and T_I has none. Intervals are made in the coordinates
 //! and carried over; one that reaches `1/T_I = 0` is open above in T_I and in K.
 //!
-//! **Determined** is what the data show: less than half of the variance before the data is left of
-//! it ([`Parameter::prior_share`]), it does not rest at a bound of the search range, and its
-//! interval excludes zero; for omega_nm and zeta_nm, whose prior has a scale, that it is known
+//! **Determined** means determined by the data: less than half of the variance before the data is
+//! left of it ([`Parameter::prior_share`]), it does not rest at a bound of the search range, and
+//! its interval excludes zero; for omega_nm and zeta_nm, whose prior has a scale, that it is known
 //! within a factor of two.
 
 use hoid_model::{
@@ -130,7 +130,7 @@ pub(super) struct CoordinateEstimate<'a> {
     pub covariance: Option<&'a [f64]>,
     /// For each coordinate.
     pub prior_share: &'a [f64],
-    /// For each coordinate, what was searched for.
+    /// Search range of each coordinate.
     pub limits: &'a [(f64, f64)],
     /// Intervals by profile likelihood, where there are such.
     pub profile: &'a [Option<(f64, f64)>],

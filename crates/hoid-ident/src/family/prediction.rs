@@ -43,7 +43,7 @@ const ROUNDS: usize = 3;
 /// Relative change of the weight of the prior that needs no other round.
 const SETTLED: f64 = 0.05;
 
-/// The records, and what all forms have in common.
+/// The records and the common settings of all forms.
 #[derive(Debug, Clone)]
 pub(super) struct Prediction<'a> {
     pub data: Vec<Data<'a>>,

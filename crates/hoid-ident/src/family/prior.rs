@@ -9,7 +9,7 @@
 //!
 //! How much of a result is prior is the ratio of its variance after the data to that before
 //! ([`prior share`](super::Parameter::prior_share)): one means that the data carried no
-//! information. Amount by which the prior moves the estimate follows from it
+//! information. The amount by which the prior moves the estimate follows from it
 //! ([`OperatorPrior::pull`]).
 
 use std::{fmt, str::FromStr};

@@ -27,8 +27,8 @@ use crate::{Fit, ResponsePoint, Termination};
 pub struct OperatorOfRecord {
     /// The operator.
     pub operator: FamilyOperator,
-    /// Covariance of its coordinates by rows: clustered, with what the prior leaves open. `None` if
-    /// the information is singular.
+    /// Covariance of its coordinates by rows: clustered, with the part of the prior. `None` if the
+    /// information is singular.
     pub covariance: Option<Vec<f64>>,
     /// The same from the model alone, as if residuals were white and nothing varied.
     pub model_based: Option<Vec<f64>>,

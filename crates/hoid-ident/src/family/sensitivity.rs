@@ -31,7 +31,7 @@ const MIXED: NoiseOrders = (4, 5);
 pub(super) const LARGEST_SHARE_AT_LINES: f64 = 0.25;
 /// Amount by which the squares of the differences count more without lines.
 pub(super) const MORE_WITHOUT_LINES: f64 = 0.5;
-/// Standard deviations of what no rival shows without lines.
+/// Standard deviations for parameters that no other fit shows without lines.
 pub(super) const UNSEEN_WITHOUT_LINES: [(Coordinate, f64); 2] =
     [(Coordinate::LogOmega, 0.12), (Coordinate::LogZeta, 0.2)];
 /// Iterations in which a rival need not converge: it represents a size.

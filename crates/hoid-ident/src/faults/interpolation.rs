@@ -1,4 +1,4 @@
-//! Samples by what is on both sides of them.
+//! Samples from their neighbours on both sides.
 //!
 //! With the innovations `eps = A x` of the autoregression, the m samples from s on that the others
 //! make most likely minimise `sum eps(t)^2` over all rows that hold one of them (A. J. E. M. Janssen,

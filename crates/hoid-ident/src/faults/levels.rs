@@ -29,12 +29,12 @@ const LARGE: f64 = 6.0;
 const BESIDE_S: f64 = 5.0;
 /// Least step, in deviations next to it.
 const STEPPED: f64 = 6.0;
-/// Ratio of the deviations of seconds that is another unit.
+/// Ratio of the deviations of seconds above which the unit has changed.
 const UNITS: f64 = 100.0;
 /// Deviations of the rest beyond which a sample belongs to such a stretch.
 const OUTSIDE: f64 = 15.0;
 const MODULI: [f64; 7] = [360.0, 2.0 * PI, 180.0, PI, 65_536.0, 65_535.0, 4096.0];
-/// Changes that agree in a modulus of their own.
+/// Number of changes that must agree in a modulus of their own.
 const AGREE: usize = 4;
 
 /// A channel that wraps around.

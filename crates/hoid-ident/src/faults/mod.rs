@@ -1,8 +1,7 @@
 //! Faults of recorded data: found by stated statistics, and bridged or cut out before a fit.
 //!
-//! An estimator by prediction error takes each sample at its word: one sample of e that is off by 20 of its deviations
-//! enters the criterion through the operator with a weight that no thousand good ones have. What is searched for, in
-//! this order:
+//! An estimator by prediction error trusts each sample: one sample of e that is off by 20 of its deviations enters the
+//! criterion through the operator with a weight that no thousand good ones have. What is searched for, in this order:
 //!
 //! | file | fault | statistic |
 //! |---|---|---|
@@ -23,7 +22,7 @@
 //! distinguish pushes from faults.
 //!
 //! [`repair`] looks at a record and does what [`FaultHandling`](hoid_model::FaultHandling) states: by default it
-//! bridges what lasts up to [`BRIDGED_S`], cuts the record at what is longer, and leaves segments of [`SHORTEST_S`] or
+//! bridges faults of up to [`BRIDGED_S`], cuts the record at longer ones, and leaves segments of [`SHORTEST_S`] or
 //! more, each a record. Faults of more than [`MOST_SPIKES`] of the samples of a channel are reported and not bridged:
 //! then the channel is not what is assumed of it.
 

@@ -4,10 +4,10 @@
 //! `r(t) = sum_i a_i eps(t+i)/|a|^2`, whose standard deviation is `s = sigma/|a|`, a sample beyond `c s` is moved to
 //! it, `x(t) - r + c s sign(r)` (the filter cleaner of R. D. Martin and D. J. Thomson, *Proc. IEEE* 70 (1982)
 //! 1097-1115, with two sides). The sample that is farthest off comes first, and the others are examined again: an
-//! outlier is in the interpolation of its neighbours, and they would be moved in its place. Whatever a sample is, what
-//! it brings into any filter behind is bounded, in e as in u, and so is its leverage on theta. c = [`HELD`]: of a
-//! normal channel one sample in 16 000 is moved. A fit to this record that is another than that to the record itself
-//! shows that few samples carry the fit; where no sample is moved the two are one.
+//! outlier is in the interpolation of its neighbours, and they would be moved in its place. For any sample, its effect
+//! on the filters after it is bounded, in e as in u, and so is its leverage on theta. c = [`HELD`]: of a normal channel
+//! one sample in 16 000 is moved. A fit to this record that is another than that to the record itself shows that few
+//! samples carry the fit; where no sample is moved the two are one.
 
 use std::{cmp::Ordering, collections::BinaryHeap};
 
@@ -138,7 +138,7 @@ mod tests {
             e[1700] += size;
             let whole = resistant(&record(e)).unwrap();
             held.push(whole.input()[1700]);
-            // Its neighbours stay what they are.
+            // Its neighbours stay unchanged.
             let off = |t: usize| (whole.input()[t] - clean[t]).abs();
             let others = (0..clean.len()).filter(|t| *t != 1700 && off(*t) > 0.0).count();
             assert!(others <= 4, "{size}: {others} others moved");

@@ -1,4 +1,4 @@
-//! A record without what is slow, for a second opinion on a fit.
+//! A record without slow components, for a second opinion on a fit.
 //!
 //! A step or a drift of a sensor is not a fault that its neighbours could reveal, and a level does not hold it. The
 //! person does not follow it, so that e has power at low frequencies that u does not answer, and the gain of the fit
@@ -12,12 +12,12 @@ use std::f64::consts::PI;
 
 use hoid_model::{Detrend, Record};
 
-/// For a person what is slower than this is taken out, s.
+/// Components slower than this are removed for a person, s.
 pub const PERIOD_S: f64 = 20.0;
 /// Most cosines, so that the time stays in proportion to a record's length.
 const MOST: usize = 64;
 
-/// The records without what is slower than a period in s; `None` if they are too short for anything slow.
+/// The records without components slower than a period in s; `None` if they are too short for anything slow.
 pub fn without_slow(records: &[Record], period_s: f64) -> Option<Vec<Record>> {
     let count = |r: &Record| ((2.0 * r.len() as f64 * r.sample_time().s() / period_s) as usize).min(MOST);
     records.iter().any(|r| count(r) > 0).then(|| {

@@ -43,7 +43,7 @@ const LARGE: f64 = 8.0;
 const BETTER: f64 = 5.0;
 /// The same as a part of the fall.
 const PART: f64 = 0.2;
-/// How many times what faults leave, or what noise would, pushes must leave where it is a small part.
+/// Ratio to the remainder of faults, or of noise, pushes must leave where it is a small part.
 const DECISIVE: f64 = 20.0;
 /// Largest innovation that is left, as sigma.
 const CLEAN: f64 = 5.0;

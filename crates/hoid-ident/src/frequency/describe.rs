@@ -34,8 +34,8 @@ pub struct Line {
     /// `None` for one run.
     pub spread: Option<f64>,
     /// sigma as the remnant next to the line has it: of `N = U - H E` at the nearest non-excited
-    /// bins, where there is nothing but remnant. It does not hold what differs between runs, and
-    /// exists for one run too.
+    /// bins, where there is nothing but remnant. It does not include differences between runs, and
+    /// is defined for a single run as well.
     pub neighbour_error: f64,
     /// Squared coherence, 0 to 1; `None` for one run, where it is always 1.
     pub coherence: Option<f64>,

@@ -27,7 +27,7 @@
 //! Identification: A Frequency Domain Approach*, 2012, sections 2.4 to 2.7; J. S. Bendat and A. G.
 //! Piersol, *Random Data*, 2010, chapters 9 and 11.
 //!
-//! | module | what it holds |
+//! | module | contents |
 //! |---|---|
 //! | [`Excitation`] | the lines: given, of a forcing function, or found in a channel |
 //! | `window`, `spectrum` | whole periods, offsets between channels, Fourier coefficients |

@@ -15,7 +15,7 @@
 //! Source: L. Ljung, *System Identification*, 1999, sections 4.3 (grey boxes) and 7.2; T. Bohlin,
 //! *Practical Grey-box Process Identification*, 2006.
 //!
-//! | module | what it holds |
+//! | module | contents |
 //! |---|---|
 //! | `options` | [`GreyBox`]: what may be chosen, by fields and by names |
 //! | `estimator` | the fit |

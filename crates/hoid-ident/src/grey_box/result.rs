@@ -216,7 +216,7 @@ impl GreyBoxFit {
         self.whole().termination()
     }
 
-    /// The start that won.
+    /// The best start.
     pub fn start(&self) -> &str {
         self.whole().start()
     }

@@ -44,7 +44,7 @@ use crate::{
 /// Proposals that are completed with a noise model of their own.
 const COMPLETED: usize = 4;
 
-/// The starts, with what is left to find of them.
+/// The starts, with the remaining unknowns.
 pub(crate) fn initial_guesses(
     criterion: &Criterion<'_>,
     sample_time: SampleTime,

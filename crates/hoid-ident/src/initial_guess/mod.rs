@@ -1,6 +1,6 @@
 //! Where a search starts if no start is given: the poles decide.
 //!
-//! | module | what it holds |
+//! | module | contents |
 //! |---|---|
 //! | `guesses` | the starts of a criterion, from the proposals of the others |
 //! | `continuation` | poles of the averaged record |

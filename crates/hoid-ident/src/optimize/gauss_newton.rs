@@ -40,7 +40,7 @@ pub(crate) struct GaussNewton<'s> {
 
 /// Quantities decided by the next linearisation.
 enum Trial {
-    /// Whether the start is any good.
+    /// Whether the start is usable.
     Start,
     /// A step of Levenberg and Marquardt, and the decrease that the quadratic model predicts for
     /// it.

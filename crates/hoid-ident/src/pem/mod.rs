@@ -1,7 +1,7 @@
 //! The fit by the prediction error method: what it minimises is [`crate::criterion`], how is
 //! [`crate::optimize`].
 //!
-//! | module | what it holds |
+//! | module | contents |
 //! |---|---|
 //! | `constraints` | bounds and priors |
 //! | `fit_settings` | what a fit needs to know next to the records |

@@ -7,13 +7,12 @@
 //! 0.6745, from the residuals of the round before; it is held after [`SCALES`] rounds, so that the
 //! rounds settle.
 //!
-//! A bounded loss bounds what a residual weighs, and not what a sample brings into the regressors: one
-//! sample of e that is wrong is in the response of the operator for seconds, with residuals that are
-//! large because theta is right, and theta gives way (F. R. Hampel, E. M. Ronchetti, P. J. Rousseeuw
-//! and W. A. Stahel, *Robust Statistics*, 1986, section 6.3: the influence is that of the residual times
-//! that of the position). So that the position is bounded too, the records come here with each sample
-//! of e and u held to its neighbours ([`crate::faults::resistant`], by the estimator); of a normal
-//! channel one sample in 16 000 is moved, and the efficiency is that of the loss.
+//! A bounded loss bounds the weight of a residual, and not the effect of a sample on the regressors: one sample of e
+//! that is wrong is in the response of the operator for seconds, with residuals that are large because theta is right,
+//! and theta gives way (F. R. Hampel, E. M. Ronchetti, P. J. Rousseeuw and W. A. Stahel, *Robust Statistics*, 1986,
+//! section 6.3: the influence is that of the residual times that of the position). So that the position is bounded too,
+//! the records come here with each sample of e and u held to its neighbours ([`crate::faults::resistant`], by the
+//! estimator); of a normal channel one sample in 16 000 is moved, and the efficiency is that of the loss.
 //!
 //! Covariance (Huber, eq. 7.6.8, for residuals that are independent of the gradient):
 //! `s^2 kappa (psi' psi)^-1`, `kappa = mean(rho'^2) / mean(rho'')^2`, with the unweighted psi.

@@ -25,7 +25,7 @@ pub trait BatchOptions: Sized + 'static {
 }
 
 impl<E: 'static, X: 'static> BatchOption<E, X> {
-    /// An option, and what its text sets.
+    /// An option and its setter.
     pub fn new(setting: Setting, set: impl Fn(&mut E, &Setting, &str) -> Result<(), X> + 'static) -> Self {
         Self {
             setting,
@@ -66,7 +66,7 @@ impl<E: 'static, X: 'static> BatchOption<E, X> {
         }
     }
 
-    /// The same option of what the estimator is a part of.
+    /// The same option of the estimator that contains this one.
     pub fn within<W: 'static, Y: From<X> + 'static>(
         self,
         part: fn(&W) -> &E,

@@ -328,7 +328,7 @@ impl SigmoidFit {
         self.termination
     }
 
-    /// The start that won.
+    /// The best start.
     pub fn start(&self) -> &str {
         &self.start
     }

@@ -5,7 +5,7 @@ use super::layout::{Layout, MOST_VARYING};
 /// Argument from which `e^-x` is zero in double precision.
 const NOTHING: f64 = 746.0;
 
-/// The sigmoid and what changes with it at one time.
+/// The sigmoid and the changing parameters at one time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Instant {
     /// Share of the change that has happened.

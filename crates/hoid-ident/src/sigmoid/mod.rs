@@ -21,7 +21,7 @@
 //! chi-square distribution then (R. B. Davies, *Biometrika* 74 (1987) 33-43); the decision is by
 //! the BIC, `LR > 4 ln n`.
 //!
-//! | module | what it holds |
+//! | module | contents |
 //! |---|---|
 //! | `options` | [`SigmoidChange`]: what may be chosen, by fields and by names |
 //! | `estimator` | the fit |

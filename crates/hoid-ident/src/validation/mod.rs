@@ -12,7 +12,7 @@
 //! - whiteness by `Q = n (n + 2) sum_k r_k^2/(n - k)`, chi-square distributed for white residuals
 //!   (G. M. Ljung and G. E. P. Box, *Biometrika* 65 (1978) 297-303).
 //!
-//! | module | what it holds |
+//! | module | contents |
 //! |---|---|
 //! | `comparison` | a model against a record |
 //! | `goodness_of_fit` | VAF and NRMSE |

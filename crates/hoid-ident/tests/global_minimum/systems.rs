@@ -26,7 +26,7 @@ pub struct System {
 pub struct Draw(u64);
 
 impl Draw {
-    /// The stream of a number.
+    /// The random stream with a number.
     pub fn new(seed: u64) -> Self {
         Self(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ 0x5851_f42d_4c95_7f2d)
     }

@@ -1,4 +1,4 @@
-//! A finding: what it is, where, how much, and what can be done about it.
+//! A finding: kind, place, size, and what can be done about it.
 
 use std::fmt;
 

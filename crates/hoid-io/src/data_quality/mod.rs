@@ -1,7 +1,7 @@
 //! The quality of recorded data: the problems of the sampling and the values, where and how much; nothing is repaired
 //! unasked.
 //!
-//! | module | what it holds |
+//! | module | contents |
 //! |---|---|
 //! | `issue` | [`QualityIssue`]: a finding |
 //! | `signals` | the columns that are examined |

@@ -6,7 +6,7 @@
 //! library is that of `hoid-ffi`; what it and the description have to agree on is here, the
 //! variables ([`FmuKind::variables`]), whose value references are their places, and the token.
 //!
-//! | file | what it holds |
+//! | file | contents |
 //! |---|---|
 //! | `variables` | the variables of a unit |
 //! | `settings` | what the library reads when it starts |

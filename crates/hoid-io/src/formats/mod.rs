@@ -2,7 +2,7 @@
 //!
 //! To add one: a module with a [`Format`], here its `mod` line and its line in [`ALL`].
 //!
-//! | module | what it holds |
+//! | module | contents |
 //! |---|---|
 //! | `format` | [`Format`]: the self-description of a format, and all that the rest of the crate knows of it |
 //! | `lookup` | the format of a file by its extension; what to do about the formats of others |

@@ -35,8 +35,8 @@ fn known() -> MutexGuard<'static, PartFiles> {
     KNOWN.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Removes what this process has on its way, for the end at an interrupt: a process that exits drops
-/// nothing.
+/// Removes the partial output of this process, for the end at an interrupt: a process that exits
+/// drops nothing.
 pub fn remove_unfinished_files() {
     for part in std::mem::take(&mut known().parts) {
         // Contents of its place already, or cannot be removed, is swept later.

@@ -112,7 +112,7 @@ pub enum Step {
 }
 
 impl Step {
-    /// The step for what is taken out; none for nothing.
+    /// The processing step of the removed trend; none for nothing.
     pub(super) fn of_detrend(how: Detrend) -> Option<Self> {
         match how {
             Detrend::None => None,

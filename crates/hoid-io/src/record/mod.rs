@@ -3,7 +3,7 @@
 //! A trial is chosen, its rows are put on an even grid, and each value in use is checked; what may be
 //! repaired is repaired only when that is asked for.
 //!
-//! | module | what it holds |
+//! | module | contents |
 //! |---|---|
 //! | `file` | [`read_record`], [`read_prepared`], [`write_record`] |
 //! | `read_options` | [`ReadOptions`], [`TrialChoice`]: what is read and how |

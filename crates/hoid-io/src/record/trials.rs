@@ -3,8 +3,8 @@
 //!
 //! Each trial is a record of its own, with initial states of its own; one record over all of them would answer at each
 //! seam to what was never seen. A part starts where the value of the column changes or where t falls. Without `--trial`
-//! parts are only searched for where t falls: each must have [`SHORTEST`] rows, and t must fall by half of what it rose
-//! at least, which no clock does that is set. The column that steps with the parts, if there is one, gives them their
+//! parts are only searched for where t falls: each must have [`SHORTEST`] rows, and t must fall by at least half of its
+//! rise, which no clock does that is set. The column that steps with the parts, if there is one, gives them their
 //! names.
 
 use std::ops::Range;

@@ -59,7 +59,7 @@ pub fn read_fit(path: &Path) -> Result<FitFile, IoError> {
 /// Reads a fit from the text of its file.
 ///
 /// # Errors
-/// [`IoError::NoFit`] for what is no such object.
+/// [`IoError::NoFit`] for any other object.
 pub fn parse_fit(text: &str, source: &str) -> Result<FitFile, IoError> {
     let found: FitObject = serde_json::from_str(text).map_err(|error| no_fit(source, error.to_string()))?;
     let of = |p: &ParameterObject| {

@@ -7,7 +7,7 @@ use super::table_writer::write_values;
 use crate::IoError;
 use crate::formats::{bytes_of, format_to_write};
 
-/// Whether a table can be written to a place of this name; to be asked before long work.
+/// Whether a table can be written to a place of this name; checked before long computations.
 ///
 /// # Errors
 /// [`IoError::UnknownFormat`] for an extension that does not correspond to any format,
@@ -21,7 +21,7 @@ pub fn check_table_path(path: &Path) -> Result<(), IoError> {
 ///
 /// # Errors
 /// The errors of [`check_table_path`]; [`IoError::ColumnLength`], [`IoError::NoColumns`],
-/// [`IoError::DuplicateColumn`] or [`IoError::ChannelName`] for what cannot be written; those of
+/// [`IoError::DuplicateColumn`] or [`IoError::ChannelName`] for failures of writing; those of
 /// [`write_atomically`](crate::write_atomically).
 ///
 /// ```

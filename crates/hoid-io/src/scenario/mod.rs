@@ -35,7 +35,7 @@
 //! Missing keys have the values of the condition; without one, the parameters of `[last]` are those of `[initial]`, and
 //! all else is as in C1.
 //!
-//! | module | what it holds |
+//! | module | contents |
 //! |---|---|
 //! | `reading` | [`read_scenario`]: from a file or its text to a scenario; the schemas of both kinds |
 //! | `keys` | the keys of a scenario |

@@ -26,7 +26,7 @@ pub struct FileSurvey {
     pub samplings: Vec<SamplingSurvey>,
     /// Problems with the sampling, structure by structure.
     pub quality_issues: Vec<QualityIssue>,
-    /// Notes on how it was read.
+    /// Notes on reading.
     pub notes: Vec<String>,
 }
 

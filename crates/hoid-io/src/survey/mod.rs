@@ -1,6 +1,6 @@
 //! Contents of a file before any choice: columns, their sampling and ranges.
 //!
-//! | module | what it holds |
+//! | module | contents |
 //! |---|---|
 //! | `file` | [`survey()`]: all that is found in a file |
 //! | `read` | its columns, as they were read |

@@ -1,7 +1,7 @@
 //! The columns of a file of any format, before a record is made of them: what their cells mean, and
 //! which of them are asked for.
 //!
-//! | module | what it holds |
+//! | module | contents |
 //! |---|---|
 //! | `columns` | [`Table`]: the columns of a file, and why a value of them cannot be used |
 //! | `cell` | [`Cell`]: numbers with a point or a comma, the words for a missing value |

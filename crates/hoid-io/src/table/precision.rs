@@ -21,10 +21,9 @@ impl Precision {
         }
     }
 
-    /// The value for times in a file of binary numbers. A recorder that rounds what it saves, as to tenths of a ms,
-    /// leaves times that are all whole multiples of its last digit, and is known by that. The rest of a rounded number
-    /// is below two units of its last binary digit; as many digits as are searched for here leave no such rest by
-    /// chance.
+    /// The value for times in a file of binary numbers. A recorder that rounds its values, as to tenths of a ms, leaves
+    /// times that are all whole multiples of its last digit, and is known by that. The rest of a rounded number is
+    /// below two units of its last binary digit; as many digits as are searched for here leave no such rest by chance.
     pub(crate) fn of_times(values: &[f64], single: bool) -> Self {
         if single {
             return Self::single();

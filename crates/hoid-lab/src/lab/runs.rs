@@ -204,7 +204,7 @@ impl Shared {
         Ok(())
     }
 
-    /// Writes what is after a run: first its record, so that a run that was reported as verified has one.
+    /// Writes the end of a run: first its record, so that a run that was reported as verified has one.
     fn close(
         &self,
         state: &mut Current,

@@ -14,7 +14,7 @@ const MOST_LINES: usize = 64;
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Request {
     pub method: String,
-    /// Without what is after a question mark.
+    /// Without the query.
     pub path: String,
     pub host: Option<String>,
     pub origin: Option<String>,

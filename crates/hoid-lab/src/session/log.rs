@@ -128,7 +128,7 @@ impl RunLog {
         })
     }
 
-    /// Whether a batch continues what is logged; the tick after its last.
+    /// Whether a batch continues the log; the tick after its last.
     ///
     /// # Errors
     /// [`LabError::Message`] for one that does not continue the last one or is beyond the end.

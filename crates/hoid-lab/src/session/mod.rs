@@ -19,7 +19,7 @@
 //! each second. What is written at once is whole or not there. A folder therefore shows at any
 //! instant how far the session is: a run without `end.json` was interrupted.
 //!
-//! | file | what it holds |
+//! | file | contents |
 //! |---|---|
 //! | `folder` | the names of files and folders |
 //! | `run_start` | [`RunStart`]: what is known before a run; [`Ended`]: what is known after it |

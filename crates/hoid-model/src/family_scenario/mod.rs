@@ -6,7 +6,7 @@
 //! [`Scenario`](crate::scenario::Scenario), which is the task of the thesis and stays apart: its
 //! operator is the lead, its element `K_c/(s(s + omega_b))`.
 //!
-//! | file | what it holds |
+//! | file | contents |
 //! |---|---|
 //! | `state` | [`FamilyState`]: operator and controlled element at one instant |
 //! | `multi_sine` | [`MultiSine`], [`Excitation`]: targets and disturbances as in recorded tasks |

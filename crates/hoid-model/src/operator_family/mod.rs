@@ -10,7 +10,7 @@
 //! `[K/T_I, T_L, 1/T_I, ln omega, ln zeta, tau]` ([`Coordinate`]), in which `1/T_I = 0`, the pure
 //! integration, is a point like others.
 //!
-//! | file | what it holds |
+//! | file | contents |
 //! |---|---|
 //! | `form` | [`Form`], [`Coordinate`] |
 //! | `operator` | [`FamilyOperator`]: one operator, its response, its named parameters |

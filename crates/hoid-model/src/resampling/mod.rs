@@ -29,7 +29,7 @@
 //! almost no new information, and the poles of every model lie within 2 % of 1. [`Decimation::Auto`] takes what is
 //! recorded at more than 200 Hz to about 100 Hz: by the M for which the new rate is nearest to it.
 //!
-//! | file | what it holds |
+//! | file | contents |
 //! |---|---|
 //! | `kernel` | [`Kernel`]: the filter |
 //! | `decimation` | [`Decimation`]: by how much; [`Decimated`]: the actions taken |

@@ -17,7 +17,7 @@
 //! programs (`90/s(s+6)`), and is refused with both remedies. Common factors of numerator and
 //! denominator stay: `s/s^2` has a pole that it hides. A delay is a factor of the whole.
 //!
-//! | file | what it holds |
+//! | file | contents |
 //! |---|---|
 //! | `coefficients` | the list of coefficients |
 //! | `reader` | the expression |

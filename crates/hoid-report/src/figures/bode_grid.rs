@@ -143,8 +143,8 @@ pub struct BodeGrid {
     pub columns: Vec<BodeColumn>,
 }
 
-/// Magnitude over phase as one figure, with logarithmic frequency in rad/s. `title` is what a
-/// screen reader announces.
+/// Magnitude over phase as one figure, with logarithmic frequency in rad/s. `title` is the text for
+/// screen readers.
 pub fn bode_grid(id: &str, title: &str, grid: &BodeGrid) -> String {
     let row = |name: &str, unit: &str, of: fn(&BodeCurve) -> Curve| -> Vec<CurvePanel> {
         let panel = |column: &BodeColumn| CurvePanel {

@@ -1,5 +1,5 @@
 //! Box plots of the results of many runs: groups on the abscissa, in each group one box for each
-//! series. [`BoxStatistics`] states what a box shows.
+//! series. [`BoxStatistics`] describes the boxes.
 
 use kuva::{
     prelude::Plot,
@@ -79,7 +79,7 @@ pub struct BoxGrid {
     pub columns: usize,
     /// Text above each column, or above each panel; empty for none.
     pub titles: Vec<String>,
-    /// Name of what the groups differ in, such as `n_k^*`.
+    /// Name of the difference between the groups, such as `n_k^*`.
     pub abscissa: String,
     /// Names of the groups.
     pub groups: Vec<String>,
@@ -95,7 +95,7 @@ pub struct BoxGrid {
     pub least_reach: f64,
 }
 
-/// Box plots as one figure. `title` is what a screen reader announces.
+/// Box plots as one figure. `title` is the text for screen readers.
 pub fn box_plots(id: &str, title: &str, grid: &BoxGrid) -> String {
     let columns = grid.columns.max(1);
     let n = grid.panels.len();

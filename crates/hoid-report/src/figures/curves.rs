@@ -102,7 +102,7 @@ pub struct CurveGrid {
     pub shared_ordinates: bool,
 }
 
-/// Curves as one figure. `title` is what a screen reader announces.
+/// Curves as one figure. `title` is the text for screen readers.
 pub fn curves(id: &str, title: &str, grid: &CurveGrid) -> String {
     let columns = grid.columns.max(1);
     let n = grid.panels.len();

@@ -116,7 +116,7 @@ fn frequencies(found: &Description) -> Vec<f64> {
 }
 
 /// The describing function as points with error bars of 1.96 standard errors, and models as lines.
-/// `title` is what a screen reader announces.
+/// `title` is the text for screen readers.
 pub fn describing(id: &str, title: &str, found: &Description, models: &[ModelCurve]) -> String {
     let lines = &found.function.lines;
     let omega: Vec<f64> = lines.iter().map(|line| line.omega_rad_s).collect();

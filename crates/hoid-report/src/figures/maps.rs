@@ -70,7 +70,7 @@ pub struct MapGrid {
     pub mark: String,
 }
 
-/// Maps as one figure. `title` is what a screen reader announces.
+/// Maps as one figure. `title` is the text for screen readers.
 pub fn maps(id: &str, title: &str, grid: &MapGrid) -> String {
     let columns = grid.columns.max(1);
     let n = grid.panels.len();

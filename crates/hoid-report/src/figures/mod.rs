@@ -1,6 +1,6 @@
 //! The figures of reports and studies, each as one SVG text.
 //!
-//! | function | what it draws |
+//! | function | figure |
 //! |---|---|
 //! | [`bode`] | frequency response of fitted models with 95 % bands |
 //! | [`autocorrelation`], [`cross_correlation`] | tests of the residuals |

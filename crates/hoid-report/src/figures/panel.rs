@@ -27,7 +27,7 @@ pub enum CurveKind {
     Batch,
     /// A count that stays until the next row, in the colour of its method.
     Steps,
-    /// Bound of what is expected: a thin black line, not in the legend.
+    /// Bound of the expected range: a thin black line, not in the legend.
     Bound,
 }
 

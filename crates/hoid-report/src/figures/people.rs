@@ -19,7 +19,7 @@ const HEIGHT: f64 = 150.0;
 /// The names of the places below the axis, and a second row of them.
 const NAMES_BELOW: f64 = 17.0;
 const SECOND: f64 = 12.0;
-/// Parts of a place: people from and to, and the mean.
+/// Horizontal positions within a column: first and last person, and the mean.
 const PEOPLE: (f64, f64) = (0.18, 0.6);
 const MEAN: f64 = 0.78;
 /// More people than this are grey, without a legend.
@@ -54,8 +54,8 @@ pub struct PeopleGrid {
     pub abscissa: String,
 }
 
-/// People by condition as one figure, two panels in a row where there are several. `title` is what a screen reader
-/// announces.
+/// People by condition as one figure, two panels in a row where there are several. `title` is the text for screen
+/// readers.
 pub fn people_by_condition(id: &str, title: &str, grid: &PeopleGrid) -> String {
     let n = grid.panels.len();
     if n == 0 || grid.places.is_empty() {

@@ -53,7 +53,7 @@ pub struct TraceGrid {
     pub shared_ordinates: bool,
 }
 
-/// The panels of a grid as one figure. `title` is what a screen reader announces.
+/// The panels of a grid as one figure. `title` is the text for screen readers.
 pub fn trace_panels(id: &str, title: &str, grid: &TraceGrid) -> String {
     let columns = grid.columns.max(1);
     let n = grid.panels.len();

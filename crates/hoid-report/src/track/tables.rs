@@ -21,7 +21,7 @@ use crate::{
 /// Time from which errors count, s: the start of a recursion from nothing is left out.
 const ERRORS_FROM_S: f64 = 10.0;
 
-/// One row a method: what it is, how it forgets, where it started.
+/// One row per method: description, forgetting, where it started.
 pub fn methods(traces: &[Evaluated<'_>], record: &Record) -> Vec<Value> {
     let row = |t: &Evaluated<'_>| {
         let trace = t.section.trace;

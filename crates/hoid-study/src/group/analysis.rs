@@ -35,7 +35,7 @@ use crate::statistics::median;
 
 /// Label of a run that could not be read.
 pub(super) const READ: &str = "read";
-/// Label of what is of the recording itself.
+/// Label for the recording itself.
 pub(super) const RECORD: &str = "record";
 /// Name of the table of people.
 pub(super) const PEOPLE: &str = "people";

@@ -1,6 +1,6 @@
 //! Recorded runs of several subjects: from a folder of files to a group result.
 //!
-//! | module | what it holds |
+//! | module | contents |
 //! |---|---|
 //! | [`Manifest`] | which file is which run of which subject, and what is done with it |
 //! | [`ReadSettings`], [`PreparationSettings`], [`AnalysisSettings`], [`ConditionSettings`] | its tables: how runs are read, prepared and analysed, and the prior knowledge of a condition |

@@ -25,7 +25,7 @@ pub enum PersonStatus {
     Fitted,
     /// It failed.
     Failed,
-    /// There is none, since what the person does changes within the runs.
+    /// There is none, since the behaviour of the person changes within the runs.
     Changes,
 }
 

@@ -28,7 +28,7 @@ use crate::StudyError;
 pub struct Plan {
     /// Name of the study.
     pub name: String,
-    /// One line on what it is.
+    /// Description in one line.
     pub title: String,
     /// Its content or notes on it.
     pub description: String,
@@ -80,7 +80,7 @@ struct OwnKeys {
 /// Most replications of a cell.
 const MOST_REPLICATIONS: u64 = 100_000_000;
 
-/// Most estimates of a study.
+/// Largest number of estimates of a study.
 const MOST_ESTIMATES: u128 = 10_000_000_000;
 
 /// Most blocks of a study: a few files each.
@@ -265,7 +265,8 @@ impl Plan {
         &self.text
     }
 
-    /// SHA-256 of what decides the results: the text of the plan and the replications.
+    /// SHA-256 of everything that determines the results: the text of the plan and the
+    /// replications.
     pub fn hash(&self) -> String {
         let mut hasher = Sha256::new();
         hasher.update(self.text.as_bytes());

@@ -33,7 +33,7 @@ use super::{
 pub struct EstimatorCell {
     /// Its name in the plan.
     pub name: String,
-    /// The name, and what represents the lists of its table.
+    /// The name, and the axes that replace the lists of its table.
     pub label: String,
     /// Axes that replace the lists.
     pub axes: Vec<Axis>,

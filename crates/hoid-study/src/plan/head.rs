@@ -9,7 +9,7 @@ use serde::Deserialize;
 pub(crate) struct Head {
     /// Name of the study: letters, digits, - and _.
     pub name: String,
-    /// One line on what it is.
+    /// Description in one line.
     #[serde(default)]
     pub title: String,
     /// Its content or notes on it.

@@ -61,7 +61,7 @@ settings! {
     groups {
         /// Bounds.
         pub bounds: BoundOptions,
-        /// A delay that is followed.
+        /// A tracked delay.
         pub delay: DelayOptions,
         /// The guard.
         pub guard: GuardOptions,

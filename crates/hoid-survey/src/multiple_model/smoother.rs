@@ -234,7 +234,7 @@ fn join(before: &[Side], after: &[Side]) -> Joined {
     }
     pairs.retain(|(log, _)| *log >= most + least);
     let each: Vec<(f64, Joined)> = if pairs.is_empty() {
-        // Nothing could be joined: what the past shows alone.
+        // Nothing could be joined: the prediction from the past alone.
         let shares = before.iter().map(|f| (f.log_weight.exp(), alone(f)));
         shares.collect()
     } else {

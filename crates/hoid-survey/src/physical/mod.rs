@@ -26,7 +26,7 @@ settings! {
         pub stability: StabilityOptions,
         /// Bounds.
         pub bounds: BoundOptions,
-        /// A delay that is followed.
+        /// A tracked delay.
         pub delay: DelayOptions,
         /// The guard.
         pub guard: GuardOptions,

@@ -19,7 +19,7 @@ pub struct About {
     pub told: &'static str,
 }
 
-/// A record and what is asked of it.
+/// A record and its task.
 #[derive(Debug, Clone, Copy)]
 pub struct Task<'a> {
     /// The record.

@@ -41,7 +41,7 @@ settings! {
         /// Memory 1/(1 - lambda)
         #[setting(unit("samples"), bounds(Bounds::AtLeast(2.0)))]
         pub memory: f64 = 1024.0,
-        /// Weight p of what is known before the data
+        /// Weight p of the prior
         #[setting(bounds(Bounds::PositiveFinite))]
         pub penalty: f64 = 0.3,
         /// Decay of the kernel from one sample to the next

@@ -15,7 +15,7 @@
 //!
 //! Figures show the average over the five runs, as the text draws them, and the median alongside.
 //!
-//! | module | what it holds |
+//! | module | contents |
 //! |---|---|
 //! | `people` | [`ExperimentPlan`]: the virtual people |
 //! | [`procedure`] | what is done with one run |

@@ -79,8 +79,8 @@ pub struct ReproductionSummary {
 /// to go on.
 ///
 /// # Errors
-/// [`ThesisError::UnknownItem`]; [`ThesisError::Study`] and [`ThesisError::Io`] for what cannot be
-/// run, read or written.
+/// [`ThesisError::UnknownItem`]; [`ThesisError::Study`] and [`ThesisError::Io`] for failures of
+/// running, reading or writing.
 pub fn reproduce(
     wanted: &Reproduction,
     directory: &Path,

@@ -1,4 +1,4 @@
-//! Errors of what a method found in one run.
+//! Errors of a method in one run.
 //!
 //! At each kept time `E(t) = sqrt(mean_i |H(j omega_i, t)/H_0(j omega_i, t) - 1|^2)` over the lines
 //! of the forcing function from 0.6 to 11 rad/s (the third to the ninth: the two below turn a few

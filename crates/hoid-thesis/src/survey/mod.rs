@@ -14,10 +14,10 @@
 //! All methods give the response `H(j omega, t)`, so that they are compared by it ([`measure`]); parameters are
 //! compared only for methods that have them.
 //!
-//! | module | what it holds |
+//! | module | contents |
 //! |---|---|
 //! | `plan` | [`SurveyPlan`] |
-//! | [`measure`] | errors of what a method found in one run |
+//! | [`measure`] | errors of a method in one run |
 //! | `run` | [`survey()`]: runs and methods |
 //! | `table` | the tables of the page "The survey's methods" of the book |
 

@@ -5,7 +5,7 @@
 //! that forget, a doubt for those that do not. For the rows from which the estimate moves on, at most [`ROWS`] are
 //! examined, evenly apart:
 //!
-//! | kind | what was observed |
+//! | kind | observation |
 //! |---|---|
 //! | `start-explains-little` | VAF of the simulated start fit on its span below 20 % |
 //! | `not-convertible` | more than 5 % of the rows do not correspond to any operator |

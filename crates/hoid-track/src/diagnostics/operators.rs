@@ -30,7 +30,7 @@ const NEGATIVE_LEAD: f64 = 0.1;
 /// rounding.
 const AT_FASTEST: f64 = 0.4999;
 
-/// Report of the operators of the rows of a trace.
+/// Findings about the operators in the rows of a trace.
 pub(super) fn operator_findings(trace: &Trace, operators: &[Operator]) -> Vec<Finding> {
     let mut all = Vec::new();
     if operators.is_empty() || operators.iter().all(is_other) {

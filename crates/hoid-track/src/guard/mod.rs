@@ -26,11 +26,11 @@
 //! **Filters have settled** after the delay and [`SETTLE_S`]: the slowest poles of people's
 //! neuromuscular systems (omega zeta of 2 to 4 rad/s) leave less than 2 % after that time.
 //!
-//! A misfit, swapped channels or a larger level that last for [`GIVEN_UP_S`] are taken for the new typical level: the
-//! recursion starts again from its start, and the default is learnt again. When after that the signals are as they were
-//! before, so is the default. Silence has no end.
+//! A misfit, exchanged channels or a larger level that last for [`GIVEN_UP_S`] are accepted as the new signals: the
+//! recursion restarts from its start, and the typical levels are estimated again. When after that the signals are as
+//! they were before, so is the default. Silence has no end.
 //!
-//! | file | what it holds |
+//! | file | contents |
 //! |---|---|
 //! | `holding` | samples that are held back, and the treatment of them |
 //! | `pausing` | pauses, from their start to their end |

@@ -29,7 +29,7 @@ settings! {
         pub gain: GainOptions,
         /// Stability.
         pub stability: StabilityOptions,
-        /// A delay that is followed.
+        /// A tracked delay.
         pub delay: DelayOptions,
         /// The guard.
         pub guard: GuardOptions,

@@ -77,7 +77,7 @@ fn alarms(changes: &[(f64, Change)]) -> Vec<Alarm> {
     changes.iter().map(of).collect()
 }
 
-/// Sample by sample: what a record does not hold, missing samples and the history of a second
+/// Sample by sample: data that a record does not hold, missing samples and the history of a second
 /// recording.
 fn over_samples(task: &Task, options: &TrackOptions) -> Result<EntrantResult, String> {
     let span = task.start_record().ok_or("the start span is not all there")?;

@@ -1,6 +1,6 @@
 //! Those who take part.
 //!
-//! | file | what it holds |
+//! | file | contents |
 //! |---|---|
 //! | `methods` | every method of [`hoid_track::Method`], as it is by default |
 //! | `basis` | three gains in the basis of a nominal person, and what whitens a remnant |

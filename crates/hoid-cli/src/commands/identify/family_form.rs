@@ -28,7 +28,7 @@ pub struct FamilyReport<'a> {
 }
 
 impl FamilyReport<'_> {
-    /// The answer, and with `verbose` what is after it.
+    /// The answer, and with `verbose` the rest.
     pub fn page(&self, verbose: bool) -> Result<String, CliError> {
         let mut page = self.answer(verbose)?;
         if !verbose {

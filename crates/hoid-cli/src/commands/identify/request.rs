@@ -1,4 +1,4 @@
-//! From the options of `hoid identify` to what is asked of the library.
+//! Converts the options of `hoid identify` to a request to the library.
 
 use hoid::analysis::{Request, ResolvedRequest};
 

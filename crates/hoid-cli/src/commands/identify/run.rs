@@ -161,7 +161,7 @@ fn sentence(found: &PolynomialAnswer<'_>) -> Option<String> {
     )
 }
 
-/// The answer, and with `verbose` what is after it.
+/// The answer, and with `verbose` the rest.
 fn page(found: &PolynomialAnswer<'_>, verbose: bool) -> String {
     let mut page = answer(found);
     if verbose {

@@ -96,7 +96,7 @@ struct SigmoidReport<'a> {
 }
 
 impl SigmoidReport<'_> {
-    /// The answer, and with `verbose` what is after it.
+    /// The answer, and with `verbose` the rest.
     fn page(&self, verbose: bool) -> String {
         let Self {
             fit,

@@ -2,7 +2,7 @@
 //! gives one line of JSON on standard output, flushed, whatever the line holds; or each datagram
 //! one datagram.
 //!
-//! | file | what it holds |
+//! | file | contents |
 //! |---|---|
 //! | `session` | the samples in their order, and the state of the recursion |
 //! | `lines`, `clock` | what a line means, and its time |

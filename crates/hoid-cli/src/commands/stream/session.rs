@@ -130,7 +130,7 @@ impl Session {
         Ok(self.handle(line))
     }
 
-    /// Takes what a line means; true when the output has a line for it.
+    /// Handles a parsed line; true if the output has a line for it.
     fn handle(&mut self, line: ParsedLine) -> bool {
         self.forget_innovation();
         match line {
@@ -149,8 +149,8 @@ impl Session {
         self.lines.is_multiple_of(self.every)
     }
 
-    /// Takes what came as a datagram, of which the samples that count for an answer are reported
-    /// one by one. What is not a sample is dropped: it may come from anyone.
+    /// Handles a datagram, of which the samples that count for an answer are reported one by one.
+    /// What is not a sample is dropped: it may come from anyone.
     ///
     /// # Errors
     /// The errors of the answers.

@@ -13,7 +13,7 @@ const ROWS_SHOWN: usize = 8;
 /// Coefficients that are printed where there is no operator.
 const COEFFICIENTS_SHOWN: usize = 6;
 
-/// A summary for people, and with `verbose` what is after it.
+/// A summary for people, and with `verbose` the rest.
 ///
 /// # Errors
 /// The errors of the quality of the start fit.

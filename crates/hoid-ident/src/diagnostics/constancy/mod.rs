@@ -26,7 +26,7 @@
 //! and records are counted. The delay and the other parameters are judged apart, each on the level
 //! [`LEVEL`]. Where the operator is known the directions are its parameters, else coefficients.
 //!
-//! | file | what it holds |
+//! | file | contents |
 //! |---|---|
 //! | `blocks` | scores and information of blocks of records |
 //! | `critical` | p-values of a supremum |

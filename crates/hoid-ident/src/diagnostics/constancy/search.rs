@@ -265,7 +265,7 @@ fn tested(
     })
 }
 
-/// The inverse over what the data determine, in units of a unit diagonal.
+/// The inverse over the determined parameters, in units of a unit diagonal.
 pub(super) fn pseudo_inverse(whole: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let p = whole.nrows();
     let scale = DVector::from_fn(p, |i, _| {

@@ -17,7 +17,7 @@ use super::search::{Constancy, pseudo_inverse};
 
 /// Standard errors by which a block moves a parameter.
 const MOVED: f64 = 2.0;
-/// The same in what a block does by chance, where there are few of them.
+/// The same relative to random blocks, where there are few of them.
 const BY_CHANCE: f64 = 4.5;
 /// Fewest blocks.
 const FEWEST: usize = 5;

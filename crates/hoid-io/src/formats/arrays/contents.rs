@@ -67,7 +67,7 @@ pub(crate) struct Contents {
     pub(crate) entries: Vec<Entry>,
     /// The lines that hoid wrote next to the columns.
     pub(crate) comments: Vec<String>,
-    /// Notes on how it was read.
+    /// Notes on reading.
     pub(crate) notes: Vec<String>,
     /// How the lines of a matrix are named.
     pub(crate) indexing: Indexing,

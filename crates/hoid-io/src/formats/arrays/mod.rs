@@ -2,7 +2,7 @@
 //! a text or something that is not read; records and tables are made of it here, the same way for
 //! all of them.
 //!
-//! | module | what it holds |
+//! | module | contents |
 //! |---|---|
 //! | `numbers` | [`Numbers`]: bytes with a type |
 //! | `array` | [`Array`]: numbers with dimensions |

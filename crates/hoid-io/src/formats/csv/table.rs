@@ -275,9 +275,9 @@ impl Rows<'_> {
 /// Lines above the last one whose numbers show how long one is.
 const COMPARED: usize = 8;
 
-/// That the last number of a file may be cut: the last line lacks its end, and its last cell is
-/// shorter by two characters or more than that of each of the [`COMPARED`] lines before, which have
-/// digits after a point.
+/// The last number of a file may be cut: the last line lacks its end, and its last cell is shorter
+/// by two characters or more than that of each of the [`COMPARED`] lines before, which have digits
+/// after a point.
 fn cut_number(source: &CsvSource<'_>, rows: usize) -> Option<String> {
     let last_cell = |row: usize| {
         let (start, _) = source.row(row)?;

@@ -49,7 +49,7 @@ impl<'a> Elements<'a> {
         self.rest.is_empty()
     }
 
-    /// The next element, or what contradicts the format.
+    /// The next element, or the violation of the format.
     pub(super) fn next(&mut self) -> Result<Element<'a>, String> {
         let ends = |left: usize| format!("an element ends {left} bytes into its tag");
         let first = self

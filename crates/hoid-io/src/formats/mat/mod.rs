@@ -1,6 +1,6 @@
 //! Variables of MATLAB.
 //!
-//! | module | what it holds |
+//! | module | contents |
 //! |---|---|
 //! | `read` | the variables of a file of any version |
 //! | `elements` | tags and data of version 5, damaged or not |

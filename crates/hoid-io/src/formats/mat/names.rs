@@ -8,7 +8,7 @@ use crate::formats::arrays::{COMMENTS, Entry, Value};
 /// The variable that keeps the names that are not names of variables, each line a variable and the
 /// name it represents.
 pub(super) const NAMES: &str = "hoid_names";
-/// MATLAB cuts what is longer.
+/// MATLAB truncates longer names.
 const LONGEST_NAME: usize = 63;
 const KEYWORDS: [&str; 20] = [
     "break",

@@ -46,7 +46,7 @@ pub(super) fn read(bytes: Vec<u8>, file: &str) -> Result<ReadFile, IoError> {
     guarded(file, || columns(bytes.into(), file))
 }
 
-/// Whether this is Parquet at all, as text that report what it is instead.
+/// Whether this is Parquet at all, as text that describes the actual content.
 fn check_ends(bytes: &[u8], file: &str) -> Result<(), IoError> {
     let file = || file.to_owned();
     let found = if bytes.is_empty() {

@@ -3,7 +3,7 @@
 //!
 //! Bomb `k` of a format is the same bytes on every machine.
 //!
-//! | file | what it holds |
+//! | file | contents |
 //! |---|---|
 //! | `zeros` | zeros that are packed, of any length, in no time |
 //! | `parquet`, `npz`, `mat`, `hdf5`, `xdf`, `texts` | the bombs of a format |

@@ -58,7 +58,7 @@ pub fn bomb(draw: &mut Draw) -> Vec<u8> {
             unpacked: (8 * values).min(i32::MAX as u64),
             packed: &[0; 20],
         }),
-        // It holds what it reports.
+        // Its content matches its header.
         2 => page(&Page {
             compression: gzip(),
             optional: false,

@@ -5,7 +5,7 @@
 //! of it. Formats that keep checksums over what is compressed are taken apart first and packed
 //! again, for damage after a wrong checksum would only try the checksum.
 //!
-//! | file | what it holds |
+//! | file | contents |
 //! |---|---|
 //! | `draw` | numbers that look like chance, from a seed |
 //! | `originals` | the good files |

@@ -1,7 +1,7 @@
 //! A look at the files of a group before they are analysed ([`Look`]): what is found in them is in the manifest with
 //! the evidence next to it, to be looked through by a person; the request is not searched for.
 //!
-//! | file | what it holds |
+//! | file | contents |
 //! |---|---|
 //! | `evidence` | what was found |
 //! | `first_fit` | form and order of the noise model of the first run |
@@ -93,7 +93,7 @@ pub fn inspect(manifest: &mut Manifest, directory: &Path, known: &LookOptions) -
             manifest.conditions.insert(condition.clone(), settings);
         }
     }
-    // One span for all: what is whole in each condition.
+    // One span for all, complete in each condition.
     if let (None, None, Some(first)) = (known.from_s, known.to_s, spans.first())
         && spans.iter().all(|span| span == first)
     {

@@ -5,9 +5,9 @@
 //!
 //! - **a change of the gains**, and at every few births one of omega_nm and zeta_nm too, with the
 //!   prior probability of such a change since the last birth;
-//! - **a neighbouring delay**, as what may have held all the time: as old as its parent, each
-//!   parameter opened by the error that the difference of the delays makes in it; the first of them
-//!   when the bank starts;
+//! - **a neighbouring delay**, as an alternative that may have been true throughout: as old as its
+//!   parent, each parameter opened by the error that the difference of the delays makes in it; the
+//!   first of them when the bank starts;
 //! - **a change of the delay**: delays spread over all candidates, with gains that are opened as in
 //!   any change, and probabilities in proportion to the normal density of the step. The proposed
 //!   delays move on by one each time, so that each candidate has its turn, and the number of
@@ -64,7 +64,8 @@ pub struct Mixture {
     pub variance: f64,
 }
 
-/// Delays on either side of the likeliest that are proposed as what may have held all the time.
+/// Delays on either side of the likeliest that are proposed as an alternative that may have been
+/// true throughout.
 const NEIGHBOURS: usize = 3;
 /// Least probability of a hypothesis, relative to the likeliest: none is lost for ever.
 const LEAST_PROBABILITY: f64 = 1e-12;

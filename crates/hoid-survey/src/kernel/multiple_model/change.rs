@@ -35,7 +35,7 @@ pub struct Change {
     pub z: [f64; OPERATOR + 2],
 }
 
-/// Lambda, and what has been declared since it rose above zero.
+/// Lambda, and the declarations since it rose above zero.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ChangeDetector {
     log_odds: f64,

@@ -51,8 +51,8 @@ pub(super) struct StartingPoint {
 }
 
 impl StartingPoint {
-    /// Of what is known; `tau_s` is the delay, for an error that is straight between samples, and whether it
-    /// has been given.
+    /// From the prior; `tau_s` is the delay, for an error that is straight between samples, and whether it has been
+    /// given.
     pub fn of(prior: &PersonPrior, tau_s: f64, is_given: bool, sample_time: SampleTime) -> Result<Self, IdentError> {
         let DefaultOperator {
             mut point, mut spread, ..

@@ -47,7 +47,7 @@ pub fn inject(fault: &Fault, clean: &Table, second: &Table, seed: u64, case: u64
     let until = |length: usize| at.saturating_add(length).min(n);
     let (on, size) = (fault.kind.on, fault.size);
     let seconds = if size == WHOLE { n } else { samples(size) };
-    // Rows that differ; what shows is the same except for what stays.
+    // Rows that differ; the visible text is the same except for what stays.
     let mut rows = (at, n);
     let mut stays = false;
     match fault.kind.what {

@@ -88,7 +88,7 @@ pub struct Row {
     pub claims: Vec<Claim>,
 }
 
-/// Judges a fit by what the program printed.
+/// Judges a fit by the output of the program.
 pub fn of_fit(json: &Value, known: &CaseTruth) -> CaseOutcome {
     let claims = claims_of(json, known);
     let worst = worst_of(&claims, &known.truth);

@@ -11,7 +11,7 @@
 //! Methods that estimate wrongly on clean runs too, as `rls` with its own noise model, do so here:
 //! the clean runs are a row of the same table.
 //!
-//! | file | what it holds |
+//! | file | contents |
 //! |---|---|
 //! | `table` | a recording as the columns of a file |
 //! | `kinds` | the faults: kinds, sizes, places, and the cases in their order |

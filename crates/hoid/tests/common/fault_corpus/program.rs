@@ -151,7 +151,7 @@ fn write(base: &Base, fault: &Fault, folder: &Path, seed: u64, case: u64) -> Res
     Ok((files.into_iter().map(|(file, _)| file).collect(), known))
 }
 
-/// The judgement, or what the program reported instead of a result.
+/// The judgement, or the message of the program instead of a result.
 fn run(
     program: &Path,
     way: Way,
