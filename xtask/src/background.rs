@@ -46,7 +46,7 @@ impl Background {
     }
 }
 
-/// Nothing goes on after a chore that has failed.
+/// Nothing continues after a chore that has failed.
 impl Drop for Background {
     fn drop(&mut self) {
         let _ = self.child.kill();

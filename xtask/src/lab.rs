@@ -2,7 +2,7 @@
 //! program after it, and the studies that need a browser: a long session (`hour.mjs`), operators in real time
 //! (`real.mjs`).
 //!
-//! All need npm, what looks at a page a browser; what is not there is reported and left out.
+//! All need npm, what looks at a page a browser; missing items are reported and left out.
 
 use std::{
     env, fs,

@@ -106,7 +106,7 @@ impl Wheel {
     }
 }
 
-/// A fresh environment with the package in it; its interpreter. For that of the tests the workspace is built before.
+/// A fresh environment with the package in it; its interpreter. The tests need the workspace to be built before.
 pub fn environment(wheel: Wheel) -> Result<PathBuf, String> {
     begin(wheel)?;
     install(wheel)?;

@@ -2,7 +2,7 @@
 //!
 //! A finding against the data or the fit counts against all answers. In addition, an answer can be undetermined by
 //! itself: a parameter that the data do not determine, a crossover whose interval holds zero. The level of the whole is
-//! that of the answers that were asked for: a result whose delay is open is trustworthy in its report on the crossover,
+//! that of the answers that were requested: a result whose delay is open is trustworthy in its report on the crossover,
 //! and not determined for a request for the delay. By default it is that of the response, and a loop that is open is a
 //! doubt.
 
@@ -35,10 +35,10 @@ pub trait Answers {
     fn answers(&self, element: Option<&ContinuousTransferFunction>) -> Vec<Answered>;
 }
 
-/// The names of answers that are asked for.
+/// The names of answers that are requested.
 ///
 /// # Errors
-/// [`AnalysisError::Options`] for a name of none.
+/// [`AnalysisError::Options`] for an unknown name.
 pub fn asked_for(names: &[String]) -> Result<Vec<String>, AnalysisError> {
     let known = || {
         let parameters = PARAMETERS.iter().map(|(name, _)| *name);
@@ -79,8 +79,8 @@ pub fn judged(verdict: Verdict, answers: &[Answered], asked: &[String]) -> Verdi
     verdict.append(open)
 }
 
-/// The verdict on one answer: the prior knowledge of the fit as a whole, and what makes this one
-/// open.
+/// The verdict on one answer: the prior knowledge of the fit as a whole, and the reason why this
+/// one is undetermined.
 pub fn of_answer(verdict: &Verdict, answer: &Answered) -> Verdict {
     let whole = verdict.findings().iter().filter(|finding| finding.kind != OPEN);
     Verdict::of(whole.chain(&answer.open).cloned().collect())

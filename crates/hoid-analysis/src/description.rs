@@ -27,7 +27,7 @@ pub enum Excitation {
 }
 
 impl Excitation {
-    /// As users write it: a channel or `none`; found by itself where nothing is specified.
+    /// As users write it: a channel or `none`; found automatically if not specified.
     pub fn of_text(text: Option<&str>) -> Self {
         match text {
             None => Self::Found,

@@ -22,10 +22,10 @@ pub enum AnalysisError {
         /// The other.
         second: String,
     },
-    /// A file without the columns that were asked for, in which they are found under other names.
+    /// A file without the columns that were requested, in which they are found under other names.
     #[error(transparent)]
     OtherColumns(Box<OtherColumns>),
-    /// An offset of a channel that is not there.
+    /// An offset of a channel that does not exist.
     #[error("--offset: there is no channel {name:?}; the record has {known}, and e and u represent input and output")]
     NoSuchChannel {
         /// The request.
@@ -89,7 +89,7 @@ impl From<IdentError> for AnalysisError {
 }
 
 impl AnalysisError {
-    /// Why a file is not read, with what to ask for where it has other columns than were asked for.
+    /// Why a file is not read, with what to ask for where it has other columns than were requested.
     pub fn of_reading(error: IoError, path: &Path, options: &ReadOptions) -> Self {
         match other_columns(&error, path, options) {
             Some(others) => Self::OtherColumns(Box::new(others)),

@@ -19,7 +19,7 @@
 //! | the describing function, where the excitation is recorded | `description`, `offset` |
 //! | the fit, a second opinion, the loop, the settings of the estimator | `estimators`: a file each |
 //! | what the recordings show | `identified`, `recordings` |
-//! | what each answer is worth, and the verdict on those that were asked for | `answers` |
+//! | what each answer is worth, and the verdict on those that were requested | `answers` |
 //! | a describing function, from recordings to its verdict | `describing` |
 //! | a recursion over a recording, from it to the verdict | `tracking` |
 //! | the level of u, the settings that all share | `level`, `settings` |

@@ -10,7 +10,7 @@ use crate::{
     recordings::{Account, Recordings},
 };
 
-/// Most values of an input that steps.
+/// Largest number of values of an input that steps.
 const MOST_LEVELS: usize = 16;
 
 impl Recordings {

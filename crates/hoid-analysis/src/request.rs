@@ -118,7 +118,7 @@ impl ResolvedRequest {
 }
 
 impl Request {
-    /// The request, and remarks on names of before and on what follows from an option.
+    /// The request, and remarks on earlier names and on what follows from an option.
     ///
     /// # Errors
     /// [`AnalysisError`] for options that contradict each other or have no such value.

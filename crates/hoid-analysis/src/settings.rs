@@ -33,7 +33,7 @@ impl Setting {
         Self { given, ..self }
     }
 
-    /// Settings, given where they report it or are not among those by default.
+    /// Marks settings as given if they differ from the defaults.
     pub fn against(all: Vec<Self>, by_default: &[Self]) -> Vec<Self> {
         let is_default = |one: &Self| {
             by_default

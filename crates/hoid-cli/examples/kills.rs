@@ -1,6 +1,6 @@
 //! Studies, groups and reproductions that are killed at random instants, or whose blocks are damaged
-//! between two kills, and then go on: are their results the same, byte for byte? The numbers of the
-//! page "Damaged inputs and kills".
+//! between two kills, and then continue: are their results the same, byte for byte? The numbers of
+//! the page "Damaged inputs and kills".
 //!
 //! `cargo xtask slow kills [--kills N] [--damaged N] [--seed N] [--only study|group|reproduce]
 //! [--program FILE]`: so many kills by SIGKILL, which lets no program tidy up, and so many blocks

@@ -22,14 +22,14 @@ pub enum CliError {
     /// The arguments are contradictory or invalid.
     #[error("{0}")]
     Usage(String),
-    /// A file with other columns than were asked for, and the command that names them.
+    /// A file with other columns than were requested, and the command that names them.
     #[error("{0}")]
     OtherColumns(String),
     /// A stream that cannot be read, understood or written.
     #[error("{0}")]
     Stream(String),
     /// A result that was made and could not be printed.
-    #[error("standard output cannot be written: {0}; what was asked is not there, or is cut: make room for it")]
+    #[error("standard output cannot be written: {0}; what was asked is missing, or is cut: make room for it")]
     Output(std::io::Error),
     /// A result that was printed, and reports that the data do not determine the requested
     /// quantity.

@@ -1,5 +1,5 @@
 //! Standard output and standard error. A reader that closes the pipe early (`hoid ... | head`) has
-//! what it wanted: the command goes on with its files, and nothing is reported. Any other output
+//! what it wanted: the command continues with its files, and nothing is reported. Any other output
 //! that cannot be written, such as a full disk, is an error.
 
 use std::{

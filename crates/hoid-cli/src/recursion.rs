@@ -18,7 +18,7 @@ use crate::{
 /// The option that may be a file.
 const PRIOR: &str = "prior";
 
-/// The recursion that was asked for.
+/// The recursion that was requested.
 ///
 /// # Errors
 /// [`CliError::Usage`].
@@ -41,7 +41,7 @@ pub fn request(args: &RecursionArgs) -> Result<TrackRequest, CliError> {
     })
 }
 
-/// A recursion over a record, as it was asked for.
+/// A recursion over a record, as it was requested.
 ///
 /// # Errors
 /// As [`request`].

@@ -1,8 +1,8 @@
 //! Tables for people: three rules, as in print, and as wide as the screen.
 //!
-//! On a narrow screen cells are wrapped between words, never within a word or a number with its
-//! error. A table that is too wide even so becomes a list for each row, and a course of values a table
-//! on its side, with as many of its times as there is room for.
+//! On a narrow screen cells are wrapped between words, never within a word or a number with its error. A table that is
+//! too wide even so becomes a list for each row, and a series of values a transposed table, with as many of its times
+//! as there is room for.
 
 use std::fmt;
 

@@ -341,7 +341,7 @@ pub fn crossings(all: &Crossings) -> String {
 
 /// Report of there is to on the loop of an estimate next to its lowest crossover: the others, the smallest phase
 /// margin, the gain margin, and that it is not stable. Nothing is reported about one that crosses once and is stable,
-/// unless it is asked for.
+/// unless it is requested.
 pub fn loop_shape(shape: &LoopShape, always: bool) -> String {
     if !always && shape.crossovers.len() < 2 && shape.is_stable() != Some(false) {
         return String::new();

@@ -1,5 +1,4 @@
-//! Faults of recorded data, as a user meets them: no estimate beyond four standard errors of the truth
-//! without a word.
+//! Faults of recorded data, as a user meets them: no estimate beyond four standard errors of the truth silently.
 #![allow(clippy::unwrap_used)]
 
 mod common;

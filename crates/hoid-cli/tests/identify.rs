@@ -66,7 +66,7 @@ fn identify_prints_the_json_of_the_contract() {
     assert_eq!(found["candidates"], serde_json::json!([]));
 }
 
-/// The bytes with which a file starts report what it is, and it has the width that was asked for.
+/// The bytes with which a file starts report what it is, and it has the width that was requested.
 #[test]
 #[cfg(feature = "pdf-png")]
 fn a_figure_is_a_page_or_a_picture_as_its_name_says() {
@@ -527,8 +527,8 @@ fn a_simulation_with_little_noise_is_identified() {
     }
 }
 
-/// The delay of a person whose error was logged at a tenth of its rate is right by one of the two values, and by the course
-/// that is asked for.
+/// The delay of a person whose error was logged at a tenth of its rate is right by one of the two values, and by the
+/// course that is requested.
 #[test]
 fn the_course_between_samples_moves_the_delay_by_half_a_sample() {
     let directory = simulated();

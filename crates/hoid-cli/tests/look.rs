@@ -138,7 +138,7 @@ fn nothing_is_guessed_where_it_is_not_certain() {
     }
     let named = ["info", "two.csv", "--input", "r-y", "--excitation", "none"];
     let said = good(at, &named);
-    assert!(said.contains("excitation  as asked for") && said.contains("Next: hoid identify two.csv --input r-y"));
+    assert!(said.contains("excitation  as requested") && said.contains("Next: hoid identify two.csv --input r-y"));
     let (code, _) = bad(at, &["info", "empty.csv"]);
     assert_eq!(code, 1);
 }

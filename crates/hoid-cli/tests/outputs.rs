@@ -286,7 +286,7 @@ structure = "arx"
 orders.nk = 29
 "#;
 
-/// True if a program started from here is not to end with its terminal (`nohup`), and rightly goes on.
+/// True if a program started from here is not to end with its terminal (`nohup`), and rightly continues.
 #[cfg(unix)]
 fn hang_up_is_ignored() -> bool {
     let status = fs::read_to_string("/proc/self/status").unwrap_or_default();

@@ -1,4 +1,4 @@
-//! Rates above 200 Hz: filtered and decimated by themselves, stated in the result, and the same person.
+//! Rates above 200 Hz: filtered and decimated automatically, stated in the result, and the same person.
 #![allow(clippy::unwrap_used)]
 
 mod common;

@@ -114,7 +114,7 @@ fn hostile_datagrams_are_counted() {
     udp.socket.set_read_timeout(Some(SHORT)).unwrap();
     assert_eq!(udp.receive(&mut [0; 16]), None, "no answer for what is not a sample");
     udp.socket.set_read_timeout(Some(PATIENCE)).unwrap();
-    // Values that are none are samples with a fault.
+    // Invalid values are samples with a fault.
     udp.send(&as_struct(2, f64::NAN, f64::INFINITY, f64::NAN));
     assert!(udp.estimate().1[17].is_nan());
     udp.send(b"0.03,0.1,0.2");

@@ -180,7 +180,7 @@ fn person() -> AdaptiveFilter<Vec<f64>> {
     AdaptiveFilter::new(default_operator.prior(ts), memory).unwrap()
 }
 
-/// Goes on with a person: from the start, where replays are short, or from where they are long.
+/// Continues with a person: from the start, where replays are short, or from where they are long.
 fn follow(mut person: AdaptiveFilter<Vec<f64>>, data: &[(f64, f64)], history: &mut Vec<f64>) {
     history.clear();
     for &(x, u) in data {

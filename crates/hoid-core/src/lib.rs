@@ -76,7 +76,7 @@
 //! | [`guard`] | samples and spans that no tracking signal makes, before a recursion sees them |
 //! | [`held_operator`], [`divided_differences`] | exact zero-order hold of the operator with any delay, and its Jacobian; the functions that it is made of |
 //! | [`filter`], [`delay`], [`stability`] | rational filters over slices, a delay line, the Schur-Cohn test |
-//! | [`mod@state`] | the numbers that change, to save a recursion and go on elsewhere |
+//! | [`mod@state`] | the numbers that change, to save a recursion and continue elsewhere |
 #![no_std]
 
 #[cfg(test)]

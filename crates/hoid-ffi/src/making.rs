@@ -88,8 +88,8 @@ pub unsafe extern "C" fn hoid_tracker_free(tracker: *mut HoidTracker) {
     });
 }
 
-/// Saves a tracker as bytes, to go on in another process with the same digits. With `buffer` NULL and `room` 0 only the
-/// length is reported.
+/// Saves a tracker as bytes, to continue in another process with the same digits. With `buffer` NULL and `room` 0 only
+/// the length is reported.
 ///
 /// # Safety
 /// `tracker` was made here; `buffer` has room for `room` bytes, `length` for a number.

@@ -148,7 +148,7 @@ fn object(text: &str) -> Result<Map<String, Value>, Failure> {
     })
 }
 
-/// Takes an option out; none if it is not there or null.
+/// Takes an option out; none if it is missing or null.
 fn taken<T>(
     options: &mut Map<String, Value>,
     name: &str,

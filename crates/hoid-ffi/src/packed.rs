@@ -8,7 +8,7 @@
 //! | | the bytes |
 //! | 8 | FNV-1a over all before (G. Fowler, L. C. Noll, K.-P. Vo, 1991; 64 bits) |
 //!
-//! All least byte first. The sum guards against damage, not against an adversary.
+//! Little-endian. The sum guards against damage, not against an adversary.
 
 use serde_json::Value;
 

@@ -1,6 +1,6 @@
 //! Report of a tracker.
 //!
-//! A list is asked for with its room and the place for its count; with NULL and no room only the
+//! A list is requested with its room and the place for its count; with NULL and no room only the
 //! count is reported.
 
 use std::ffi::c_char;

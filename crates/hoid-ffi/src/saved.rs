@@ -1,4 +1,4 @@
-//! A tracker as bytes, to go on elsewhere with the same digits.
+//! A tracker as bytes, to continue elsewhere with the same digits.
 //!
 //! The description is the request and the orders, the bytes are the numbers of
 //! [`hoid_track::Live::saved`] (`packed`).

@@ -1,4 +1,4 @@
-//! A tracker as it was asked for, from its warm-up on. Nothing here knows of C, except for the
+//! A tracker as it was requested, from its warm-up on. Nothing here knows of C, except for the
 //! names, which C wants to keep.
 
 use std::ffi::{CStr, CString};

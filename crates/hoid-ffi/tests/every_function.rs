@@ -37,7 +37,7 @@ type Lists<T> = unsafe extern "C" fn(*const HoidTracker, *mut T, usize, *mut usi
 /// A list: first its length, then into memory that was never written to, just long enough.
 fn listed<T: Copy>(tracker: *const HoidTracker, of: Lists<T>) -> Vec<T> {
     let mut count = 0;
-    // SAFETY: a tracker; only the count is asked for.
+    // SAFETY: a tracker; only the count is requested.
     assert_eq!(unsafe { of(tracker, ptr::null_mut(), 0, &mut count) }, HOID_OK);
     let mut list = Vec::<T>::with_capacity(count);
     if count > 0 {
@@ -124,7 +124,7 @@ fn a_tracker_by_every_function_of_the_header() {
     assert!(read(hoid_last_error()).contains("multiple-model"));
 
     let mut length = 0;
-    // SAFETY: only the length is asked for.
+    // SAFETY: only the length is requested.
     let status = unsafe { hoid_tracker_save(tracker, ptr::null_mut(), 0, &mut length) };
     assert_eq!(status, HOID_OK);
     let mut bytes = Vec::<u8>::with_capacity(length);

@@ -1,4 +1,4 @@
-//! Whatever a caller hands over, the answer is a status: no panic, no value that is none.
+//! Whatever a caller hands over, the answer is a status: no panic, no value that is invalid.
 #![allow(clippy::unwrap_used)]
 
 use std::{
@@ -39,7 +39,7 @@ fn answered(status: HoidStatus, tracker: *mut HoidTracker) -> Result<Owned, (Hoi
 
 fn saved(tracker: &Owned) -> Vec<u8> {
     let mut length = 0;
-    // SAFETY: only the length is asked for.
+    // SAFETY: only the length is requested.
     let status = unsafe { hoid_tracker_save(tracker.0, ptr::null_mut(), 0, &mut length) };
     assert_eq!(status, HOID_OK);
     let mut bytes = vec![0; length];
@@ -179,7 +179,7 @@ fn a_fit_is_what_a_tracker_begins_with() {
     assert_eq!(first(&tracker), first(&same));
     let value = f64::from_bits(first(&tracker)[0].0);
     assert!((value - 2.0).abs() < 0.2, "the gain of the fit: {value}");
-    // It goes on from its bytes, which have the fit in them.
+    // It continues from its bytes, which have the fit in them.
     assert_eq!(first(&restored(&saved(&tracker)).ok().unwrap()), first(&tracker));
     // The sample time is that of the fit.
     let (status, said) = of(0.02, fit).err().unwrap();

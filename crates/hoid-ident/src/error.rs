@@ -93,7 +93,7 @@ pub enum IdentError {
     /// A channel that a record does not have.
     #[error("record {label} has no channel {channel} to make instruments of; it has {available}")]
     NoChannel {
-        /// The channel that was asked for.
+        /// The channel that was requested.
         channel: String,
         /// The record.
         label: String,

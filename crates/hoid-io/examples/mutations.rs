@@ -5,7 +5,7 @@
 //!
 //! The cases are shared among processes, each with a limit of its address space (`ulimit -v`; where there is no such
 //! limit, nothing is reported about memory). A case that ends its process, or keeps it for [`PATIENCE`], is reported
-//! and the process goes on after it. `--keep` writes the files of the cases that failed. It is built with overflow
+//! and the process continues after it. `--keep` writes the files of the cases that failed. It is built with overflow
 //! checks on, as the tests are.
 #![allow(clippy::unwrap_used, clippy::print_stdout, clippy::print_stderr)]
 
@@ -29,7 +29,7 @@ use mutations::{Case, case, originals::originals, readers, spent::Spent};
 const SEED: u64 = 2026;
 /// Time limit of one case.
 const LIMIT: Duration = Duration::from_secs(1);
-/// A process that does not go on for so long hangs.
+/// A process that does not continue for so long hangs.
 const PATIENCE: Duration = Duration::from_secs(60);
 
 /// The request.

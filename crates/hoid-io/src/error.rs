@@ -321,7 +321,7 @@ pub enum IoError {
         /// Their names, two at least.
         trials: Vec<String>,
     },
-    /// A trial that is not there.
+    /// A trial that does not exist.
     #[error("{file}: there is no trial {asked}; it has {available}")]
     NoSuchTrial {
         /// The file.
@@ -406,7 +406,7 @@ pub enum IoError {
     EmptySpan {
         /// The file.
         file: String,
-        /// The span as asked for.
+        /// The span as requested.
         span: String,
         /// First time of the record, s.
         start_s: f64,

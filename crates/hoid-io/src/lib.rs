@@ -1,7 +1,7 @@
 //! The file formats of hoid: the only crate that knows them.
 //!
 //! Recordings come as CSV, Parquet, NPZ, MATLAB or XDF, with columns of any name, clocks that jitter and rows that are
-//! missing. Reading takes the columns that are asked for, finds the sampling, checks every value in use, and gives an
+//! missing. Reading takes the columns that are requested, finds the sampling, checks every value in use, and gives an
 //! evenly sampled [`Record`](hoid_model::Record) or an error that names the place in the file. Nothing is repaired
 //! unasked; problems of the data are reported next to the record.
 //!

@@ -61,7 +61,7 @@ pub(crate) fn told(what: &str) -> String {
 /// How near a name has to be to be offered: as near as the command line wants a flag.
 const NEAR: f64 = 0.7;
 
-/// "; did you mean "u"?" for names that are not there: of each the one that differs in capitals alone, else the nearest
+/// "; did you mean "u"?" for names that do not exist: of each the one that differs in capitals alone, else the nearest
 /// by Jaro's measure (M. A. Jaro, J. Am. Stat. Assoc. 84 (1989) 414-420). Of e and u it may be the column that has the
 /// common name of what they are. Empty where none is near.
 pub(crate) fn did_you_mean(unknown: &[&str], names: &[&str]) -> String {

@@ -218,7 +218,7 @@ fn objects_of_matlab_come_with_the_line_that_saves_their_numbers() {
         message.contains("timeseries") && message.contains("x.Time"),
         "{message}"
     );
-    // A name that is not there is in the object.
+    // A name that does not exist is in the object.
     let message = refused("mat/h5py_objects_v73.mat", "e", "u");
     assert!(
         message.contains("runs holds an object of the class timetable"),

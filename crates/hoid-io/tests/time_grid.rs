@@ -48,7 +48,7 @@ fn the_time_may_have_the_name_that_a_recorder_gives_it() {
     );
 }
 
-/// A header, how its times are written, and what is asked for.
+/// A header, how its times are written, and what is requested.
 type Written<'a> = (&'a str, &'a dyn Fn(i64) -> String, Option<&'a str>);
 
 /// The record under a header, of 40 rows at 50 Hz whose times are written by `time`.
@@ -110,7 +110,7 @@ fn times_in_any_unit_and_form_are_the_same_record() {
         assert!(read.record.time_s(0).abs() < 1e-9, "{header} {choice:?}");
         assert_eq!(read.record.len(), 40);
     }
-    // A row number is no time, and a unit that is asked for wins over the one that is found.
+    // A row number is no time, and a unit that is requested wins over the one that is found.
     assert!(record_with("", |k| k.to_string(), None).is_err());
     assert_eq!(
         record_with("t", ms, Some("t:s")).unwrap().record.sample_time().s(),

@@ -78,7 +78,7 @@ fn a_time_that_starts_again_or_a_column_divides_the_rows() {
             read[0].notes
         );
     }
-    // One of them; and one that is not there.
+    // One of them; and one that does not exist.
     assert_eq!(first_and_len(&trials(&counted, Some("trial=2")).unwrap()), [(10.0, 12)]);
     let message = |choice| trials(&counted, Some(choice)).unwrap_err().to_string();
     assert!(message("trial=4").contains("there is no trial trial=4; it has 1, 2, 3"));

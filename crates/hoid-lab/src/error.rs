@@ -1,4 +1,4 @@
-//! Why an experiment cannot go on.
+//! Why an experiment cannot continue.
 
 use std::path::Path;
 

@@ -26,7 +26,7 @@ sub-P01/ses-01/             one session of one person, who has a made-up name
                             had them (ms from tick 0), what the device reported
   ..._frames.csv            frames: their time, when they were drawn (ms from tick 0), the tick and the
                             error that they show
-  ..._live.csv              the estimate while the run went on
+  ..._live.csv              the estimate while the run continued
   ..._end.json              how the run ended, SHA-256 of ticks, events and frames
   ..._beh.parquet           the run at 100 Hz: t, e, u, f_t (target), d (disturbance), y (output),
                             e_shown (error on the screen)

@@ -89,7 +89,7 @@ struct Current {
     /// A run that was sent and has not started.
     ready: Option<Ready>,
     run: Option<Running>,
-    /// The run that ended last: its page may not have heard of it yet, and go on for a moment.
+    /// The run that ended last: its page may not have heard of it yet, and continue for a moment.
     over: Option<usize>,
     reporting: bool,
     pages: Pages,
@@ -111,7 +111,7 @@ struct Running {
 }
 
 impl Current {
-    /// The run that goes on, by its number.
+    /// The run that continues, by its number.
     fn running(&self, number: usize) -> Result<&Running, LabError> {
         let run = self.run.as_ref().filter(|run| run.begun.number == number);
         run.ok_or_else(|| LabError::Order(format!("run {number} is not going on")))
@@ -178,7 +178,7 @@ impl Lab {
         id
     }
 
-    /// A page is gone; a run of it is broken off, and the session goes on in the newest window that is left: a page
+    /// A page is gone; a run of it is broken off, and the session continues in the newest window that is left: a page
     /// that is loaded again may have come before the old one is known to be gone.
     pub fn leave(&self, id: u64) {
         self.shared.pages().remove(&id);
@@ -273,7 +273,7 @@ impl Shared {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// The folder of the session that goes on or is shown.
+    /// The folder of the session that continues or is shown.
     fn session_folder(&self) -> Option<PathBuf> {
         self.state().session.as_ref().map(|session| session.folder.clone())
     }
@@ -285,7 +285,9 @@ impl Shared {
     fn hello(&self, id: u64, role: Role, browser: BTreeMap<String, String>) -> Result<(), LabError> {
         let long = |(name, value): (&String, &String)| name.len() > 64 || value.len() > 512;
         if browser.len() > 32 || browser.iter().any(long) {
-            return Err(LabError::Message("the message of the page about its browser is too long".to_owned()));
+            return Err(LabError::Message(
+                "the message of the page about its browser is too long".to_owned(),
+            ));
         }
         if let Some(page) = self.pages().get_mut(&id) {
             page.role = Some(role);
@@ -297,11 +299,11 @@ impl Shared {
             let before = state.person.filter(|before| *before != id);
             self.give(&mut state, id)?;
             if let Some(before) = before {
-                let words = "The session goes on in another window; this one looks on.".to_owned();
+                let words = "The session continues in another window; this one looks on.".to_owned();
                 self.tell(&ToPage::Refused { words, elsewhere: true }, |page, _| page == before);
             }
         } else if role == Role::Person {
-            let words = "A run goes on in another window; this one looks on.".to_owned();
+            let words = "A run continues in another window; this one looks on.".to_owned();
             self.tell(&ToPage::Refused { words, elsewhere: true }, |page, _| page == id);
         }
         drop(state);
@@ -319,7 +321,7 @@ impl Shared {
             .map(|(id, _)| *id)
     }
 
-    /// The session goes on in the window `id`.
+    /// The session continues in the window `id`.
     fn give(&self, state: &mut Current, id: u64) -> Result<(), LabError> {
         state.person = Some(id);
         state.ready = None;
@@ -363,7 +365,7 @@ impl Shared {
             return Err(LabError::Order("without consent nothing is measured".to_owned()));
         }
         if state.run.is_some() || matches!(self.mode, Mode::Replay(_)) {
-            return Err(LabError::Order("another session goes on".to_owned()));
+            return Err(LabError::Order("another session continues".to_owned()));
         }
         state.session = Some(Session::begin(&self.out, &self.config, subject, cc0)?);
         state.pages = Pages::default();
@@ -373,7 +375,9 @@ impl Shared {
     fn resume(&self, state: &mut Current, name: &str) -> Result<(), LabError> {
         let open = self.open_sessions();
         if state.run.is_some() || !open.iter().any(|known| known == name) {
-            return Err(LabError::Order(format!("there is no session {name:?} to go on with")));
+            return Err(LabError::Order(format!(
+                "there is no session {name:?} to continue with"
+            )));
         }
         state.session = Some(Session::open(&self.out.join(name))?);
         state.pages = Pages::default();

@@ -1,4 +1,4 @@
-//! The lag of the person while the run goes on.
+//! The lag of the person while the run continues.
 //!
 //! The tracker acts in a basis whose lag stays where it started: nothing of it reports what T_I is. So the samples of
 //! the measurement since the last declared change are fitted as `hoid identify` does, each 10 s, on a thread of its
@@ -71,7 +71,7 @@ pub struct LagFits {
     from_s: f64,
     /// Samples at the last fit.
     fitted: usize,
-    /// A fit goes on.
+    /// A fit continues.
     busy: bool,
     last: Lag,
 }

@@ -11,10 +11,10 @@
 //! | [`order`] | the order of the runs, by Latin squares |
 //! | [`task`] | [`Task`](task::Task): a run as tables, and its recomputation |
 //! | [`plant`] | the arithmetic of a tick, twin of the page's |
-//! | [`session`] | the folder: what is appended, what is written at once, how a session goes on |
+//! | [`session`] | the folder: what is appended, what is written at once, how a session continues |
 //! | [`verify`] | [`check`](verify::check): verified, or unverified and why |
 //! | [`record`] | a run as a record for all commands of hoid |
-//! | [`live`], [`lag`] | the estimate while the run goes on, the lag of the person besides |
+//! | [`live`], [`lag`] | the estimate while the run continues, the lag of the person besides |
 //! | [`wire`] | what page and server report to each other |
 //! | [`lab`] | [`Lab`]: the experiment as its pages see it |
 //! | [`server`] | [`Server`]: HTTP and sockets on 127.0.0.1 |

@@ -1,4 +1,4 @@
-//! The estimate while the run goes on.
+//! The estimate while the run continues.
 //!
 //! A recursion of `hoid track` takes e and u of every tenth tick on a thread of its own, fed by the
 //! batches of the page; nothing of it is in the loop. With the controlled element P known, the open

@@ -60,7 +60,7 @@ impl Plant {
     }
 }
 
-/// Most states of a controlled element.
+/// Largest number of states of a controlled element.
 pub const MOST_STATES: usize = 16;
 
 /// From the output of a device to u.

@@ -131,7 +131,7 @@ fn said(command: &mut Command, place: &Path, name: &str) {
         escaped(&out),
         escaped(&wrong)
     );
-    // Without the page its link is not there, which reports it.
+    // Without the page its link is missing, which reports it.
     let _ = hoid_io::write_atomically(&page, |file| file.write_all(html.as_bytes()));
 }
 

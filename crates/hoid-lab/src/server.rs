@@ -7,7 +7,7 @@
 //! | refused | status |
 //! |---|---|
 //! | another host or origin, no token or another one | 403 |
-//! | a path that is none | 404 |
+//! | a path that is invalid | 404 |
 //! | another method than GET | 405 |
 //! | a head of more than 16 KiB | 431 |
 //! | more than 64 connections with the token at once | 503 |

@@ -65,8 +65,8 @@ impl Task {
     /// run, which draw the phases with the seed of the condition.
     ///
     /// # Errors
-    /// [`LabError::Message`] for a condition that is none, as a file may have it; [`LabError::Model`] for an element that
-    /// cannot be held.
+    /// [`LabError::Message`] for a condition that is invalid, as a file may have it; [`LabError::Model`] for an element
+    /// that cannot be held.
     pub fn new(condition: &Condition, cell: u64, replication: u64) -> Result<Self, LabError> {
         condition.check()?;
         let course = condition.course()?;

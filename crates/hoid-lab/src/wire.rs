@@ -40,9 +40,9 @@ pub enum FromPage {
     },
     /// The person has read the text.
     Consent { subject: String, agreed: bool, cc0: bool },
-    /// The person goes on with a session.
+    /// The person continues with a session.
     Resume { session: String },
-    /// The next run is asked for.
+    /// The next run is requested.
     Next {},
     /// Tick 0 of the run that was sent.
     Begin {
@@ -63,7 +63,7 @@ pub enum FromPage {
     },
     /// The run was broken off.
     Abort { number: usize },
-    /// The pages about the session are asked for.
+    /// The pages about the session are requested.
     Reports {},
 }
 
@@ -89,11 +89,11 @@ pub enum ToPage<'a> {
     },
     /// Reliability of a run.
     Verdict { done: &'a Done, measures: &'a Measures },
-    /// The estimate while a run goes on.
+    /// The estimate while a run continues.
     Live { number: usize, line: &'a LiveLine },
     /// The request is refused; `elsewhere` if the session is in another window.
     Refused { words: String, elsewhere: bool },
-    /// The session goes on in this window, whose other window is gone.
+    /// The session continues in this window, whose other window is gone.
     Yours {},
 }
 
@@ -124,7 +124,7 @@ pub struct State {
     pub condition: Option<Condition>,
     /// Whether it is a training run.
     pub training: bool,
-    /// The run that goes on, where one does.
+    /// The run that continues, where one does.
     pub running: Option<usize>,
     /// True while pages are being made.
     pub reporting: bool,

@@ -193,7 +193,7 @@ fn a_disk_that_fills_loses_nothing_that_was_told() {
                 broken += 1;
             }
         }
-        // And it goes on.
+        // And it continues.
         assert!(again.new_number().is_ok());
         again.save().unwrap();
     }
@@ -203,8 +203,8 @@ fn a_disk_that_fills_loses_nothing_that_was_told() {
     );
 }
 
-/// The disk is full while a person tracks: the page is reported at once, the run does not count, and the session goes
-/// on.
+/// The disk is full while a person tracks: the page is reported at once, the run does not count, and the session
+/// continues.
 #[test]
 fn a_run_that_meets_a_full_disk_is_ended_and_the_page_is_told() {
     let at = tempfile::tempdir().unwrap();
@@ -221,7 +221,7 @@ fn a_run_that_meets_a_full_disk_is_ended_and_the_page_is_told() {
     let told =
         "run-01_ticks.csv: No space left on device (os error 28). The run was ended and does not count; make room";
     assert!(said.contains(told), "{said}");
-    // What the page has sent meanwhile is of no account, and the pages see that nothing goes on.
+    // What the page has sent meanwhile is of no account, and the pages see that nothing continues.
     person.track(1, 3000..3100).unwrap();
     assert_eq!(person.state()["running"], Value::Null);
     // As long as it is full none starts.

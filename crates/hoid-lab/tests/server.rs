@@ -242,7 +242,7 @@ fn a_window_that_is_closed_breaks_its_run_off() {
         .unwrap()
         .target;
     person.say(&batch(number, 0, &target));
-    // A second window does not take a run that goes on.
+    // A second window does not take a run that continues.
     let mut second = at.page();
     second.say(&json!({"type": "hello", "role": "person"}));
     assert!(
@@ -251,7 +251,7 @@ fn a_window_that_is_closed_breaks_its_run_off() {
             .unwrap()
             .contains("another window")
     );
-    // With the first one gone the session goes on in it.
+    // With the first one gone the session continues in it.
     drop(person);
     second.hear("yours");
     loop {

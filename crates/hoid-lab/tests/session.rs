@@ -254,8 +254,8 @@ fn people_have_their_rows_and_pseudonyms_are_checked() {
     }
 }
 
-/// Files cut at any byte, flipped or deleted, as by power cuts and full disks: the session opens, its
-/// damaged runs are unverified, and it can go on.
+/// Files cut at any byte, flipped or deleted, as by power cuts and full disks: the session opens, its damaged runs are
+/// unverified, and it can continue.
 #[test]
 fn every_session_opens_whatever_was_cut_or_lost() {
     let dir = tempfile::tempdir().unwrap();

@@ -166,7 +166,7 @@ fn fraction(whole_samples: usize, parameters: [f64; 5], sample_time: SampleTime)
         return Err(ModelError::OutOfRange {
             quantity: "delay tau_e in s",
             found: tau,
-            expected: "a time within the sample that is asked for",
+            expected: "a time within the sample that is requested",
         });
     }
     // A whole number of samples, or one more, up to rounding.

@@ -67,7 +67,7 @@ pub enum ModelError {
     /// A channel that the record does not have.
     #[error("the record has no channel {name}; it has {available}")]
     NoSuchChannel {
-        /// The name asked for.
+        /// The requested name.
         name: String,
         /// The names that exist.
         available: String,
@@ -128,7 +128,7 @@ pub enum ModelError {
         "noise level P_n = {demanded} = var(n)/var(u) cannot be reached with remnant order {order}: the largest reachable level is {largest:.4}; ask for less or use the definition var(u_n)/var(u)"
     )]
     UnreachableNoiseLevel {
-        /// The level asked for.
+        /// The requested level.
         demanded: f64,
         /// Order of the remnant filter.
         order: usize,

@@ -17,7 +17,7 @@ pub enum FaultKind {
     Spike,
     /// A constant that the channel jumps to and back from.
     Dropout,
-    /// A channel that holds its value while the others go on.
+    /// A channel that holds its value while the others continue.
     Frozen,
     /// A stretch in which nothing happens in any channel.
     Idle,
@@ -148,7 +148,9 @@ impl fmt::Display for Fault {
             FaultKind::Scale => write!(f, "{channel} is {size} times larger than elsewhere, {span}")?,
             FaultKind::TimeUnit => write!(f, "a sample time of {size} s: no person is recorded so")?,
             FaultKind::Exchanged => {
-                f.write_str("input and output seem exchanged: the output responds immediately, and the input responds late")?;
+                f.write_str(
+                    "input and output seem exchanged: the output responds immediately, and the input responds late",
+                )?;
             }
             FaultKind::Sign => f.write_str("the output answers the input with the wrong sign")?,
         }

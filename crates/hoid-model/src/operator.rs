@@ -52,7 +52,7 @@ impl OperatorParameters {
     /// which is zero when it is not named.
     ///
     /// # Errors
-    /// [`ModelError::Operator`] for a name that is not there, is lacking, or is next to one that
+    /// [`ModelError::Operator`] for a name that does not exist, is lacking, or is next to one that
     /// states the same.
     pub fn of_names(pairs: &[(String, f64)]) -> Result<Self, ModelError> {
         const NAMES: [&str; 6] = ["K_e", "T_L", "K_e_dot", "omega_nm", "zeta_nm", "tau_e"];

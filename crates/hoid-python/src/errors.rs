@@ -125,7 +125,7 @@ impl From<AnalysisError> for Failure {
     }
 }
 
-/// How an estimator is asked for.
+/// How an estimator is requested.
 fn estimator(name: &str) -> String {
     match name {
         OPERATOR => format!("structure=\"{OPERATOR}\""),

@@ -25,8 +25,8 @@ use crate::{
 /// Samples times models from which a fit is long enough to get a thread of its own, for interrupts.
 const LONG: usize = 50_000;
 
-/// Fits a model to records: the fit, and remarks on how it was asked for. The package has brought all options
-/// into the form of texts.
+/// Fits a model to records: the fit, and remarks on how it was requested. The package has brought all options into the
+/// form of texts.
 #[pyfunction]
 #[pyo3(signature = (records, *, structure, method, options, faults, decimate, progress))]
 #[allow(clippy::too_many_arguments)]

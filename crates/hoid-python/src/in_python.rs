@@ -1,8 +1,8 @@
 //! Messages of the libraries, which name options as they are typed, in the words of Python.
 //!
 //! `--new-fs 50` is `new_sampling_frequency=50`, `--fill` is `fill=True`, `--trial t=1` is `trial="t=1"`. A word after
-//! an option is its value where it is a placeholder (`HZ`), an assignment, or one of [`VALUES`]; any other goes on with
-//! the sentence.
+//! an option is its value where it is a placeholder (`HZ`), an assignment, or one of [`VALUES`]; any other continues
+//! with the sentence.
 
 use pyo3::pyfunction;
 

@@ -38,7 +38,7 @@ pub enum ReportError {
     /// A study that failed.
     #[error(transparent)]
     Study(Box<StudyError>),
-    /// A figure that cannot be made in the format that was asked for.
+    /// A figure that cannot be made in the format that was requested.
     #[error("the figure cannot be written in this format: {reason}")]
     Figure {
         /// Why.

@@ -77,7 +77,7 @@ const WORDS: [(&str, &str, &str); 7] = [
 ];
 
 /// The answer as text: "gain 6.1, lead 0.60 s, delay 0.15 s; crossover 2.9 ± 0.1 rad/s, phase margin 34 ± 3°". A
-/// parameter that is not there or not finite is left out, and so is the loop; `None` if nothing is left.
+/// parameter that is missing or not finite is left out, and so is the loop; `None` if nothing is left.
 pub fn sentence<'a>(
     parameters: impl IntoIterator<Item = (&'a str, f64)>,
     crossover_rad_s: Option<Estimate>,

@@ -59,7 +59,7 @@ pub fn write_page(directory: &Path, name: &str, html: &str) -> Result<PathBuf, R
     Ok(path)
 }
 
-/// Writes a page as `report.html` into a directory, which is made if it is not there.
+/// Writes a page as `report.html` into a directory, which is made if it is missing.
 ///
 /// # Errors
 /// [`ReportError::Io`] when it cannot be written.

@@ -57,7 +57,7 @@ pub enum SimError {
         expected: usize,
     },
     /// An instruction set that this processor does not have.
-    #[error("this processor does not have the instruction set that was asked for; use InstructionSet::Best")]
+    #[error("this processor does not have the instruction set that was requested; use InstructionSet::Best")]
     NoSuchInstructionSet,
     /// Noise that is not a number.
     #[error("the noise at sample {index} is {value}, expected a finite number")]

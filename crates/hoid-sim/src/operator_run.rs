@@ -7,7 +7,7 @@
 
 use crate::{RunSeed, Simulator, cascade::MOST};
 
-/// Most samples of an operator that goes on from what was saved, eight hours at 1 kHz: its random numbers are drawn
+/// Most samples of an operator that continues from what was saved, eight hours at 1 kHz: its random numbers are drawn
 /// again, and what claims to stand farther on must not take all memory.
 const MOST_SAMPLES: f64 = 3e7;
 
@@ -86,8 +86,8 @@ impl OperatorRun {
         numbers
     }
 
-    /// Goes on from where an operator of the same scenario and run was ([`OperatorRun::saved`]), with the same digits.
-    /// False if the numbers are of another; then nothing has changed.
+    /// Continues from where an operator of the same scenario and run was ([`OperatorRun::saved`]), with the same
+    /// digits. False if the numbers are of another; then nothing has changed.
     pub fn restore(&mut self, numbers: &[f64]) -> bool {
         let Some(([k], rest)) = numbers.split_first_chunk::<1>() else {
             return false;
@@ -118,7 +118,7 @@ impl OperatorRun {
         all[self.k.min(all.len() - 1)]
     }
 
-    /// The white noise of the sample that is next; after the end of the scenario it goes on.
+    /// The white noise of the sample that is next; after the end of the scenario it continues.
     fn white(&mut self) -> f64 {
         if self.k >= self.noise.len() {
             self.noise = self.run.white_noise(2 * self.k + 1);
@@ -174,7 +174,7 @@ mod tests {
         }
     }
 
-    /// An operator goes on in another, after the end of its scenario too.
+    /// An operator continues in another, after the end of its scenario too.
     #[test]
     fn a_saved_operator_goes_on_with_the_same_digits() {
         let mut scenario = Scenario::condition(Condition::C4);

@@ -21,7 +21,7 @@ pub enum StudyError {
     /// A file that cannot be read or written.
     #[error(transparent)]
     Io(#[from] IoError),
-    /// A shard that is none.
+    /// A shard that is invalid.
     #[error("shard {found:?}: expected I/N with 1 <= I <= N, such as 2/7")]
     BadShard {
         /// The value given.
@@ -38,13 +38,15 @@ pub enum StudyError {
         reason: String,
     },
     /// Results would be overwritten.
-    #[error("{directory} already holds a study: go on with --resume, or take another directory")]
+    #[error("{directory} already holds a study: continue with --resume, or take another directory")]
     Occupied {
         /// The directory.
         directory: String,
     },
     /// A plan or manifest of the user in the place of the copy next to the results.
-    #[error("{file} is there already and would be replaced by what is run now; take another directory for the results")]
+    #[error(
+        "{file} is already present and would be replaced by what is run now; take another directory for the results"
+    )]
     SourceThere {
         /// The file.
         file: String,
@@ -72,7 +74,7 @@ pub enum StudyError {
         directory: String,
     },
     /// A study without its tables.
-    #[error("{directory} holds a study that is not finished: go on with --resume, or merge its shards")]
+    #[error("{directory} holds a study that is not finished: continue with --resume, or merge its shards")]
     Unfinished {
         /// The directory.
         directory: String,
@@ -91,7 +93,7 @@ pub enum StudyError {
         /// The directory.
         directory: String,
     },
-    /// A part that is there twice.
+    /// A part that is duplicated.
     #[error("block {block} is both in {first} and in {second}: name each shard once")]
     Overlap {
         /// The block.
@@ -121,7 +123,7 @@ pub enum StudyError {
         /// Error reported by the operating system.
         reason: String,
     },
-    /// A pattern of file names that is none.
+    /// A pattern of file invalid names.
     #[error("pattern {pattern:?}: {reason}; expected something like {{subject}}_{{condition}}_{{run}}.csv")]
     Pattern {
         /// The pattern.

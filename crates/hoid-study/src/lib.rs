@@ -41,9 +41,8 @@
 //! # Ok::<(), hoid_study::StudyError>(())
 //! ```
 //!
-//! Replications are run and stored in blocks. A study that was stopped goes on where it was
-//! (`resume`), shards of a study can run on several machines and are joined by [`merge`], and the
-//! bytes of the tables depend on neither.
+//! Replications are run and stored in blocks. A study that was stopped continues where it was (`resume`), shards of a
+//! study can run on several machines and are joined by [`merge`], and the bytes of the tables depend on neither.
 //!
 //! | module | contents |
 //! |---|---|

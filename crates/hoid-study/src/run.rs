@@ -1,7 +1,7 @@
 //! Running a study: blocks over threads, parts on disk, resume.
 //!
 //! A block is written as one file a table when it is finished, traces first, next to its place and then renamed, and at
-//! last its seal (`seal`). A study that was killed therefore has whole blocks and nothing else, and goes on with the
+//! last its seal (`seal`). A study that was killed therefore has whole blocks and nothing else, and continues with the
 //! blocks that have no seal or do not agree with it. When all blocks are there, the parts are joined in the order of
 //! the plan; which thread or machine made a part does not show.
 
@@ -32,7 +32,7 @@ pub struct RunOptions {
     pub shard: Option<Shard>,
     /// Threads; none for one a core.
     pub jobs: Option<usize>,
-    /// Go on with a study that was stopped.
+    /// Continue with a study that was stopped.
     pub resume: bool,
     /// Write the tables as CSV instead of Parquet.
     pub csv: bool,
@@ -199,7 +199,7 @@ fn prepare(plan: &Plan, directory: &Path, manifest: &RunRecord, resume: bool) ->
     Ok(manifest.clone())
 }
 
-/// Makes a directory that is known ready to go on: output in progress is removed, and what an
+/// Makes a directory that is known ready to continue: output in progress is removed, and what an
 /// earlier program left without seals is named as sealed from here on, for it has no block yet.
 pub(crate) fn ready(directory: &Path, found: &RunRecord, record: &RunRecord) -> Result<(), StudyError> {
     if found.complete {

@@ -240,7 +240,7 @@ fn cells_follow_the_order_of_the_file() {
     assert_ne!(plan.hash(), plan.clone().with_replications(11).unwrap().hash());
 }
 
-/// A plan of before the method had its current name is the same plan.
+/// A plan from before the method had its current name is the same plan.
 #[test]
 fn an_earlier_name_of_a_method_is_read() {
     let by = |method: &str| {

@@ -1,4 +1,4 @@
-//! Trackers as numbers: every method goes on with the same digits, and nothing out of them ends the process.
+//! Trackers as numbers: every method continues with the same digits, and nothing out of them ends the process.
 #![allow(clippy::unwrap_used)]
 
 use hoid_model::{
@@ -93,7 +93,7 @@ fn a_restored_tracker_goes_on_with_the_same_digits() {
     }
 }
 
-/// Numbers that were changed and sealed again, as no one does by accident: the tracker is refused or goes on, and no
+/// Numbers that were changed and sealed again, as no one does by accident: the tracker is refused or continues, and no
 /// place, length or bound out of them ends the process.
 #[test]
 fn numbers_that_were_changed_and_sealed_again_end_nothing() {

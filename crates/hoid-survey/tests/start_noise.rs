@@ -1,4 +1,4 @@
-//! A start whose operator is that of the grey box keeps the noise model that was asked for.
+//! A start whose operator is that of the grey box keeps the noise model that was requested.
 #![allow(clippy::unwrap_used)]
 
 use std::collections::BTreeMap;

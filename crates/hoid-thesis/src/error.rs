@@ -44,7 +44,7 @@ pub enum ThesisError {
     /// An estimator that failed, or an option that it does not have.
     #[error(transparent)]
     Estimator(Box<IdentError>),
-    /// A model that has no meaning.
+    /// An invalid model.
     #[error(transparent)]
     Model(#[from] ModelError),
     /// A model that is not an operator.

@@ -1,4 +1,4 @@
-//! A delay that is followed in whole samples, next to any recursion whose delay is given: one recursion for each delay
+//! A delay that is tracked in whole samples, next to any recursion whose delay is given: one recursion for each delay
 //! of a range, and the one that predicts best is reported (D. T. Magill, *Optimal adaptive estimation of sampled
 //! stochastic processes*, 1965; with evidence that is forgotten as in A. H. Jazwinski, *Stochastic Processes and
 //! Filtering Theory*, 1970, section 8.8).
@@ -40,7 +40,7 @@ const TEMPER: f64 = 3.0;
 const LARGEST: f64 = 5.0;
 /// Standard deviation of the delay about that of the start before there is any evidence, s.
 const BEFORE_S: f64 = 0.03;
-/// Most delays that are followed.
+/// Most delays that are tracked.
 const MOST: usize = 128;
 
 /// One recursion for each delay.

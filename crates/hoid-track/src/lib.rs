@@ -30,13 +30,13 @@
 //! | [`building`] | what a method is made of, for those in other crates |
 //! | `options`, `shared_options`, `memory`, `forgetting` | [`TrackOptions`]: what is to be tracked, and how |
 //! | `person_prior` | [`PersonPrior`]: the prior knowledge of a person before the first sample |
-//! | `request`, `plan` | [`TrackRequest`]: what is asked for; [`TrackPlan`]: orders that are still open, searched on the start span |
+//! | `request`, `plan` | [`TrackRequest`]: what is requested; [`TrackPlan`]: orders that are still open, searched on the start span |
 //! | `setup`, `start`, `start_noise`, `gain` | what a recursion is built of: structure, start, way of forgetting |
 //! | `kernel`, `recursion` | RLS and RPEM of the real-time kernel; what every recursion does |
 //! | `predictor`, `history`, `reported` | signals and reports for methods that are not of the kernel |
 //! | `response` | [`Response`]: gain and phase of an estimate at a frequency |
 //! | `open_loop` | [`OpenLoop`]: crossover and phase margin of an estimate with the controlled element |
-//! | `tracker`, `outcome`, `saved` | [`Tracker`]: one sample at a time; a tracker as numbers, to go on elsewhere |
+//! | `tracker`, `outcome`, `saved` | [`Tracker`]: one sample at a time; a tracker as numbers, to continue elsewhere |
 //! | `live` | [`Live`]: the warm-up of a stream, then its tracker |
 //! | `guard` | samples and spans that no tracking makes, kept from the recursion |
 //! | `stationary` | what a recursion without a guard does while nothing arrives |

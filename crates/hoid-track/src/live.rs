@@ -17,7 +17,7 @@ pub type Choose<'a> = &'a dyn Fn(&Record) -> Result<(TrackOptions, Option<Choice
 
 /// Share of the warm-up that is collected in addition after a fit that failed.
 const QUARTER: usize = 4;
-/// For a warm-up that goes on, so many times its length is kept.
+/// For a warm-up that continues, so many times its length is kept.
 const KEPT: usize = 2;
 /// Longest run of faulty samples within a warm-up, s; after a longer one it starts again.
 const LONGEST_FAULT_S: f64 = 1.0;
@@ -230,7 +230,7 @@ impl WarmUp {
         self.samples.drain(..idle.min(self.samples.len()));
         self.needed = self.collected + idle;
         self.trouble = Some(format!(
-            "neither e nor u moved for {:.1} s: left out, the warm-up goes on",
+            "neither e nor u moved for {:.1} s: left out, the warm-up continues",
             idle as f64 * self.sample_time.s()
         ));
         true

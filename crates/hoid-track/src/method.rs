@@ -129,7 +129,7 @@ pub trait RecursiveMethod: Settings + Boxed + 'static {
         None
     }
 
-    /// True if the two-sided estimate of a recorded run was asked for.
+    /// True if the two-sided estimate of a recorded run was requested.
     fn smooths(&self) -> bool {
         false
     }

@@ -114,7 +114,7 @@ impl TrackOptions {
     /// Memory of each parameter, in the order of [`TrackOptions::parameter_names`].
     ///
     /// # Errors
-    /// [`IdentError::UnknownParameter`] for a memory of a parameter that is not there.
+    /// [`IdentError::UnknownParameter`] for a memory of a parameter that does not exist.
     pub fn memories(&self) -> Result<Vec<Memory>, IdentError> {
         let (names, method) = (self.parameter_names(), &self.method);
         let given = method.memories();

@@ -31,8 +31,8 @@ impl TrackPlan {
     /// checked that can be before there are data.
     ///
     /// # Errors
-    /// [`IdentError`] for options that contradict each other, name what is not there, or give a
-    /// start for one of several models.
+    /// [`IdentError`] for options that contradict each other, name what is missing, or give a start
+    /// for one of several models.
     pub fn new(
         options: TrackOptions,
         ranges: OrderRanges,

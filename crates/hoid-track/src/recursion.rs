@@ -34,7 +34,7 @@ impl From<Step> for StepOutcome {
     }
 }
 
-/// A delay that is followed, and that of the polynomials.
+/// A delay that is tracked, and that of the polynomials.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Delay {
     /// Delay of b0 of the polynomials, samples.
@@ -81,7 +81,7 @@ pub trait Recursion: State + Send + Sync {
     fn scale_covariance(&mut self, _factor: f64) -> bool {
         false
     }
-    /// The delay at present, where it is followed.
+    /// The delay at present, if it is tracked.
     fn delay(&self) -> Option<Delay> {
         None
     }

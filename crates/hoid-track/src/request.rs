@@ -1,4 +1,4 @@
-//! A recursion as it is asked for, before the time between samples is known: a delay in seconds is none of the orders
+//! A recursion as it is requested, before the time between samples is known: a delay in seconds is none of the orders
 //! yet, and a start names its coefficients.
 
 use std::collections::BTreeMap;
@@ -25,7 +25,7 @@ pub enum RequestedStart {
     Coefficients(BTreeMap<String, f64>),
 }
 
-/// A recursion as it is asked for.
+/// A recursion as it is requested.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TrackRequest {
     /// The recursion, with its options.
@@ -70,7 +70,7 @@ impl TrackRequest {
         }
     }
 
-    /// The structure that was asked for, else that of the method.
+    /// The structure that was requested, else that of the method.
     pub fn structure(&self) -> Structure {
         self.structure.unwrap_or_else(|| self.method.default_structure())
     }
@@ -84,7 +84,7 @@ impl TrackRequest {
     /// The plan for a time between samples; everything is checked that can be before there are data.
     ///
     /// # Errors
-    /// [`IdentError`] for options that contradict each other, or name what is not there.
+    /// [`IdentError`] for options that contradict each other, or name what is missing.
     pub fn plan(&self, sample_time: SampleTime) -> Result<TrackPlan, IdentError> {
         let mut orders = self.orders.clone();
         if let Some(delay) = &self.delay {

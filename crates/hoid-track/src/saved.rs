@@ -1,7 +1,7 @@
-//! A tracker as numbers, to go on elsewhere: in another process, or after a restart.
+//! A tracker as numbers, to continue elsewhere: in another process, or after a restart.
 //!
-//! The numbers are those of the start, of which gains and bounds are made, and then all that
-//! changes ([`hoid_core::state`]), and a seal against damage. A tracker that was restored goes on with the same digits. It
+//! The numbers are those of the start, of which gains and bounds are made, and then all that changes
+//! ([`hoid_core::state`]), and a seal against damage. A tracker that was restored continues with the same digits. It
 //! does not have the start fit any more.
 
 use hoid_core::state::{State, visit_all};

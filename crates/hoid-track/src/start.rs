@@ -301,7 +301,7 @@ fn polynomial_fit(setup: &Setup, record: &Record, known: Option<&Fit>) -> Result
 }
 
 /// The Box-Jenkins fit where it has physical parameters within the bounds, else the grey box, which
-/// always has, with a noise model of the order that was asked for.
+/// always has, with a noise model of the order that was requested.
 fn fit_physical(setup: &Setup, record: &Record, known: Option<&Fit>) -> Result<FittedStart, IdentError> {
     if setup.delay_parameter_s.is_none()
         && let Some(start) = from_box_jenkins(setup, record, known)?

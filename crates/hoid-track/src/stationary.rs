@@ -16,7 +16,7 @@
 //! - The recursion is then put back to the first sample of the stand, bit for bit (a jump to its position is part of
 //!   it): to the numbers that were kept before it, from which it takes the samples again. Value, covariance and
 //!   innovation variance stay as they are there, however long it lasts.
-//! - It goes on once both signals move and the filters have settled ([`crate::guard`]).
+//! - It continues once both signals move and the filters have settled ([`crate::guard`]).
 //!
 //! A recursion that never stays constant has the same digits as without. Samples closer than 40 us are not watched.
 

@@ -6,8 +6,7 @@ use hoid_model::numbers::plain;
 
 use crate::trace::Trace;
 
-/// The method, what it remembers, where it started, the operator at the end, and the changes that
-/// were declared.
+/// The method, its memory, its start, the operator at the end, and the changes that were declared.
 impl fmt::Display for Trace {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let options = self.options();

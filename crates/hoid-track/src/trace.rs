@@ -28,7 +28,7 @@ pub struct Trace {
     pub(crate) covariance: Vec<f64>,
     /// The operator itself, for a recursion in physical parameters.
     pub(crate) operator: Vec<OperatorEstimate>,
-    /// The delay of each row, where it is followed.
+    /// The delay of each row, if it is tracked.
     pub(crate) delays: Vec<Delay>,
     /// The responses that are not those of the polynomials, at each frequency of the options.
     pub(crate) responses: Vec<f64>,

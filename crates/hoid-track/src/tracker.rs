@@ -382,7 +382,7 @@ fn largest_nk(options: &TrackOptions, sample_time: SampleTime) -> usize {
     options.orders.nk.max((latest.ceil() as usize).saturating_add(1))
 }
 
-/// The watch of a recursion without a guard, but where that was asked for.
+/// The watch of a recursion without a guard, but where that was requested.
 pub(crate) fn stationary_watch(options: &TrackOptions, sample_time: SampleTime) -> Option<Box<StationaryWatch>> {
     if options.method.guard().is_some() {
         return None;

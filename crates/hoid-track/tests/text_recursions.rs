@@ -236,7 +236,7 @@ fn a_guard_that_is_none_is_refused_with_what_to_do() {
         found.contains("windup_guard") && found.contains("exponential"),
         "{found}"
     );
-    // Without a guard that is asked for, the window is served.
+    // Without a guard that is requested, the window is served.
     assert!(of_the_text(Method::rls(), &[("forgetting", "window")]).check().is_ok());
 }
 

@@ -38,7 +38,7 @@ fn there_are_hundreds_and_no_two_are_alike() {
     let all = faults();
     assert!(all.len() > 250, "{}", all.len());
     for (i, one) in all.iter().enumerate() {
-        assert!(!all[..i].contains(one), "{one:?} is there twice");
+        assert!(!all[..i].contains(one), "{one:?} is duplicated");
         assert!(one.kind.name() != "none");
     }
 }

@@ -1,4 +1,4 @@
-"""What was found in the records of a fit, and the records as they were fitted."""
+"""Findings in the records of a fit, and the records as they were fitted."""
 
 from __future__ import annotations
 

@@ -87,7 +87,7 @@ class Comparison:
         Raises
         ------
         DataError
-            For a text that is none, was changed, or is of another version.
+            For a text that is not a result, was changed, or is of another version.
         """
         _pyhoid.comparison_figure_of(text)
         return cls(text)

@@ -2,7 +2,7 @@
 
 A plan is cut into shards. Each shard runs as one task in a folder of its worker, and its files come
 back as soon as it is done. The shards are kept next to the result until they are merged: a lost
-worker costs only the shard that it was running, and an interrupted study goes on with the shards
+worker costs only the shard that it was running, and an interrupted study continues with the shards
 that it has. The merged tables have the same bytes as those of a run on one machine.
 
 >>> from dask.distributed import Client
@@ -75,7 +75,7 @@ def study(
         As in `pyhoid.plan`. Workers get its text, and need nothing but pyhoid.
     directory : path
         Where the tables are written, on the machine of the client. A study that was stopped there
-        goes on.
+        continues.
     client : distributed.Client
         A client of any scheduler.
     shards : int, optional

@@ -44,7 +44,7 @@ class FileError(Error, OSError):
 
 
 class FileMissingError(FileError, FileNotFoundError):
-    """A file that is not there."""
+    """A file that does not exist."""
 
 
 class FormatError(Error, ValueError):

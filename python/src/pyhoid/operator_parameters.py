@@ -30,7 +30,7 @@ class OperatorParameter(NamedTuple):
         Whether the data determine the parameter.
     unit : str
     averaged_over : tuple of str
-        The forms whose estimates it is the mean of; empty if it is that of one form alone.
+        The forms over which the estimate is averaged; empty for a single form.
 
     Examples
     --------

@@ -110,7 +110,7 @@ def read(
     Raises
     ------
     FileError
-        When the file is not there (`FileNotFoundError`) or cannot be read (`OSError`).
+        When the file is missing (`FileNotFoundError`) or cannot be read (`OSError`).
     FormatError
         When the content is not as expected; the message names the row.
 

@@ -369,7 +369,7 @@ class Record:
 
         The filter is the same for all channels; the input is taken in the middle of the n samples
         over which it is held then, so that delays stay. It is what `identify`, `track` and
-        `describe` do by themselves above 200 Hz.
+        `describe` do automatically above 200 Hz.
 
         Parameters
         ----------

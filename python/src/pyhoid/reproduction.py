@@ -31,7 +31,7 @@ class Reproduction(NamedTuple):
     tables: dict[str, Table]
     #: Results of the studies by name.
     studies: dict[str, Results]
-    #: How many claims hold, hold in part, do not hold and cannot be tested; None if not asked for.
+    #: How many claims hold, hold in part, do not hold and cannot be tested; None if not requested.
     claims: dict[str, int] | None
 
 
@@ -46,7 +46,7 @@ def reproduce(
     """Make the tables, figures and claims of the thesis (Ortiz Moya 2023).
 
     This does what ``hoid reproduce`` does. Studies that are already there are not run again; one
-    that was interrupted goes on.
+    that was interrupted continues.
 
     Parameters
     ----------
@@ -87,7 +87,7 @@ def reproduce(
     if made is None:
         raise StudyStateError(
             f"the reproduction was stopped; completed parts are in {target};"
-            " make the same call again to go on"
+            " make the same call again to continue"
         )
     page, _, tally = made
     names = ("hold", "hold, and more so", "hold in part", "do not hold", "cannot be tested")

@@ -154,7 +154,7 @@ class Trace:
     @property
     def response_names(self) -> list[str]:
         """Names of gain and phase at the frequencies of `at`, crossover and margin: of those
-        that were asked for, without their errors."""
+        that were requested, without their errors."""
         starts = ("gain_db@", "phase_deg@", "crossover_rad_s", "phase_margin_deg")
         return [n for n in self.columns if n.startswith(starts) and not n.endswith("_se")]
 

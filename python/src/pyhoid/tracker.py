@@ -25,8 +25,8 @@ class Tracker(_pyhoid.Tracker):
     """A recursive estimate that takes one sample at a time.
 
     The default, ``"adaptive"``, speaks at once. Other methods without a start collect `warm_up`
-    seconds, fit them, and go on from there; until then `ready` is False. It can be pickled, and
-    goes on with the same digits.
+    seconds, fit them, and continue from there; until then `ready` is False. It can be pickled, and
+    continues with the same digits.
 
     Parameters
     ----------

@@ -53,7 +53,7 @@ pub enum Spectrum {
     Tremor,
 }
 
-/// How the strength of the remnant goes on.
+/// How the strength of the remnant continues.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Course {
     /// It stays.

@@ -17,9 +17,9 @@ pub struct Task {
     pub start_s: (f64, f64),
     /// The delay in samples with the one of the hold, where it is reported.
     pub nk: Option<usize>,
-    /// Frequencies at which the response is asked for, rad/s.
+    /// Frequencies at which the response is requested, rad/s.
     pub lines_rad_s: Vec<f64>,
-    /// Times at which it is asked for, s, in order.
+    /// Times at which it is requested, s, in order.
     pub asked_s: Vec<f64>,
     /// Where two recordings were joined.
     pub seam: Option<Seam>,
@@ -101,7 +101,7 @@ pub struct Alarm {
 /// Result of an entrant.
 #[derive(Debug, Clone, Default)]
 pub struct EntrantResult {
-    /// The report at each time that was asked for.
+    /// The report at each time that was requested.
     pub said: Vec<ReportedResponse>,
     /// The changes that were declared; none for one that declares none.
     pub alarms: Option<Vec<Alarm>>,

@@ -1,6 +1,6 @@
 //! Reliability of an answer: the line of an entrant in a run.
 //!
-//! The response is asked for at seven lines from .5 to 6 rad/s, at +2, +4, +8, +13, +18 and +28 s after each change,
+//! The response is requested at seven lines from .5 to 6 rad/s, at +2, +4, +8, +13, +18 and +28 s after each change,
 //! once before the first, and every 10 s without a change. The error is the mean of `|dH|/|H|` over the lines; who
 //! carries no information, or no number, has the error 1, that of saying zero. The band of a line covers when real and
 //! imaginary part lie within 1.96 standard errors, each counted by itself.
@@ -18,12 +18,12 @@ use super::{
     simulate::{Run, Truth, simulate},
 };
 
-/// Seconds after a change at which the response is asked for.
+/// Seconds after a change at which the response is requested.
 pub const AFTER_S: [f64; 6] = [2.0, 4.0, 8.0, 13.0, 18.0, 28.0];
 /// Lines, rad/s: seven from .5 to 6 on a logarithmic scale.
 const LINES: usize = 7;
 const LINES_RAD_S: (f64, f64) = (0.5, 6.0);
-/// Seconds before the first change at which it is asked for.
+/// Seconds before the first change at which it is requested.
 const BEFORE_S: f64 = 0.5;
 /// Seconds between two without a change, and times of its own of the long case.
 const STEADY_S: f64 = 10.0;
@@ -97,7 +97,7 @@ pub(super) fn lines_rad_s() -> Vec<f64> {
     (0..LINES).map(of).collect()
 }
 
-/// Times that are asked for, each with its label.
+/// Times that are requested, each with its label.
 pub(super) fn asked(changes_s: &[f64], start_s: f64, length_s: f64, is_long: bool) -> Vec<(String, f64)> {
     let mut all = Vec::new();
     let steady = |from: f64| {

@@ -13,7 +13,7 @@
 
 use hoid_model::{Complex64, ContinuousTransferFunction, ModelError, SampleTime, polynomial};
 
-/// An operator. Times in s, frequencies in rad/s; zero if a factor is not there.
+/// An operator. Times in s, frequencies in rad/s; zero if a factor is missing.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Operator {
     /// K, control per error.

@@ -1,11 +1,11 @@
 //! The available information: bounds that no method can exceed.
 //!
-//! **Evidence of a change.** The logarithm of the likelihood ratio of the true model after a change
-//! against the true model before it, the change's time, the remnant's spectrum, density and course
-//! known: `sum over k of log f(A n/s) - log f(A (n + delta)/s)`, n the remnant, delta the response of
-//! the person now less that of the person of before to the same errors, A the whitening filter. Over
-//! 12 a change is certain: no test at one false alarm an hour misses it but by its own fault. It is
-//! computed before stick and recorder, where the model is exact.
+//! **Evidence of a change.** The logarithm of the likelihood ratio of the true model after a change against the true
+//! model before it, the change's time, the remnant's spectrum, density and course known:
+//! `sum over k of log f(A n/s) - log f(A (n + delta)/s)`, n the remnant, delta the response of the person now less that
+//! of the person before the change to the same errors, A the whitening filter. Over 12 a change is certain: no test at
+//! one false alarm an hour misses it but by its own fault. It is computed before stick and recorder, where the model is
+//! exact.
 //!
 //! **The batch fit that knows the change.** Box-Jenkins by the prediction error method with the true
 //! delay and a noise model of order 4 on everything since the last change: it uses every sample, and

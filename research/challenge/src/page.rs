@@ -14,7 +14,7 @@ pub fn page(lines: &[Line], measured: &str) -> String {
          and lead on `1/s^2` against a disturbance at primes times 0.05 Hz, a remnant `1/(T_n s + 1)` of\n\
          .3 of the standard deviation that u has without it, 100 Hz, 90 s; a change starts at 45 s, takes\n\
          half a second, and is of the operator alone. Remnant, plant and forcing stay.\n\n\
-         H is asked for at seven lines from .5 to 6 rad/s. Who carries no information, or fails, has the error 1.\n\
+         H is requested at seven lines from .5 to 6 rad/s. Who carries no information, or fails, has the error 1.\n\
          `batch (oracle)` knows the changes and the delay: Box-Jenkins on everything since the last change\n\
          (none before 7.5 s), without a constant and over no missing sample, so that offsets, drift and\n\
          gaps cost it. A change is certain where the logarithm of the likelihood ratio of the true\n\

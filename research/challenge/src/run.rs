@@ -1,8 +1,8 @@
 //! Runs of the challenge, on all threads, kept on disk.
 //!
 //! Each run of a case is a file, a line of JSON for each entrant. It is written next to and
-//! renamed; what is there is not computed again, so that a challenge can be stopped, go on, take in
-//! another entrant, or be done in parts on several machines. Nothing depends on the number of
+//! renamed; what is there is not computed again, so that a challenge can be stopped, continue, take
+//! in another entrant, or be done in parts on several machines. Nothing depends on the number of
 //! threads.
 
 use std::path::{Path, PathBuf};
@@ -39,7 +39,7 @@ pub struct ChallengeOptions {
 /// The entrants of these names, all where there are none, and whether the batch fit is among them.
 ///
 /// # Errors
-/// [`ChallengeError::Refused`] for a name that is none.
+/// [`ChallengeError::Refused`] for a name that is invalid.
 pub(super) fn chosen_entrants(names: &[String]) -> Result<(Vec<Box<dyn Entrant>>, bool), ChallengeError> {
     let mut all = entrants();
     let known: Vec<String> = all.iter().map(|c| c.name()).chain(["batch".to_owned()]).collect();
@@ -83,7 +83,7 @@ pub(super) fn refused(reason: String) -> ChallengeError {
 /// entrants. `each` is called after every run.
 ///
 /// # Errors
-/// [`ChallengeError`] for names that are none, files, and cases that no person can stabilise.
+/// [`ChallengeError`] for invalid names, files, and cases that no person can stabilise.
 pub fn challenge(options: &ChallengeOptions, each: &(dyn Fn(&str) + Sync)) -> Result<Vec<Line>, ChallengeError> {
     let cases = chosen_cases(&options.cases)?;
     let (entrants, batch) = chosen_entrants(&options.methods)?;
@@ -119,7 +119,7 @@ pub fn challenge(options: &ChallengeOptions, each: &(dyn Fn(&str) + Sync)) -> Re
 /// Gives the line of an entrant, or of the batch fit.
 pub(super) type LineOf = Box<dyn Fn(Option<&dyn Entrant>) -> Line>;
 
-/// The lines of a run: those of the file, and those that are not there computed and added.
+/// The lines of a run: those of the file, and those that do not exist computed and added.
 pub(super) fn kept(
     folder: &Path,
     number: u64,

@@ -7,8 +7,8 @@
 //! simulators of [`hoid_sim`] but the random streams.
 //!
 //! Next to the signals a run keeps what only an oracle knows: the remnant, the course of its
-//! strength, the true response, and what the person of before each change would have answered to
-//! the same errors.
+//! strength, the true response, and what the person before the change each change would have
+//! answered to the same errors.
 
 use std::f64::consts::TAU;
 
@@ -109,7 +109,8 @@ pub struct Hidden {
     pub(super) level: Vec<f64>,
     /// Response to the error, before stick and recorder, with the recorded sign.
     pub(super) response: Vec<f64>,
-    /// For each change its first sample, and from there on the response of the person of before.
+    /// For each change its first sample, and from there on the response of the person before the
+    /// change.
     pub(super) before: Vec<(usize, Vec<f64>)>,
     /// Whitening filter of n over its standard deviation.
     pub(super) whitening: Vec<f64>,

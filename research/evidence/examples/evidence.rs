@@ -315,7 +315,7 @@ fn speed(runs: u64, python: &str) {
         .unwrap_or_default();
     let parts: Vec<&str> = printed.split_whitespace().collect();
     let Some(theirs) = parts.first().and_then(|t| t.parse::<f64>().ok()) else {
-        println!("{python} with numpy and scipy is not there: no comparison");
+        println!("{python} with numpy and scipy is missing: no comparison");
         return;
     };
     println!(

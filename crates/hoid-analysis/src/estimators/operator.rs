@@ -72,7 +72,7 @@ impl BatchEstimator for FamilyEstimator {
         let estimator = Self {
             excitation: channel,
             period_s: with.period_s,
-            // What was asked for in reading has been done.
+            // What was requested in reading has been done.
             detrend: if data.were_detrended() {
                 Detrend::None
             } else {

@@ -60,7 +60,7 @@ pub fn envelope(
         "data",
         json!({"faults": faults(files, accounts), "warnings": warnings(files, accounts)}),
     );
-    // Names of before, for one release.
+    // Earlier names, for one release.
     set("warnings", warnings(files, accounts));
     set("faults", faults(files, accounts));
     set("settings", settings(settings_of));

@@ -51,7 +51,8 @@ impl BatchResult {
     /// Reads a result that [`Identified::to_json`] wrote.
     ///
     /// # Errors
-    /// [`AnalysisError::NotAResult`] for a text that is none, is damaged, or is of another version.
+    /// [`AnalysisError::NotAResult`] for a text that is invalid, is damaged, or is of another
+    /// version.
     pub fn from_json(text: &str) -> Result<Self, AnalysisError> {
         let object = parsed(text)?;
         let estimator = object.get("estimator").and_then(Value::as_str).unwrap_or_default();
@@ -190,7 +191,7 @@ impl<F: BatchAnswer> Identified<F> {
     /// simulates and validates as before, on records that are given to it.
     ///
     /// # Errors
-    /// [`AnalysisError::NotAResult`] for a text that is none, is damaged, is of another version or estimator.
+    /// [`AnalysisError::NotAResult`] for a text that is invalid, is damaged, is of another version or estimator.
     pub fn from_json(text: &str) -> Result<Self, AnalysisError> {
         restored(parsed(text)?)
     }

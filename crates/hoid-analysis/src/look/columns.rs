@@ -52,7 +52,7 @@ impl Roles {
             .collect()
         };
         let (targets, outputs) = (known(&TARGETS), known(&OUTPUTS));
-        let asked = |name: &str| Role::new(name, "as asked for", true);
+        let asked = |name: &str| Role::new(name, "as requested", true);
         let input = match (input, error_among(columns), targets.first().zip(outputs.first())) {
             (Some(name), ..) => asked(name),
             (_, Some(name), _) => Role::new(name, "the tracking error, by its name", true),

@@ -2,7 +2,7 @@
 //! by how much the control was recorded late.
 //!
 //! Command line, groups and Python look at a file by this alone, and nothing is chosen silently: what is found is
-//! shown, with the evidence, as [`Advice`] on how to read the file. What was asked for is not searched for.
+//! shown, with the evidence, as [`Advice`] on how to read the file. What was requested is not searched for.
 //!
 //! | file | contents |
 //! |---|---|
@@ -11,7 +11,7 @@
 //! | `periods` | the excitation, its period and lines, and the longest span of whole periods |
 //! | `lag` | by how many samples the control was recorded later than the output of the controlled element |
 //! | `file` | all of this of a file: [`Look`] |
-//! | `other_columns` | what a reader is reported of a file without the columns that were asked for |
+//! | `other_columns` | error message for a file without the columns that were requested |
 //! | `advice` | how the file is to be read, and the command to type |
 
 mod advice;

@@ -14,7 +14,7 @@ pub struct LookOptions {
     pub excitation: Option<String>,
     /// The controlled element, as it was typed, and as it is meant.
     pub controlled_element: Option<(String, ContinuousTransferFunction)>,
-    /// The column of the time and its unit; found by itself where it is left out.
+    /// The column of the time and its unit; found automatically where it is left out.
     pub time: Option<TimeChoice>,
     /// The trials of a file; known by a time that starts again where they are left out.
     pub trial: Option<TrialChoice>,

@@ -1,4 +1,4 @@
-//! A file without the columns that were asked for, in which error and control are found all the same: nothing is chosen
+//! A file without the columns that were requested, in which error and control are found all the same: nothing is chosen
 //! silently, the reader is shown what to ask for.
 
 use std::path::Path;
@@ -8,7 +8,7 @@ use thiserror::Error;
 
 use super::{advice::typed, columns::Roles, file::names};
 
-/// A file without the columns that were asked for, in which error and control are found all the same.
+/// A file without the columns that were requested, in which error and control are found all the same.
 #[derive(Debug, Clone, PartialEq, Error)]
 #[error("{}: {}", self.found(), self.as_keys())]
 pub struct OtherColumns {

@@ -42,7 +42,7 @@ pub struct Periods {
 pub(super) fn search(record: &Record, known: &LookOptions) -> Result<Periods, String> {
     let channels: Vec<&str> = record.channels().map(|channel| channel.name.as_str()).collect();
     let candidates: Vec<&str> = match known.excitation.as_deref() {
-        Some("none") => return Err("as asked for".to_owned()),
+        Some("none") => return Err("as requested".to_owned()),
         Some(name) => vec![name],
         None => {
             // Error, control and output follow the excitation: they have its lines, and more.

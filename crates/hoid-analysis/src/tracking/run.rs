@@ -17,7 +17,7 @@ use crate::{
     recordings::Recordings,
 };
 
-/// A recursion over a recording, as it is asked for.
+/// A recursion over a recording, as it is requested.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tracking {
     /// The recursion.

@@ -22,7 +22,7 @@ pub enum Covariance {
     Updated(String),
 }
 
-/// Everything that was found.
+/// All results.
 #[derive(Debug, Clone)]
 pub struct Tracked {
     /// The estimate over the record.

@@ -29,13 +29,13 @@ pub struct GroupRunArgs {
     /// Manifest in TOML, or a directory with group.toml
     #[arg(value_name = "DIR|MANIFEST", required = true)]
     pub manifest: Option<PathBuf>,
-    /// Directory for tables, report and parts; it is made if it is not there
+    /// Directory for tables, report and parts; it is made if it is missing
     #[arg(long, value_name = "DIR", required = true)]
     pub out: Option<PathBuf>,
     /// Threads. Default: one a core
     #[arg(long, value_name = "J", value_parser = clap::value_parser!(u16).range(1..))]
     pub jobs: Option<u16>,
-    /// Go on with a group that was stopped
+    /// Continue with a group that was stopped
     #[arg(long)]
     pub resume: bool,
     /// Write CSV next to Parquet

@@ -66,7 +66,7 @@ pub struct IdentifyArgs {
     pub show: ShowArgs,
 }
 
-/// The structures; names of before are read, and not shown.
+/// The structures; earlier names are read, and not shown.
 fn structures() -> PossibleValuesParser {
     let polynomials = Structure::ALL.map(|structure| PossibleValue::new(structure.name()));
     let before = ["grey-box", "family", "time-varying"].map(|name| PossibleValue::new(name).hide(true));

@@ -15,7 +15,7 @@ pub struct ReadArgs {
     /// Column of the output (control): a name, -name, or a difference
     #[arg(long, value_name = "COLUMN", default_value = "u", allow_hyphen_values = true)]
     pub output: String,
-    /// Column of the time, and its unit after a colon where it is not found by itself: s, ms, us, ns, min, h, iso
+    /// Column of the time, and its unit after a colon where it is not found automatically: s, ms, us, ns, min, h, iso
     /// (dates and times), sec+nanosec [default: t, or a default name of a time]
     #[arg(long, value_name = "COLUMN[:UNIT]", value_parser = parse_time)]
     pub time: Option<TimeChoice>,
@@ -52,7 +52,7 @@ pub struct PrepareArgs {
     /// declared
     #[arg(long, value_name = "CHANNEL=UNIT", value_parser = parse_unit, value_delimiter = ',')]
     pub unit: Vec<(String, String)>,
-    /// Drop rows that are there twice, time included
+    /// Drop rows that are duplicated, time included
     #[arg(long)]
     pub drop_repeated: bool,
     /// Multiply a channel: by a factor (u=12.5), into a unit (u=12.5:deg), or from unit to unit
@@ -85,7 +85,7 @@ pub struct DecimateArgs {
 }
 
 impl DecimateArgs {
-    /// Processing for an estimator; what counts samples is not decimated by itself.
+    /// Processing for an estimator; what counts samples is not decimated automatically.
     pub fn of(self, counts_samples: bool) -> Decimation {
         if counts_samples {
             self.decimate.when_named()

@@ -12,7 +12,7 @@ use super::choices::choice_of;
 
 #[derive(Debug, Args)]
 pub struct DemoArgs {
-    /// Directory for the record, the results and the report; it is made if it is not there
+    /// Directory for the record, the results and the report; it is made if it is missing
     #[arg(long, value_name = "DIR", default_value = "hoid-demo")]
     pub out: PathBuf,
     /// Seed of the simulated run

@@ -21,7 +21,7 @@ pub fn check(show: &ShowArgs) -> Result<(), CliError> {
     })
 }
 
-/// Writes it where it is asked for, from the object of the result.
+/// Writes it where it is requested, from the object of the result.
 ///
 /// # Errors
 /// The errors of the object and of writing.

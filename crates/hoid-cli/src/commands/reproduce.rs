@@ -53,7 +53,7 @@ pub fn run(args: &ReproduceArgs) -> Result<(), CliError> {
     })?;
     let Some(found) = found else {
         return Err(CliError::Stopped(format!(
-            "the reproduction was stopped; completed parts are in {}, the same command goes on with it",
+            "the reproduction was stopped; completed parts are in {}, the same command continues with it",
             args.out.display()
         )));
     };

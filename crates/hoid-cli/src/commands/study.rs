@@ -105,7 +105,7 @@ pub fn with_progress(
         Ok(outcome)
     } else {
         Err(CliError::Stopped(format!(
-            "{name} was stopped; completed parts are in {}, go on with --resume",
+            "{name} was stopped; completed parts are in {}, continue with --resume",
             directory.display()
         )))
     }

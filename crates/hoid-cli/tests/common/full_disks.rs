@@ -76,7 +76,7 @@ pub fn rounds(bench: &Bench, work: &Work, count: usize, draw: &mut Draw) -> Opti
         let again = bench.command(work, &place).output().unwrap();
         let said = String::from_utf8_lossy(&again.stderr).into_owned();
         if !again.status.success() || said.contains("damaged") {
-            fail(format!("goes on with {}: {said}", again.status));
+            fail(format!("continues with {}: {said}", again.status));
         }
         compare(&expected, &place, &what).into_iter().for_each(&mut fail);
         fs::remove_dir_all(&place).unwrap();

@@ -32,7 +32,7 @@ pub struct Work {
     pub name: &'static str,
     /// Before `--out`.
     pub arguments: &'static [&'static str],
-    /// What lets it go on.
+    /// What lets it continue.
     pub resume: &'static [&'static str],
     /// Whether its blocks are in `parts/` of the directory itself.
     pub has_parts: bool,

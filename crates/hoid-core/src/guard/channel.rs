@@ -29,10 +29,10 @@
 //! deviations on, one of 8e9 samples. The floor is a share of the signal's mean magnitude below which an
 //! outlier is worth nothing.
 //!
-//! **While it is held back** the signal goes on along its last slope where that has a meaning (order 2 or more), damped
-//! with a time constant of [`SLOPE_S`], else at its last value. It has come back when it is as near to that as it may
-//! be after h samples: within `max(m q_j, floor) + h q_1` if it has a slope, and `max(m q_1, floor) sqrt(h + 1)` if it
-//! wanders.
+//! **While it is held back** the signal continues along its last slope where that has a meaning (order 2 or more),
+//! damped with a time constant of [`SLOPE_S`], else at its last value. It has come back when it is as near to that as
+//! it may be after h samples: within `max(m q_j, floor) + h q_1` if it has a slope, and `max(m q_1, floor) sqrt(h + 1)`
+//! if it wanders.
 
 /// Orders of the differences.
 pub const ORDERS: usize = 4;
@@ -336,7 +336,7 @@ impl ChannelGuard {
         (x - expected).abs() <= room
     }
 
-    /// Goes on from a sample that has come back, with the mean slope since the last good one.
+    /// Continues from a sample that has come back, with the mean slope since the last good one.
     pub fn resume(&mut self, x: f64) {
         let slope = (x - self.base) / (f64::from(self.held) + 1.0);
         self.last = x;
@@ -345,7 +345,7 @@ impl ChannelGuard {
         (self.held, self.size) = (0, 0.0);
     }
 
-    /// Goes on from the last samples of the signal as they came, the newest last.
+    /// Continues from the last samples of the signal as they came, the newest last.
     pub fn restart(&mut self, samples: impl Iterator<Item = f64>) {
         (self.known, self.held, self.size, self.slope) = (0, 0, 0.0, 0.0);
         let mut first = true;

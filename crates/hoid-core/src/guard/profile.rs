@@ -44,7 +44,7 @@ const SWAPPED: f64 = 6.0;
 /// Largest evidence of one block.
 const MOST_EVIDENCE: f64 = 4.0;
 const MISFIT: f64 = 4.0;
-/// R below which no model predicts too little.
+/// Ratio R below which a model predicts well enough.
 const LEAST_RATIO: f64 = 1.5;
 /// Growth of the innovations without which it is not a misfit.
 const LEAST_GROWTH: f64 = 2.0;
@@ -481,7 +481,7 @@ mod tests {
         }
     }
 
-    /// The stick is where it rests and e goes on; not so where the person does an unpredicted sample, or e is
+    /// The stick is where it rests and e continues; not so where the person does an unpredicted sample, or e is
     /// stationary too.
     #[test]
     fn a_rest_is_not_frozen_but_a_rest_that_does_not_fit_is() {

@@ -96,7 +96,7 @@ pub struct Learning {
     pub estimate: Coefficient,
 }
 
-/// An estimate that is not there, and why.
+/// An estimate that does not exist, and why.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct LeftOut {
     /// The quantity that was compared without it.
@@ -105,7 +105,7 @@ pub struct LeftOut {
     pub subject: String,
     /// In which condition.
     pub condition: String,
-    /// Why it is not there.
+    /// Why it is missing.
     pub reason: String,
 }
 
@@ -120,7 +120,7 @@ pub struct Comparison {
     pub means: Vec<Mean>,
     /// The differences.
     pub differences: Vec<Difference>,
-    /// Changes from run to run, where they were asked for.
+    /// Changes from run to run, where they were requested.
     pub learning: Vec<Learning>,
     /// Missing people.
     pub left_out: Vec<LeftOut>,
@@ -181,7 +181,8 @@ impl Comparison {
     /// Reads the output of [`Self::to_json`].
     ///
     /// # Errors
-    /// [`AnalysisError::NotAResult`] for a text that is none, is damaged, or is of another version.
+    /// [`AnalysisError::NotAResult`] for a text that is invalid, is damaged, or is of another
+    /// version.
     pub fn from_json(text: &str) -> Result<Self, AnalysisError> {
         let none = |found: String| AnalysisError::NotAResult { found };
         let object: Value = serde_json::from_str(text).map_err(|error| none(format!("it is not JSON: {error}")))?;

@@ -24,7 +24,7 @@ pub enum CompareError {
     /// Nothing to judge a mean by.
     #[error("all estimates are equal: there is no scatter to judge a difference by; is a run given twice?")]
     NoScatter,
-    /// A quantity that is none.
+    /// A quantity that is invalid.
     #[error(
         "there is no quantity {found:?} to compare; expected crossover, phase_margin, tau_e, gain_db@W or phase_deg@W with W in rad/s, rms_e, rms_u, or a parameter of the operator such as K, T_L, omega_nm"
     )]

@@ -38,7 +38,7 @@ pub struct Level {
     pub members: Vec<String>,
 }
 
-/// A factor as it is asked for.
+/// A factor as it is requested.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Factor {
     /// Its name.

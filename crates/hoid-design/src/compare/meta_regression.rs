@@ -22,7 +22,7 @@
 //!   `I^2 = tau^2/(tau^2 + v)` with the typical `v = (n - p)/tr P` at zero (J. P. T. Higgins and S. G. Thompson,
 //!   *Stat. Med.* 21 (2002) 1539-1558).
 //!
-//! Where no error is known all `v_i` are zero: tau^2 is the sample variance, and Q is not there.
+//! Where no error is known all `v_i` are zero: tau^2 is the sample variance, and Q is missing.
 
 use hoid_model::named_choice;
 use nalgebra::{DMatrix, DVector};

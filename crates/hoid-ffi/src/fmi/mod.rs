@@ -10,7 +10,7 @@
 //! | `model` | what takes samples: tracker and operator |
 //! | `operator` | the operator of a scenario, of the thesis or of the family |
 //! | `component` | handles, statuses and messages of both interfaces |
-//! | `state` | its state, to go back to it or to go on elsewhere |
+//! | `state` | its state, to go back to it or to continue elsewhere |
 //! | `fmi2`, `fmi3` | the functions of FMI 2.0 and 3.0 |
 
 mod component;

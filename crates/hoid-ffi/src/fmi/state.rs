@@ -1,5 +1,5 @@
-//! The state of an instance, to go back to it or to go on elsewhere with the same digits (FMI 2.0.4, section
-//! 2.1.8; FMI 3.0.1, section 2.2.10).
+//! The state of an instance, to go back to it or to continue elsewhere with the same digits (FMI 2.0.4, section 2.1.8;
+//! FMI 3.0.1, section 2.2.10).
 //!
 //! A state in the hands of an importer is what it is serialised to (`packed`). The description is the token of the
 //! unit, where the instance is in its experiment and the values of all variables; the bytes are those of the tracker,

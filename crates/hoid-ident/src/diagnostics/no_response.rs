@@ -36,7 +36,7 @@ const LAG_RATE: f64 = 0.3;
 const NEUROMUSCULAR: (f64, f64) = (11.0, 0.4);
 /// Records without a relation that are drawn.
 const SURROGATES: usize = 1999;
-/// Fewest frequencies.
+/// Least number of frequencies.
 const FEWEST: usize = 12;
 const SEED: u64 = 0x686f_6964;
 const COLUMNS: usize = 3;

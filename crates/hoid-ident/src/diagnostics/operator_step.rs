@@ -32,7 +32,7 @@ const NOISE: usize = 4;
 /// Parameters of the operator.
 const OPERATOR: usize = 5;
 
-/// The step that a record asks for in one parameter.
+/// The step in one parameter that fits a record better.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OperatorStep {
     /// Name of the parameter.

@@ -71,7 +71,7 @@ impl SigmoidFit {
                         "the delay {value:.3} s lies at the end of the range in which it was searched for; widen it"
                     ),
                 )),
-                // A pure integration, or a lag that is none.
+                // A pure integration, or an absent lag.
                 Some(Remark::AtBound) if name == "T_I" => all.push(Finding::note(
                     "lag",
                     format!("T_I and K are not determined, K/T_I is: T_I rests at a bound, {value:.3} s"),

@@ -1,7 +1,7 @@
 //! Least squares after an autoregression: what remains of u when some columns are taken out, white.
 //!
 //! Of `u = X b + level + v`, `D v = eps`, noise model of order [`NOISE`] and b in turn, residuals beyond a given number
-//! of standard deviations limited to it where a limit is asked for.
+//! of standard deviations limited to it where a limit is requested.
 
 use nalgebra::{DMatrix, DVector};
 

@@ -34,7 +34,7 @@ pub struct FormFigures {
 const NO_EVIDENCE: f64 = 2.0;
 /// Weight below which a form is left out: its part in a mean is less than its error.
 const LEAST_WEIGHT: f64 = 0.02;
-/// Most forms that are averaged.
+/// Largest number of forms that are averaged.
 const MOST_FORMS: usize = 4;
 
 /// The best form and the weight of each, from their criteria, simplest form first; `None` for a form that does not

@@ -24,7 +24,7 @@ use crate::{SearchOptions, criterion::Workspace, optimize::Objective};
 const LARGEST_AT_START: f64 = 0.05;
 /// Share that the best of them may leave where the noise is little: of a person's u no operator explains so much.
 const LITTLE: f64 = 5e-3;
-/// Share below which the residual is rounding, which no search is to go on for.
+/// Share below which the residual is rounding, which no search is to continue for.
 const ROUNDING: f64 = 1e-25;
 /// Points of a grid from which a form is searched that has not been found without noise, and how often: the second time
 /// next to the best that the first has found.

@@ -45,7 +45,7 @@ pub struct Parameter {
     pub prior_share: f64,
     /// True if the data determine it.
     pub determined: bool,
-    /// The forms whose estimates it is the mean of; empty if it is that of one form alone.
+    /// The forms over which the estimate is averaged; empty for a single form.
     pub averaged_over: Vec<Form>,
 }
 

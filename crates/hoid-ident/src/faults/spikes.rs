@@ -2,9 +2,9 @@
 //!
 //! Two explanations of a large innovation is compared with each other (A. J. Fox, *J. Royal Statistical Society B* 34
 //! (1972) 350-363; I. Chang, G. C. Tiao and C. Chen, *Technometrics* 30 (1988) 193-204). A *push* of the person enters
-//! the innovations: it moves the channel, which then goes on as it always does. A *fault* is added to the samples
-//! alone: each innovation after it is off by a coefficient of A, and the channel goes on as if nothing had been. For m
-//! samples from s on,
+//! the innovations: it moves the channel, which then continues as it always does. A *fault* is added to the samples
+//! alone: each innovation after it is off by a coefficient of A, and the channel continues as if nothing had been. For
+//! m samples from s on,
 //!
 //! | explanation | what it leaves of `S = sum eps^2/sigma^2` |
 //! |---|---|

@@ -137,7 +137,7 @@ struct Run {
 /// [`IdentError::NoRecords`], [`IdentError::MixedSampling`], [`IdentError::NotWholePeriods`],
 /// [`IdentError::LineBeyondNyquist`], [`IdentError::NoExcitation`] for e or u that does not move,
 /// [`IdentError::NoLinePower`] for a line without power, [`IdentError::BadOption`] for a channel
-/// that is not there.
+/// that does not exist.
 pub fn describe(
     records: &[Record],
     excitation: &Excitation,

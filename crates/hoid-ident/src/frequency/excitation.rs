@@ -86,7 +86,7 @@ impl Excitation {
     /// The lines omega_k in rad/s, each a harmonic of the period T in s within 1e-4 of a harmonic.
     ///
     /// # Errors
-    /// [`IdentError::BadOption`] for a line that is none, and as [`Excitation::of_harmonics`].
+    /// [`IdentError::BadOption`] for a line that is invalid, and as [`Excitation::of_harmonics`].
     pub fn new(omega_rad_s: &[f64], period_s: f64) -> Result<Self, IdentError> {
         let mut harmonics = Vec::with_capacity(omega_rad_s.len());
         for &omega in omega_rad_s {
@@ -124,7 +124,7 @@ impl Excitation {
     /// with the period given it is refused.
     ///
     /// # Errors
-    /// [`IdentError::BadOption`] for a channel that is not there, or whose power is not in such
+    /// [`IdentError::BadOption`] for a channel that does not exist, or whose power is not in such
     /// lines: noise, or a span of no whole periods; [`IdentError::NoExcitation`] for a constant
     /// channel; [`IdentError::NotWholePeriods`].
     pub fn found_in(record: &Record, channel: &str, search: &LineSearch) -> Result<Self, IdentError> {

@@ -35,7 +35,7 @@ const GRID_ZETA: [f64; 3] = [0.25, 0.7, 1.3];
 /// Time constants of the remnant, s; the first ranks the grid.
 /// Below half a sample a filter of third order has another minimum.
 pub(crate) const GRID_TIME_CONSTANT_S: [f64; 6] = [0.1, 0.004, 0.012, 0.03, 0.06, 0.3];
-/// Fewest delays over a range that is not a point.
+/// Least number of delays over a range that is not a point.
 const FEWEST_DELAYS: usize = 3;
 
 /// A start with its name: `[K_e, K_e_dot, omega_nm, zeta_nm, tau_e, T_n]`, the same for all

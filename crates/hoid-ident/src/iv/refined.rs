@@ -34,7 +34,7 @@ const FAR: f64 = 1.15;
 /// Steps below this share of the output are rounding.
 const ROUNDING: f64 = 1e-12;
 
-/// Iterates, and where that does not settle goes on in the nonlinear form ([`super::own_poles`]);
+/// Iterates, and where that does not settle continues in the nonlinear form ([`super::own_poles`]);
 /// `noise_of` gives the noise model that belongs to a system.
 pub(super) fn settle(
     limits: IterationLimits,

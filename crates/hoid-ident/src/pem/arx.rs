@@ -28,7 +28,7 @@ const WELL_CONDITIONED: f64 = 1e7;
 /// Share of the residuals in the power of the output below which the fit counts as exact here.
 const EXACT: f64 = 1e-12;
 
-/// Solution of the regression with what its uncertainty needs.
+/// Solution of the regression with the data for its uncertainty.
 #[derive(Debug)]
 struct Regression {
     pub theta: Vec<f64>,

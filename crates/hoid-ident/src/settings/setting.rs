@@ -85,7 +85,7 @@ impl Setting {
     /// Reads a value.
     ///
     /// # Errors
-    /// [`IdentError::BadOption`] for a text that is none, or out of the bounds.
+    /// [`IdentError::BadOption`] for a text that is invalid, or out of the bounds.
     pub fn read<V: Value>(&self, text: &str) -> Result<V, IdentError> {
         let bad = |expected: String| self.refused(text, &expected);
         let value = V::read(text.trim()).map_err(bad)?;

@@ -308,7 +308,7 @@ impl SigmoidFit {
     }
 
     /// Standard deviation of the innovations before and after the change; `None` if the same
-    /// throughout was asked for, or the residuals have no size.
+    /// throughout was requested, or the residuals have no size.
     pub fn noise_levels(&self) -> Option<[f64; 2]> {
         self.levels
     }

@@ -29,7 +29,7 @@ pub const SIGMOID_NAMES: [(&str, &str); 9] = [
     ("tau_e", "s"),
 ];
 
-/// Most parameters of a numerator.
+/// Largest number of parameters of a numerator.
 pub(crate) const MOST_VARYING: usize = 3;
 
 /// Where everything is in theta.

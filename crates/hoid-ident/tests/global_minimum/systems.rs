@@ -14,7 +14,7 @@ const SAMPLES: usize = 300;
 /// Samples before it.
 const RUN_IN: usize = 500;
 
-/// A system, what was recorded of it, and random numbers for the caller that goes on with it.
+/// A system, what was recorded of it, and random numbers for the caller that continues with it.
 pub struct System {
     pub orders: Orders,
     pub theta: Vec<f64>,

@@ -1,5 +1,5 @@
-//! Rows that are there twice, and stalls: channels that all hold their values while the time goes
-//! on.
+//! Rows that are duplicated, and stalls: channels that all hold their values while the time
+//! continues.
 //!
 //! One channel may hold because a hand rests, and two in coarse steps may do so together. A stall
 //! is reported by the channel that naturally holds shortest: all hold for longer than `min_c L_c`.
@@ -92,7 +92,7 @@ pub(super) fn stalls(signals: &Signals<'_>, levels: &[Levels], grid: Option<&Gri
     if moving.is_empty() || rows < 3 {
         return;
     }
-    // Whether each row holds the row before; rows that are there twice are another matter.
+    // Whether each row holds the row before; rows that are duplicated are another matter.
     let advances = |row: usize| grid.is_none_or(|grid| grid.standing.binary_search(&row).is_err());
     let holds: Vec<Vec<bool>> = moving
         .iter()

@@ -9,7 +9,7 @@ use crate::IoError;
 use crate::record::ReadOptions;
 use crate::table::{Table, column_expression};
 
-/// Problems with the columns that are asked for, within the span.
+/// Problems with the columns that are requested, within the span.
 ///
 /// # Errors
 /// [`IoError::NoSuchColumn`] and [`IoError::Expression`].

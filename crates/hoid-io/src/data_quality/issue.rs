@@ -18,9 +18,9 @@ pub enum QualityIssueKind {
     Missing,
     /// Time that stays constant or runs back.
     Unordered,
-    /// Rows that are there twice, time included.
+    /// Rows that are duplicated, time included.
     Repeated,
-    /// Rows that are not there.
+    /// Rows that do not exist.
     Gap,
     /// Times off an even grid.
     Jitter,
@@ -28,7 +28,7 @@ pub enum QualityIssueKind {
     Clock,
     /// A clock whose rate changes.
     Drift,
-    /// All channels hold their values while the time goes on.
+    /// All channels hold their values while the time continues.
     Stalled,
     /// A channel that stays at its end.
     Saturated,

@@ -7,7 +7,7 @@
 //! | `signals` | the columns that are examined |
 //! | `grid` | the even grid after a time |
 //! | `timing` | jitter, missing rows, a time that is constant or decreases, a clock that is off or drifts |
-//! | `holds` | rows that are there twice, and channels that all hold their values |
+//! | `holds` | rows that are duplicated, and channels that all hold their values |
 //! | `values` | saturation, quantisation, constants, missing values |
 //! | `search` | all of these, for columns that belong together, and for the channels of a record |
 //! | `in_table` | the same for the columns that a record is made of |

@@ -93,7 +93,7 @@ impl FmuSettings {
     /// Behaviour of the unit.
     ///
     /// # Errors
-    /// For a kind that is none.
+    /// For a kind that is invalid.
     pub fn kind(&self) -> Result<FmuKind, String> {
         FmuKind::of_name(&self.kind).map_err(|error| format!("{FMU_SETTINGS}: {error}"))
     }

@@ -27,7 +27,7 @@ pub fn write_atomically(path: &Path, write: impl FnOnce(&mut dyn Write) -> io::R
     file.finish()
 }
 
-/// Makes a directory for results, and those above it, where they are not there yet.
+/// Makes a directory for results, and those above it, where they are not available yet.
 ///
 /// # Errors
 /// [`IoError::Unwritable`] for errors that the operating system reports.

@@ -102,7 +102,7 @@ fn make(directory: &Path) -> io::Result<NamedTempFile> {
 }
 
 /// The error of the system without the name of the part, which belongs to no person business: the
-/// message names the place that was asked for.
+/// message names the place that was requested.
 fn without_path(error: io::Error) -> io::Error {
     let text = error.to_string();
     match text.split_once(" at path ") {

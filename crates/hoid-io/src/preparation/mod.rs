@@ -1,6 +1,6 @@
 //! Treatment of a record between the file and the estimator, and the account of it.
 //!
-//! The steps are taken in one order, whatever the order in which they were asked for:
+//! The steps are taken in one order, whatever the order in which they were requested:
 //!
 //! | step | module | what it does |
 //! |---|---|---|

@@ -29,7 +29,7 @@ pub struct Preparation {
     pub run_in_s: f64,
     /// Trend removed from input and output, last.
     pub detrend: Detrend,
-    /// Whether rows that are there twice, time included, are dropped before anything is read.
+    /// Whether rows that are duplicated, time included, are dropped before anything is read.
     pub drop_repeated: bool,
 }
 

@@ -13,7 +13,7 @@ use crate::wording::decimal;
 #[serde(tag = "step", rename_all = "kebab-case")]
 #[non_exhaustive]
 pub enum Step {
-    /// Rows that were there twice, time included, were dropped.
+    /// Rows that were duplicated, time included, were dropped.
     DropRepeated {
         /// Rows dropped.
         rows: usize,

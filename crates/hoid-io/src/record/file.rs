@@ -1,6 +1,6 @@
 //! Records from files and into files.
 //!
-//! Reading takes the columns that are asked for, finds the sampling, checks every value in use and
+//! Reading takes the columns that are requested, finds the sampling, checks every value in use and
 //! gives a [`Record`], or the error that names the place. Nothing is repaired unless
 //! [`Repair`](crate::Repair) asks for it, and what was repaired is reported in the notes. The
 //! format follows from the extension.

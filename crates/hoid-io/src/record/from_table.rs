@@ -26,7 +26,7 @@ pub struct ReadRecord {
     pub quality_issues: Vec<QualityIssue>,
 }
 
-/// The record in a table, without rows that are there twice where that is asked for.
+/// The record in a table, without rows that are duplicated where that is requested.
 pub(super) fn record_of(
     mut table: Table<'_>,
     options: &ReadOptions,

@@ -1,4 +1,4 @@
-//! The remedies for damaged records, applied only when they are asked for: rows that were written
+//! The remedies for damaged records, applied only when they are requested: rows that were written
 //! twice are dropped, straight lines are drawn over missing values, and from an uneven t to an even
 //! grid.
 //!

@@ -94,8 +94,8 @@ impl TableReader<'_> {
         (densest.len() > 2 && densest.len() + 2 < t.len()).then_some(densest)
     }
 
-    /// The values of a column in use: all finite, the missing ones bridged where that was asked
-    /// for.
+    /// The values of a column in use: all finite, the missing ones bridged where that was
+    /// requested.
     pub(super) fn values(&mut self, column: usize, rows: Range<usize>, t: Option<&[f64]>) -> Result<Vec<f64>, IoError> {
         let source = &mut self.table.columns[column];
         let may_fill = self.options.repair.fill;

@@ -21,7 +21,7 @@ const SHORTEST: usize = 8;
 /// Trials that were found: their names and rows.
 type Parts = Vec<(String, Range<usize>)>;
 
-/// The trial of a table that was asked for; the table itself where it holds one only.
+/// The trial of a table that was requested; the table itself where it holds one only.
 pub(crate) fn of_table<'a>(table: Table<'a>, choice: Option<&TrialChoice>) -> Result<Table<'a>, IoError> {
     let file = || table.source.file().to_owned();
     let (by, parts) = match choice {

@@ -144,7 +144,7 @@ pub(crate) fn check_names(names: &[String], file: &str, notes: &mut Vec<String>)
     Ok(())
 }
 
-/// Most columns of a table: a recording has some tens.
+/// Largest number of columns of a table: a recording has some tens.
 const MOST_COLUMNS: usize = 10_000;
 
 /// Checks the number of columns, before anything is made of them.

@@ -1,5 +1,5 @@
 //! The columns of a file of any format, before a record is made of them: what their cells mean, and
-//! which of them are asked for.
+//! which of them are requested.
 //!
 //! | module | contents |
 //! |---|---|

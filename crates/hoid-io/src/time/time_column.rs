@@ -94,7 +94,7 @@ pub(crate) fn with_time<'a>(mut table: Table<'a>, choice: Option<&TimeChoice>) -
     Ok(table)
 }
 
-/// The column that was asked for.
+/// The column that was requested.
 fn chosen(table: &Table<'_>, choice: &TimeChoice) -> Result<(usize, Option<Unit>), IoError> {
     let position = |name: &str| table.columns.iter().position(|column| column.name == name);
     let unit = choice.unit;

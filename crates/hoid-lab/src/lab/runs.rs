@@ -20,7 +20,7 @@ use crate::{
 impl Shared {
     pub(super) fn send_run(&self, state: &mut Current, id: u64) -> Result<(), LabError> {
         if state.run.is_some() {
-            return Err(LabError::Order("a run goes on".to_owned()));
+            return Err(LabError::Order("a run continues".to_owned()));
         }
         let session = session_of(state)?;
         let Some(planned) = session.next() else {
@@ -184,7 +184,7 @@ impl Shared {
         Ok(())
     }
 
-    /// Ends the run that goes on, if one does.
+    /// Ends the run that continues, if one does.
     pub(super) fn end_run(
         &self,
         state: &mut Current,

@@ -7,7 +7,7 @@ use std::{
 
 /// Longest head of a request, bytes.
 const LONGEST: usize = 16 * 1024;
-/// Most lines of a head.
+/// Largest number of lines of a head.
 const MOST_LINES: usize = 64;
 
 /// The used parts of a request.
@@ -46,7 +46,7 @@ impl Request {
         }
         let path = parsed.path?.split('?').next()?.to_owned();
         let method = parsed.method?.to_owned();
-        // A header that is there twice belongs to no person honest one.
+        // A header that is duplicated belongs to no person honest one.
         let header = |name: &str| {
             let mut all = parsed.headers.iter().filter(|h| h.name.eq_ignore_ascii_case(name));
             let value = std::str::from_utf8(all.next()?.value).ok()?.trim().to_owned();

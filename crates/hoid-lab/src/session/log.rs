@@ -90,7 +90,7 @@ pub struct Batch {
     pub frames: Vec<Frame>,
 }
 
-/// The files of a run that goes on.
+/// The files of a run that continues.
 #[derive(Debug)]
 pub struct RunLog {
     files: [(PathBuf, File); 3],
@@ -105,7 +105,7 @@ impl RunLog {
     /// Makes the files with their headers.
     ///
     /// # Errors
-    /// [`LabError::File`]; a file that is there already is not written over.
+    /// [`LabError::File`]; a file that is already present is not written over.
     pub fn create(stem: &Stem, ticks: usize) -> Result<Self, LabError> {
         let headers = [
             "tick,u,e\n",
@@ -242,7 +242,7 @@ mod tests {
         assert!(log.append(&batch(10)).unwrap_err().to_string().contains("frames.csv"));
         assert_eq!(log.ticks(), 10);
         assert_eq!(std::fs::read(stem.file("ticks.csv")).unwrap(), before);
-        // Once there is room it goes on where it was.
+        // Once there is room it continues where it was.
         log.files[2].1 = frames;
         log.append(&batch(10)).unwrap();
         assert_eq!(log.ticks(), 20);

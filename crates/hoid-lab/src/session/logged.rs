@@ -24,8 +24,8 @@ pub struct Logged {
 }
 
 impl Logged {
-    /// Reads it, as far as it is whole: to the end of the last line, in the words of a line that is none, and nothing
-    /// of a file that is not there, which reports it in `faults`.
+    /// Reads it, as far as it is whole: to the end of the last line, in the words of a line that is invalid, and
+    /// nothing of a file that does not exist, which reports it in `faults`.
     ///
     /// # Errors
     /// [`LabError::Io`] for errors that the operating system reports of a file that is there.
@@ -48,7 +48,7 @@ impl Logged {
     }
 }
 
-/// Calls `each` with the numbers of every whole line after the header, up to one that is none; the problems of the
+/// Calls `each` with the numbers of every whole line after the header, up to one that is invalid; the problems of the
 /// file, if something is.
 fn rows<const N: usize>(path: &Path, mut each: impl FnMut([f64; N])) -> Result<Option<String>, LabError> {
     let name = || {
@@ -56,7 +56,7 @@ fn rows<const N: usize>(path: &Path, mut each: impl FnMut([f64; N])) -> Result<O
             .map_or_else(String::new, |name| name.to_string_lossy().into_owned())
     };
     if !path.exists() {
-        return Ok(Some(format!("{} is not there", name())));
+        return Ok(Some(format!("{} is missing", name())));
     }
     let bytes = hoid_io::read_bytes(path)?;
     let whole = whole_lines(&bytes);

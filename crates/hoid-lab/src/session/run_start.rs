@@ -172,7 +172,7 @@ impl Ended {
         read_json(&path).map(Some)
     }
 
-    /// The hashes of the files as they are; empty for one that is not there.
+    /// The hashes of the files as they are; empty for one that does not exist.
     ///
     /// # Errors
     /// [`LabError::Io`].

@@ -1,4 +1,4 @@
-//! The session as a whole: what is planned, what is done, and how it goes on after whatever ended it.
+//! The session as a whole: what is planned, what is done, and how it continues after whatever ended it.
 
 use std::{
     collections::BTreeMap,
@@ -120,7 +120,7 @@ impl Session {
     /// Starts a session of a person who has confirmed the consent.
     ///
     /// # Errors
-    /// [`LabError::Order`] for a pseudonym that is none; those of files.
+    /// [`LabError::Order`] for a pseudonym that is invalid; those of files.
     pub fn begin(out: &Path, config: &Config, subject: &str, cc0: bool) -> Result<Self, LabError> {
         check_subject(subject)?;
         hoid_io::make_directory(out)?;

@@ -174,7 +174,7 @@ impl Hostile {
         }
     }
 
-    /// A session one file of which is another, opened, judged and shown.
+    /// A session with one changed file, opened, judged and shown.
     fn damaged(&mut self, draw: &mut Draw) {
         let at = self.directory.path().join("damaged/sub-P01/ses-01");
         let _ = fs::remove_dir_all(&at);

@@ -236,7 +236,7 @@ impl RemnantPart {
         if self.signal_dependence.is_some() && self.intermittence.is_some() {
             return Err(ModelError::Operator {
                 reason: "a part of the remnant follows u and is there at times only: u is larger while it is there, and its \
-                         strength would not be what is asked for; make two parts of it"
+                         strength would not be what is requested; make two parts of it"
                     .to_owned(),
             });
         }

@@ -6,7 +6,7 @@ use std::str::FromStr;
 use super::kernel::{Kernel, PASS, STOP_DB};
 use crate::{ModelError, SampleTime};
 
-/// Rates above it are decimated by themselves, Hz.
+/// Rates above it are decimated automatically, Hz.
 const HIGHEST_HZ: f64 = 200.0;
 /// The rate that they are brought near to, Hz.
 const WANTED_HZ: f64 = 100.0;

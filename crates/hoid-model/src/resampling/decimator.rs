@@ -114,7 +114,7 @@ impl<const C: usize> Decimator<C> {
         numbers
     }
 
-    /// Goes on where the one was that [`Decimator::saved`] was asked of; false for numbers of another.
+    /// Continues where the one was that [`Decimator::saved`] was asked of; false for numbers of another.
     #[must_use]
     pub fn restore(&mut self, numbers: &[f64]) -> bool {
         let (mut left, mut lacking) = (numbers.iter(), false);

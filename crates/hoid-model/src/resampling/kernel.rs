@@ -71,7 +71,7 @@ impl Kernel {
         })
     }
 
-    /// Samples that it reaches to each side of the one asked for.
+    /// Samples that it reaches to each side of the requested one.
     pub fn half(self) -> usize {
         self.half
     }
@@ -214,7 +214,7 @@ mod tests {
                         (gain - 1.0).abs() < 5e-5 && leak < 5e-5,
                         "{factor}, {share}: {gain}, {leak:e}"
                     );
-                    // Linear phase: symmetric about the place asked for.
+                    // Linear phase: symmetric about the requested place.
                     assert!(delay.abs() < 1e-10, "{delay:e}");
                 }
                 let (gain, _) = response(&weights, nyquist, fraction);

@@ -6,13 +6,12 @@
 //! x'(k) = sum_n h(n) x(k M - n),    k = 0 .. round(N/M) - 1
 //! ```
 //!
-//! (R. E. Crochiere and L. R. Rabiner, *Multirate Digital Signal Processing*, 1983, chapter 2). h is
-//! the windowed sinc of [`Kernel`], the same for all channels, its delay compensated: what is between
-//! e and u stays between them. Beyond its ends the record goes on as its reflection in the end point,
-//! `x(-n) = 2 x(0) - x(n)` (as zero-phase filters have it: F. Gustafsson, IEEE Trans. Signal
-//! Processing 44 (1996) 988-992), so that no sample is lost and whole periods stay whole. What is
-//! invented so reaches half the filter, about 14 new samples, into the record, and is above its pass
-//! band.
+//! (R. E. Crochiere and L. R. Rabiner, *Multirate Digital Signal Processing*, 1983, chapter 2). h is the windowed sinc
+//! of [`Kernel`], the same for all channels, its delay compensated: what is between e and u stays between them. Beyond
+//! its ends the record continues as its reflection in the end point, `x(-n) = 2 x(0) - x(n)` (as zero-phase filters
+//! have it: F. Gustafsson, IEEE Trans. Signal Processing 44 (1996) 988-992), so that no sample is lost and whole
+//! periods stay whole. What is invented so reaches half the filter, about 14 new samples, into the record, and is above
+//! its pass band.
 //!
 //! **The filter** passes up to 0.8 of the new Nyquist frequency and stops what would fold into that
 //! band, from 1.2 of it on, by 80 dB; in between it falls to half at the Nyquist frequency. A filter

@@ -167,7 +167,7 @@ fn a_stream_has_the_digits_of_the_record() {
 fn missing_values_are_nobodys() {
     let value = |k: usize| waves(k as f64 * 1e-3);
     let samples = |k: usize| match k {
-        // A gap in both, a value of u alone, and a start that is not there.
+        // A gap in both, a value of u alone, and a start that does not exist.
         0..7 | 1500..1523 => (f64::NAN, f64::NAN),
         2000 => (value(k), f64::INFINITY),
         _ => (value(k), value(k)),

@@ -59,7 +59,7 @@ pub struct BoxPanel {
     pub name: String,
     /// Its unit; empty for none.
     pub unit: String,
-    /// The boxes by group and, in each, by series; a place that is not there is one without a
+    /// The boxes by group and, in each, by series; a place that does not exist is one without a
     /// value.
     pub boxes: Vec<Vec<BoxStatistics>>,
     /// Size up to which the ordinate is linear, and logarithmic beyond; linear throughout where it

@@ -92,7 +92,7 @@ pub fn group_figures(manifest: &Manifest, out: &Path) -> Result<Vec<(String, Str
 /// is where the manifest was read.
 ///
 /// # Errors
-/// [`ReportError::Io`], [`ReportError::Study`] for tables that are not there and pages that cannot be written;
+/// [`ReportError::Io`], [`ReportError::Study`] for tables that do not exist and pages that cannot be written;
 /// [`ReportError::Template`] for a defect of this crate.
 pub fn write_group_pages(manifest: &Manifest, path: &Path, out: &Path) -> Result<Vec<PathBuf>, ReportError> {
     let read = Tables::read(out)?;

@@ -123,7 +123,7 @@ fn grid(traces: &[Evaluated<'_>], record: &Record, panels: Vec<TracePanel>) -> T
 }
 
 /// Quantities that people determine: gain and phase at the frequencies of the traces, crossover and phase margin with
-/// the controlled element, and the level of the remnant; `None` where neither was asked for.
+/// the controlled element, and the level of the remnant; `None` where neither was requested.
 pub fn response_grid(traces: &[Evaluated<'_>], record: &Record) -> Option<TraceGrid> {
     let mut panels = Vec::new();
     let mut add = |name: String, unit: &str, of: &dyn Fn(&Trace, usize) -> Option<Estimate>| {

@@ -86,7 +86,7 @@ impl FamilyOperatorRun {
         beside.into_iter().chain(self.numbers().map(|number| *number)).collect()
     }
 
-    /// Goes on from where an operator of the same scenario and run was ([`FamilyOperatorRun::saved`]), with the same
+    /// Continues from where an operator of the same scenario and run was ([`FamilyOperatorRun::saved`]), with the same
     /// digits. False if the numbers are of another; then nothing has changed.
     pub fn restore(&mut self, saved: &[f64]) -> bool {
         let Some((&[k, n], rest)) = saved.split_first_chunk::<2>() else {
@@ -223,7 +223,7 @@ mod tests {
         }
     }
 
-    /// An operator goes on in another, after the end of its scenario too.
+    /// An operator continues in another, after the end of its scenario too.
     #[test]
     fn a_saved_operator_goes_on_with_the_same_digits() {
         let new = || FamilyOperatorRun::new(FamilySimulator::new(&busy()).unwrap(), SEED, 0.0).unwrap();

@@ -102,7 +102,7 @@ impl RemnantRun {
     /// The remnant of sample `k`, which comes after that of `k - 1`.
     #[inline]
     pub fn next(&mut self, scenario: &ResolvedFamilyScenario, of: &Remnants, k: usize) -> f64 {
-        // After the end of the scenario it goes on.
+        // After the end of the scenario it continues.
         if k >= self.steps.len() {
             self.draw(scenario, 2 * k + 1);
         }

@@ -144,7 +144,7 @@ impl Manifest {
             }
             if !known.insert((&run.subject, &run.condition, &run.run)) {
                 return Err(format!(
-                    "run {} of {} in {:?} is there twice, the second time as {}: give each its own run",
+                    "run {} of {} in {:?} is duplicated, the second time as {}: give each its own run",
                     run.run,
                     run.subject,
                     run.condition,

@@ -23,7 +23,7 @@
 //! | `join` | the tables of the group from those of its runs |
 //!
 //! Each run is a part on disk, as a block of a study is, and so are the findings in all runs of a person in a
-//! condition, which comes first: a group that was stopped goes on, and of a run nothing stays in memory but its
+//! condition, which comes first: a group that was stopped continues, and of a run nothing stays in memory but its
 //! estimates and responses; traces are averaged for one person in one condition after the other.
 
 mod analysis;

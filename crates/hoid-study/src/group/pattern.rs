@@ -46,8 +46,8 @@ impl Pattern {
     /// Reads a pattern.
     ///
     /// # Errors
-    /// [`StudyError::Pattern`] for braces that are not closed, other names, one that is there
-    /// twice, two names without a text between them, or a pattern without `{run}`.
+    /// [`StudyError::Pattern`] for braces that are not closed, other names, one that is duplicated,
+    /// two names without a text between them, or a pattern without `{run}`.
     pub fn new(text: &str) -> Result<Self, StudyError> {
         let bad = |reason: String| StudyError::Pattern {
             pattern: text.to_owned(),
@@ -69,7 +69,7 @@ impl Pattern {
                     )));
                 }
                 if parts.contains(&Part::Name(name.to_owned())) {
-                    return Err(bad(format!("{{{name}}} is there twice")));
+                    return Err(bad(format!("{{{name}}} is duplicated")));
                 }
                 if matches!(parts.last(), Some(Part::Name(_))) {
                     return Err(bad(format!("nothing separates {{{name}}} from the name before it")));

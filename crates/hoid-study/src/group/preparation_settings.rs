@@ -46,7 +46,7 @@ pub struct PreparationSettings {
     /// Time from the first sample that is dropped, s.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub run_in_s: Option<f64>,
-    /// Whether rows that are there twice are dropped.
+    /// Whether rows that are duplicated are dropped.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub drop_repeated: Option<bool>,
 }

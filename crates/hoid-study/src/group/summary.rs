@@ -3,7 +3,7 @@
 //! | finding | weight | when |
 //! |---|---|---|
 //! | `nothing-read` | undetermined | no run could be read |
-//! | `nothing-determined` | undetermined | operators were asked for, and of no person there is one that the data determine |
+//! | `nothing-determined` | undetermined | operators were requested, and of no person there is one that the data determine |
 //! | `run-failed` | doubt | a run could not be read |
 //! | `condition-failed` | doubt | no operator could be fitted to a person in a condition |
 //! | `person-not-determined`, `person-doubtful` | doubt | the verdict on a person |
@@ -55,7 +55,7 @@ impl GroupSummary {
     /// From the tables in the directory of a finished group.
     ///
     /// # Errors
-    /// [`StudyError::Io`] for tables that are not there.
+    /// [`StudyError::Io`] for tables that do not exist.
     pub fn read(manifest: &Manifest, directory: &Path) -> Result<Self, StudyError> {
         let table = |name: &str| read_table(&table_path(directory, name, false));
         let (people, estimates) = (people_of(&table(PEOPLE)?), table("estimates")?);

@@ -108,7 +108,7 @@ pub fn simulate_group(
     )
 }
 
-/// Most runs of a virtual experiment: a file each.
+/// Largest number of runs of a virtual experiment: a file each.
 const MOST_RUNS: u64 = 100_000;
 
 /// Checks the number of files that an experiment would write.

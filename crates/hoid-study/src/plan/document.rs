@@ -83,7 +83,7 @@ const MOST_REPLICATIONS: u64 = 100_000_000;
 /// Largest number of estimates of a study.
 const MOST_ESTIMATES: u128 = 10_000_000_000;
 
-/// Most blocks of a study: a few files each.
+/// Largest number of blocks of a study: a few files each.
 const MOST_BLOCKS: u128 = 1_000_000;
 
 impl Plan {

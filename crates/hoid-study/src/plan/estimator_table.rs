@@ -159,7 +159,7 @@ pub(crate) struct EstimatorTable {
     pub(super) start: Option<BTreeMap<String, StartValue>>,
     /// Own starts from which a search runs to its end. Default 2.
     pub(super) starts: Option<usize>,
-    /// Most iterations of a search. Default 100.
+    /// Largest number of iterations of a search. Default 100.
     pub(super) max_iterations: Option<usize>,
     /// Shortest and longest delay tau_e of an operator, s. Default 0.05 to 0.6, of operator 0.02 to 0.8.
     #[serde(alias = "delay_range_s")]

@@ -122,7 +122,7 @@ pub(super) fn smooth(
     Ok(joined.iter().map(&mut row).collect())
 }
 
-/// The mixtures of pairs at the samples asked for, ascending.
+/// The mixtures of pairs at the requested samples, ascending.
 fn two_sided(
     record: &Record,
     alarm: f64,

@@ -21,11 +21,11 @@
 //! ([`super::laguerre`]). With e the method needs the right noise model in a closed loop: z then
 //! holds past noise, which is independent of a white eps only.
 //!
-//! **Covariance.** To first order the errors go on as `t <- (I - A) t - g eps` with rows `g_i phi'`
-//! for B and F and `g_i psi'` for D (psi the gradient for all parameters: D inherits what B and F
-//! are wrong by), so that `sigma^2 C` with `C <- (I - A) C (I - A)' + g g'` is the covariance of
-//! theta, whatever gain was used: for lambda = 1 that of the batch method, with forgetting about
-//! `P/(1 + lambda)`.
+//! **Covariance.** To first order the errors continue as `t <- (I - A) t - g eps` with rows
+//! `g_i phi'` for B and F and `g_i psi'` for D (psi the gradient for all parameters: D inherits
+//! what B and F are wrong by), so that `sigma^2 C` with `C <- (I - A) C (I - A)' + g g'` is the
+//! covariance of theta, whatever gain was used: for lambda = 1 that of the batch method, with
+//! forgetting about `P/(1 + lambda)`.
 //!
 //! **Stability.** A step of B and F is halved until the roots of F lie within [`RADIUS`].
 

@@ -24,11 +24,11 @@ pub struct About {
 pub struct Task<'a> {
     /// The record.
     pub record: &'a Record,
-    /// Samples after which an estimate is asked for, in their order.
+    /// Samples after which an estimate is requested, in their order.
     pub at: &'a [usize],
     /// Frequencies of the lines of the forcing function, rad/s.
     pub lines_rad_s: &'a [f64],
-    /// Frequencies at which the response is asked for, rad/s; some of the lines.
+    /// Frequencies at which the response is requested, rad/s; some of the lines.
     pub omega_rad_s: &'a [f64],
     /// Span from which a start is fitted, s.
     pub start_s: (f64, f64),
@@ -40,7 +40,7 @@ pub struct Task<'a> {
     pub change: Option<(f64, f64)>,
 }
 
-/// Result of a comparator, one entry for each sample that was asked for.
+/// Result of a comparator, one entry for each sample that was requested.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Followed {
     /// The response at each frequency.
@@ -108,7 +108,7 @@ impl Task<'_> {
         }
         if let Some(k) = self.at.iter().find(|k| **k >= e.len()) {
             return Err(unsuited(
-                "a sample that is asked for",
+                "a sample that is requested",
                 k.to_string(),
                 "one of the record",
             ));

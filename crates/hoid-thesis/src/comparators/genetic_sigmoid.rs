@@ -15,8 +15,8 @@
 //!
 //! with the unit responses y_0, y_1 of [`super::unit_responses`] and K_e, T_L along the sigmoid
 //! `1/(1 + e^(-G (t - t_M)))`; d1 is the least-squares value for each v. The best of the last
-//! generation is the start of [`SigmoidChange`], which goes on by Gauss-Newton steps to the maximum
-//! of the likelihood, as the source does.
+//! generation is the start of [`SigmoidChange`], which continues by Gauss-Newton steps to the
+//! maximum of the likelihood, as the source does.
 
 use std::f64::consts::TAU;
 
@@ -48,7 +48,7 @@ const RANGES: [(f64, f64); 9] = [
 const N: usize = RANGES.len();
 /// Place of t_M.
 const MIDPOINT: usize = 4;
-/// Members that go on as they are.
+/// Members that continue as they are.
 const ELITE: usize = 2;
 /// Members that are drawn for each parent.
 const DRAWN: usize = 3;

@@ -1,7 +1,7 @@
 //! The survey's other methods as comparators: those that Part II of the thesis describes (section 2.4) and that need
 //! more than the samples so far: the lines, what comes after, a second run. The recursive ones are in `hoid_survey`.
 //!
-//! A comparator follows a record and reports, at times that are asked for, what the operator's response is at some
+//! A comparator follows a record and reports, at times that are requested, what the operator's response is at some
 //! frequencies, and its parameters where it has them. Each is small, after the source that it names, tuned on runs of
 //! its own (the page "The survey's methods" of the book states how), and reached by the plan of a
 //! [survey](crate::survey), not by `track --method`: these are here to be compared with.

@@ -15,10 +15,9 @@
 //!
 //! `g' K^-1 g = sum_i (g_i - g_{i+1})^2/(decay^i - decay^(i+1)) + g_{nb-1}^2/decay^(nb-1)`.
 //!
-//! The recursion is in the information form, `R(t) = lambda R(t-1) + phi phi'` and the same of
-//! `phi u`: sums of squares that stay positive whatever the excitation. They are solved where an
-//! estimate is asked for. The Fourier transform of g is the response, `H = sum g_i e^(-j omega i Ts)`.
-//! It has no poles, and so no operator parameters.
+//! The recursion is in the information form, `R(t) = lambda R(t-1) + phi phi'` and the same of `phi u`: sums of squares
+//! that stay positive whatever the excitation. They are solved where an estimate is requested. The Fourier transform of
+//! g is the response, `H = sum g_i e^(-j omega i Ts)`. It has no poles, and so no operator parameters.
 
 use hoid_ident::{settings, settings::Bounds};
 use nalgebra::DMatrix;
@@ -70,7 +69,7 @@ impl RlsFir {
         inverse
     }
 
-    /// The impulse responses after the samples that are asked for.
+    /// The impulse responses after the samples that are requested.
     fn impulse_responses(&self, task: &Task<'_>) -> Result<Vec<Vec<f64>>, ThesisError> {
         let (e, u) = task.signals(NAME, self.nb)?;
         let lambda = 1.0 - 1.0 / self.memory;

@@ -45,7 +45,7 @@ pub(super) struct Run {
 }
 
 impl Run {
-    /// One replication, P_n and m0 as asked for.
+    /// One replication, P_n and m0 as requested.
     pub fn of(condition: Condition, order: usize, level: f64) -> Self {
         Self::replication(condition, order, level, 0)
     }
@@ -100,7 +100,7 @@ impl Run {
         }
     }
 
-    /// The true responses at the samples that are asked for.
+    /// The true responses at the samples that are requested.
     pub fn responses(&self) -> Vec<Vec<Complex64>> {
         let task = self.task();
         let of = |k: &usize| response_of(&self.operator(*k), self.record.sample_time(), task.omega_rad_s).unwrap();

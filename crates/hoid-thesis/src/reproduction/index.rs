@@ -35,7 +35,7 @@ pub struct StudyEntry {
     pub directory: String,
     /// Estimates that were made.
     pub estimates: u64,
-    /// Time that it took, s; none when it was there already.
+    /// Time that it took, s; none when it already existed.
     pub seconds: Option<f64>,
 }
 

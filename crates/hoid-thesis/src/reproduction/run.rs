@@ -2,7 +2,7 @@
 //! tests the claims, writes the index page.
 //!
 //! Studies are in `studies/NAME`, pictures and numbers in `figures` and `tables`. A study that is
-//! there already is taken as it is, so that a reproduction that was stopped goes on.
+//! already present is taken as it is, so that a reproduction that was stopped continues.
 
 use std::{
     collections::BTreeSet,
@@ -76,7 +76,7 @@ pub struct ReproductionSummary {
 }
 
 /// Reproduces into a directory; none when `goes_on` has stopped it, and then it can be called again
-/// to go on.
+/// to continue.
 ///
 /// # Errors
 /// [`ThesisError::UnknownItem`]; [`ThesisError::Study`] and [`ThesisError::Io`] for failures of

@@ -28,7 +28,7 @@
 //! | `supposed` | omega_nm, zeta_nm or tau_e of the last row are the prior before the record (a note) |
 //! | `last-row` | the estimate at the end is doubtful or no estimate, whatever the other rows are |
 //! | `not-followed` | what the last seconds of the record show against the last row |
-//! | `structure` | errors of before carry more information about u than the operator at the end does |
+//! | `structure` | earlier errors carry more information about u than the operator at the end does |
 //! | `sign` | the response at .5 rad/s would push the error away, where no controlled element is named |
 //! | `unstable-loop`, `no-crossover` | with the controlled element, the loop of the last row could not have been held |
 //! | `undeclared-change`, `drifting`, `swaying` | the response is not the same where no change is declared |

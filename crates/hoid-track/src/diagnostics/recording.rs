@@ -75,8 +75,8 @@ impl Trace {
         all
     }
 
-    /// Where e and u stay constant and the estimate goes on, which was asked for: nothing arrives there, and its error
-    /// bars go to zero with the innovations ([`crate::stationary`]).
+    /// Where e and u stay constant and the estimate continues, which was requested: nothing arrives there, and its
+    /// error bars go to zero with the innovations ([`crate::stationary`]).
     pub(super) fn learnt_at_rest(&self, record: &Record) -> Option<Finding> {
         if self.options().method.guard() != Some(GuardChoice::No) {
             return None;
@@ -146,7 +146,7 @@ impl Trace {
         worst.map(|(_, words)| Finding::doubt("not-followed", words))
     }
 
-    /// An estimate that is none at the end, whatever it was before.
+    /// An estimate that is invalid at the end, whatever it was before.
     pub(super) fn last_row_finding(&self) -> Option<Finding> {
         let operator = self.operator(self.len().checked_sub(1)?).ok()?;
         let nothing = is_open(&operator.k_e) && is_open(&operator.k_e_dot) && !self.response_is_known;

@@ -5,17 +5,17 @@
 //! |---|---|---|---|
 //! | outlier of up to [`LONGEST_S`] | the prediction of e; the recursion's own prediction of u | stays | the recursion is put back to before it and takes the samples again, those that were held back interpolated |
 //! | a jump that stays, a pulse of the hand | the same | stays | the recursion is put back to before it and takes the samples as they came: the result is that without a guard |
-//! | no numbers for longer | the same | stays | goes on once the filters have settled |
-//! | 30 times the typical magnitude | the long-run mean of e, the prediction of u | stays | goes on from there once the filters have settled |
-//! | frozen, idle, larger or rescaled, swapped, misfit (by blocks of a second) | the samples, into the filters alone | is put back to before it | goes on from there once the span is over and the filters have settled |
-//! | an estimate that has gone diverged by [`hoid_core::guard::reference`] | the samples, into the filters alone | is put back to the start | goes on from there once the filters have settled |
+//! | no numbers for longer | the same | stays | continues once the filters have settled |
+//! | 30 times the typical magnitude | the long-run mean of e, the prediction of u | stays | continues from there once the filters have settled |
+//! | frozen, idle, larger or rescaled, swapped, misfit (by blocks of a second) | the samples, into the filters alone | is put back to before it | continues from there once the span is over and the filters have settled |
+//! | an estimate that has gone diverged by [`hoid_core::guard::reference`] | the samples, into the filters alone | is put back to the start | continues from there once the filters have settled |
 //!
-//! **Steps and pulses.** `e = r - y`: a step of the target moves e by the same within one sample, and y goes on; so
-//! does u, for the person answers after their delay. A jump of e that stays, after which e moves as it did while u goes
-//! on as predicted, is tracking and is not told. A sensor that is disturbed lets go as fast as it took hold: what comes
-//! back by a jump is an outlier. A hand that is fast goes out of a dead zone at once but comes back over several
-//! samples: an excursion of u of [`PULSE_S`] or more within [`PULSE`] times its mean magnitude, whose last step is
-//! within what u moves anyway, is a pulse, taken as it came.
+//! **Steps and pulses.** `e = r - y`: a step of the target moves e by the same within one sample, and y continues; so
+//! does u, for the person answers after their delay. A jump of e that stays, after which e moves as it did while u
+//! continues as predicted, is tracking and is not told. A sensor that is disturbed lets go as fast as it took hold:
+//! what comes back by a jump is an outlier. A hand that is fast goes out of a dead zone at once but comes back over
+//! several samples: an excursion of u of [`PULSE_S`] or more within [`PULSE`] times its mean magnitude, whose last step
+//! is within what u moves anyway, is a pulse, taken as it came.
 //!
 //! **Putting back.** The numbers of a recursion are few ([`hoid_core::state`]). They are kept when a
 //! sample is first held back, every [`SOUND_EVERY`] blocks in which all was well (the last two are

@@ -25,7 +25,7 @@ impl Entrant for OfMethod {
         let options = self.options(task)?;
         match task.record() {
             Some(record) if task.seam.is_none() => {
-                // Rows at every half second, on which all times that are asked for lie.
+                // Rows at every half second, on which all times that are requested lie.
                 let every = (0.5 / task.sample_time.s()).round() as usize;
                 let trace = track(&record, &options, every).map_err(|e| e.to_string())?;
                 let row = |t_s: &f64| ((t_s / task.sample_time.s() / every as f64 + 1e-6) as usize).max(1) - 1;
@@ -110,7 +110,7 @@ fn over_samples(task: &Task, options: &TrackOptions) -> Result<EntrantResult, St
     Ok(answer)
 }
 
-/// The report at a time; nothing while one of the responses is not there.
+/// The report at a time; nothing while one of the responses is missing.
 fn reported(responses: Option<Vec<Response>>, operator: Option<&OperatorEstimate>) -> ReportedResponse {
     let Some(responses) = responses else {
         return ReportedResponse::default();

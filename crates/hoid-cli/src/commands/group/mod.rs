@@ -106,7 +106,7 @@ fn write_manifest(args: &GroupInitArgs) -> Result<(), CliError> {
     let piped = path.as_os_str() == "-";
     if !piped && path.exists() {
         return Err(CliError::Usage(format!(
-            "{} is there already; remove it or name another with --out",
+            "{} is already present; remove it or name another with --out",
             path.display()
         )));
     }
@@ -171,7 +171,7 @@ fn analyse(path: &Path, out: &Path, args: &GroupRunArgs) -> Result<(), CliError>
     paper_table::check(&args.show)?;
     output_paths::check(&[&path], &[args.show.table.as_deref()], &[])?;
     let manifest = Manifest::read(&path)?;
-    // What goes on writes no manifest.
+    // What continues writes no manifest.
     if !args.resume {
         hoid::io::check_output_directory(out, &[&path])?;
     }

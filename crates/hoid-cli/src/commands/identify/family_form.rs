@@ -14,7 +14,7 @@ use crate::{error::CliError, text};
 const STRAIGHT_ERRORS: f64 = 2.0;
 const LEAST_HALF_S: f64 = 0.007;
 
-/// Everything that was found.
+/// All results.
 pub struct FamilyReport<'a> {
     pub identified: &'a Identified,
     pub fit: &'a FamilyFit,

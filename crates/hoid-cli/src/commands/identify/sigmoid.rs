@@ -83,7 +83,7 @@ fn before_and_after(fit: &SigmoidFit) -> String {
     rows.to_string()
 }
 
-/// Everything that was found.
+/// All results.
 struct SigmoidReport<'a> {
     fit: &'a SigmoidFit,
     verdict: &'a Verdict,

@@ -185,7 +185,7 @@ impl Columns {
         }
     }
 
-    /// A sample of its numbers; those that are not there are `None`.
+    /// A sample of its numbers; those that do not exist are `None`.
     fn sample(
         &self,
         t: Option<Result<f64, Fault>>,

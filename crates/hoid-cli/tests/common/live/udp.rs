@@ -91,7 +91,7 @@ impl Stream {
         last_words(&mut self.child, &mut self.said)
     }
 
-    /// Ends the stream without a word; its port and the socket.
+    /// Ends the stream silently; its port and the socket.
     pub fn killed(mut self) -> (u16, UdpSocket) {
         self.child.kill().unwrap();
         self.child.wait().unwrap();

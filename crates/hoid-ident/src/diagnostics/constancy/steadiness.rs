@@ -15,7 +15,7 @@ use super::{
 };
 use crate::diagnostics::whitened::{LIMIT, NOISE, Whitened, thinning};
 
-/// Fewest blocks of 2 s.
+/// Least number of blocks of 2 s.
 const FEWEST: usize = 8;
 
 /// A response that is not the same throughout.

@@ -19,7 +19,7 @@ use super::search::{Constancy, pseudo_inverse};
 const MOVED: f64 = 2.0;
 /// The same relative to random blocks, where there are few of them.
 const BY_CHANCE: f64 = 4.5;
-/// Fewest blocks.
+/// Least number of blocks.
 const FEWEST: usize = 5;
 
 /// A block, and what is elsewhere without it.

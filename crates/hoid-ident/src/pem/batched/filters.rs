@@ -154,7 +154,7 @@ pub(super) fn filter_response<R: Number>(zero: R, [d, f]: [&[f64]; 2], r: &mut [
     whiten(zero, d, r, x_f, at);
 }
 
-/// `y = x/F` from place `at` on, where y goes on from what is before.
+/// `y = x/F` from place `at` on, where y continues from what is before.
 #[inline(always)]
 fn divide<R: Number>(zero: R, f: &[f64], x: &[f64], y: &mut [f64], at: usize) {
     y[at..at + x.len()].copy_from_slice(x);

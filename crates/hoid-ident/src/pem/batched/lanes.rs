@@ -47,7 +47,7 @@ thread_local! {
     static LEFT: Cell<Option<Memory>> = const { Cell::new(None) };
 }
 
-/// Most numbers of a signal that are kept.
+/// Largest number of numbers of a signal that are kept.
 const KEPT: usize = 1 << 18;
 
 impl Drop for Lanes {

@@ -1,5 +1,5 @@
 //! Numbers as they are in a file: bytes, a type, and where each starts. They become `f64` when they
-//! are asked for.
+//! are requested.
 
 use std::rc::Rc;
 
@@ -111,7 +111,7 @@ impl Numbers {
         self.kind
     }
 
-    /// Each `stride`-th number from `first` on, `len` of them; those that are not there are left
+    /// Each `stride`-th number from `first` on, `len` of them; those that do not exist are left
     /// away.
     pub(crate) fn line(&self, first: usize, stride: usize, len: usize) -> Self {
         let there = if first >= self.len {

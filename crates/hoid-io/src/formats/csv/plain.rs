@@ -63,7 +63,7 @@ impl RowStarts {
 pub(super) struct Plain {
     /// Values by column.
     pub(super) values: Vec<Vec<f64>>,
-    /// Precision of the columns where it was asked for.
+    /// Precision of the columns where it was requested.
     pub(super) precision: Vec<Precision>,
     /// Where the rows start.
     pub(super) starts: Vec<usize>,
@@ -71,7 +71,7 @@ pub(super) struct Plain {
     pub(super) end: usize,
 }
 
-/// A table as its rows are read: what divides the cells, and the columns whose precision is asked for.
+/// A table as its rows are read: what divides the cells, and the columns whose precision is requested.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Layout<'a> {
     pub(super) separator: u8,

@@ -99,7 +99,7 @@ pub(super) fn streams(bytes: &[u8]) -> Result<(Vec<Stream>, Option<usize>), Stri
             let samples =
                 empty(&header.format).ok_or_else(|| damaged(format!("its format is \"{}\"", shown(&header.format))))?;
             if known.insert(id, streams.len()).is_some() {
-                return Err(damaged(String::from("its header is there a second time")));
+                return Err(damaged(String::from("its header is duplicated")));
             }
             streams.push(Stream {
                 id,
@@ -153,7 +153,7 @@ impl Stream {
     /// Compares the footer with the data.
     ///
     /// # Errors
-    /// What is not there.
+    /// What is missing.
     pub(super) fn check_footer(&self) -> Result<(), String> {
         let Some(footer) = self.footer else { return Ok(()) };
         let read = self.stamps.len();

@@ -13,7 +13,7 @@ pub fn bomb(draw: &mut Draw) -> Vec<u8> {
     let many = 1 << (10 + draw.below(7));
     let kind = *draw.one_of(&["double64", "int8", "string", "float32"]);
     match draw.below(8) {
-        // Channels that are not there, and samples.
+        // Channels that do not exist, and samples.
         0 => {
             chunk(&mut file, HEADER, &header(1, large, kind, "100", ""));
             chunk(&mut file, SAMPLES, &samples(&large.to_le_bytes(), &[0; 64]));

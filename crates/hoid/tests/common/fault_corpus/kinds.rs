@@ -61,7 +61,7 @@ pub enum What {
     Quantised,
     /// Rows that are gone for some seconds, the time counted as if nothing were.
     Lost,
-    /// Rows that are there twice for some seconds, the time counted on.
+    /// Rows that are duplicated for some seconds, the time counted on.
     Duplicated,
     /// u later by some samples from here on.
     Late,

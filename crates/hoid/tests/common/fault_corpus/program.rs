@@ -88,7 +88,7 @@ pub struct Outcome {
     pub refusal: Option<String>,
 }
 
-/// Evaluates a fault in the runs of `who` in each of the ways that are asked for and fit.
+/// Evaluates a fault in the runs of `who` in each of the ways that are requested and fit.
 ///
 /// # Errors
 /// Report of the simulation or the file system.

@@ -17,7 +17,7 @@ pub struct Table {
 }
 
 impl Table {
-    /// e and u of a record, with the disturbance where it is asked for and there.
+    /// e and u of a record, with the disturbance where it is requested and there.
     pub fn of(record: &Record, with_disturbance: bool) -> Self {
         let h = record.sample_time().s();
         Self {
@@ -45,14 +45,14 @@ impl Table {
         [&mut self.e, &mut self.u].into_iter().chain(self.d.as_mut())
     }
 
-    /// Counts the time again, as a recorder does that has no information about rows that are gone
-    /// or twice.
+    /// Counts the time again, as a recorder does that has no information about rows that are
+    /// missing or duplicated.
     pub fn renumber(&mut self) {
         let (n, h) = (self.e.len(), self.h);
         self.t = (0..n).map(|k| k as f64 * h).collect();
     }
 
-    /// As CSV; what is not there is an empty cell.
+    /// As CSV; missing items are an empty cell.
     pub fn to_csv(&self) -> String {
         let mut text = String::from(if self.d.is_some() { "t,e,u,d\n" } else { "t,e,u\n" });
         let cell = |x: f64| if x.is_nan() { String::new() } else { x.to_string() };
